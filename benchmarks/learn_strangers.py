@@ -37,10 +37,11 @@ from strangers.hidden import CURVES, PLAIN, STRANGERS
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
 from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import declared
 
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
 NAME = 'stranger'
@@ -87,7 +88,7 @@ def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
         day=(EPOCH_NS * 1e-9 + setting.clock_s) / 86400.0,
     )
     sizes = [q.value for q in term.parameters.values()]
-    acting = term.effect().action(Frame(ship, scenario, setting.first_rad), *sizes)
+    acting = declared(term).action(Frame(ship, scenario, setting.first_rad), *sizes)
     time_s = np.clip(t + 60.0, 0.0, scenario.length_s)
     read = simulate_columns(ship, scenario, [Action(), acting], time_s)
     change = np.concatenate(

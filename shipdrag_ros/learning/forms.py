@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.learning.term import LearntTerm, TermForm, TermParameter
 from shipdrag_ros.parameter import Prior, Shape, either_sign, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
+from shipdrag_ros.ship.term import TermForm, TermParameter
 from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.learnt import effect_of
 
 SMOOTH_OVER_FORM = 30.0
 """Prior odds of something smooth without a formula, over each form."""
@@ -30,7 +31,8 @@ _TURNS_AT = (0.55, 0.45)  # share of the highest speed: median, sd of the logari
 _LASTS = (0.25, 0.8)  # share of the longest run: the same
 _NARROW, _BROAD = 0.03, 0.1  # widths of steps, shares of the same
 _HUMPS = (0.06, 0.12, 0.24)
-_SCAN = (-1.8, -1.35, -0.9, -0.45, 0.0, 0.45, 0.9, 1.35, 1.8)  # z where a curve may turn
+_SCAN = (-1.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.6)  # z where a curve may turn
+_SIZES = (-1.2, 0.0, 1.2)  # z of a size alone
 _WAYS_ROUND = ((1.0, 0.0), (0.7, 0.7), (0.05, 1.0), (-0.7, 0.7))  # z of two components
 _REFERENCE = 0.2  # Froude number at which A is of the same size whatever the power
 
@@ -85,7 +87,7 @@ class LearnableForm:
         """
         Return it as an effect that may be missing.
         """
-        plain = self.term.effect()
+        plain = effect_of(self.term)
         parameters = tuple(
             replace(q, prior=prior, low=-math.inf, high=math.inf)
             for q, prior in zip(plain.parameters, self.priors, strict=True)
@@ -102,7 +104,7 @@ class LearnableForm:
             first.setdefault(way.mode, way)
         starts: list[tuple[float, ...]] = [(0.0, b, c) for b, c in _WAYS_ROUND]
         if len(self.priors) == 1:
-            starts = [(z,) for z in _SCAN]
+            starts = [(z,) for z in _SIZES]
         elif self.priors[1].shape is Shape.LOG_NORMAL:
             starts = [(0.0, z) for z in _SCAN]
         elif len(self.priors) == 2:
@@ -146,7 +148,7 @@ def _form(
     scope = 'earth' if variable in _OF_EARTH else 'sensor' if channel == 'log' else 'hull'
     term = LearntTerm(
         name=f'form_{number}_{channel}_{variable}_{shape}',
-        form=TermForm(channel, scope, variable, shape, expression, valid),
+        term=TermForm(channel, scope, variable, shape, expression, valid),
         parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
     )
     return LearnableForm((channel, variable, shape), term, tuple(parameters.values()))

@@ -26,16 +26,21 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
-from shipdrag_ros.learning.term import LearntTerm, TermEvidence, TermLimit, TermParameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit, TermParameter
+from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
-_FITTED = 16  # forms that are fitted: of each kind the best by the linear response, and more
+_FITTED, _KINDS = (
+    16,
+    10,
+)  # forms that are fitted: by the linear response, the best of so many kinds
+_BEGUN = 2  # starts of each
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
@@ -171,6 +176,7 @@ class _LearningCase:
     seen: tuple[Observation, ...]
     ship: Ship
     forms: dict[str, LearnableForm]
+    ways: dict[str, list[EffectWay]]
     comparing: Comparing
     found: ComparedHypotheses
 
@@ -180,11 +186,18 @@ class _LearningCase:
     ) -> _LearningCase:
         every = {form.term.name: form for form in forms(ship, _span(seen))}
         progress('looking for forms', 0, 0)
-        order = _comparing(runs, seen, ship, every, library=False).promising(len(every))
-        first = {every[name].kind: name for name in reversed(order)}  # the best of each kind
-        chosen = dict.fromkeys((*first.values(), *order))
-        kept = {name: every[name] for name in list(chosen)[:_FITTED]}
-        return cls.compared(runs, seen, ship, kept, progress)
+        longest = max(run.duration_s for run in seen)
+        ways = {name: form.ways(ship, longest, len(seen)) for name, form in every.items()}
+        ranked: dict[str, list[EffectWay]] = {}
+        for way in _comparing(runs, seen, ship, ways, library=False).promising():
+            ranked.setdefault(way.effect.name, []).append(way)
+        first: dict[object, str] = {}  # the best of each kind
+        for name in ranked:
+            first.setdefault(every[name].kind, name)
+        chosen = list(dict.fromkeys((*list(first.values())[:_KINDS], *ranked)))[:_FITTED]
+        kept = {name: every[name] for name in chosen}
+        begun = {name: ranked[name][:_BEGUN] for name in chosen}
+        return cls.compared(runs, seen, ship, kept, begun, progress)
 
     @classmethod
     def compared(
@@ -193,11 +206,12 @@ class _LearningCase:
         seen: Sequence[Observation],
         ship: Ship,
         kept: dict[str, LearnableForm],
+        ways: dict[str, list[EffectWay]],
         progress: Progress,
     ) -> _LearningCase:
         progress('comparing forms', 0, 0)
-        comparing = _comparing(runs, seen, ship, kept, library=True)
-        return cls(tuple(runs), tuple(seen), ship, kept, comparing, comparing.compare())
+        comparing = _comparing(runs, seen, ship, ways, library=True)
+        return cls(tuple(runs), tuple(seen), ship, kept, ways, comparing, comparing.compare())
 
     def moved_s(self) -> dict[str, float]:
         """Return by how much each stop is later than it is taken for."""
@@ -208,7 +222,7 @@ class _LearningCase:
     def half(self, which: int, progress: Progress) -> _LearningCase:
         """Return the same of every second run."""
         return _LearningCase.compared(
-            self.runs, self.seen[which::2], self.ship, self.forms, progress
+            self.runs, self.seen[which::2], self.ship, self.forms, self.ways, progress
         )
 
     def is_form(self, names: Names) -> bool:
@@ -230,22 +244,20 @@ def _comparing(
     runs: Sequence[CoastRun],
     seen: Sequence[Observation],
     ship: Ship,
-    kept: dict[str, LearnableForm],
+    ways: dict[str, list[EffectWay]],
     *,
     library: bool,
 ) -> Comparing:
     """Return a comparison of forms, beside the library or not."""
-    own = [e for e in LIBRARY.values() if not e.missing(ship)] if library else []
-    effects = [*own, *(form.effect() for form in kept.values())]
+    own = [e for e in effects_of(ship).values() if not e.missing(ship)] if library else []
+    effects = [*own, *(each[0].effect for each in ways.values())]
     facts_of = {run.name: run.facts for run in runs}
     stops = [run.context.stop for run in seen]
     at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
     stated = [(facts_of[run.name], ns) for run, ns in zip(seen, at_ns, strict=True)]
     known = stated_facts(ship, stated).log_likelihood
     comparing = Comparing(ship_runs(seen, ship), ship, effects, known)
-    longest = max(run.duration_s for run in seen)
-    for name, form in kept.items():
-        comparing.ways[name] = form.ways(ship, longest, len(seen))
+    comparing.ways.update(ways)
     return comparing
 
 
@@ -402,7 +414,7 @@ class _Judged:
         single = [
             (fit.log_evidence, names[0])
             for names, fit in self.case.found.best.items()
-            if len(names) == 1 and names != UNKNOWN and names[0] in LIBRARY
+            if len(names) == 1 and names != UNKNOWN and names[0] not in self.case.forms
         ]
         return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
 

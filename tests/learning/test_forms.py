@@ -25,7 +25,7 @@ def test_there_are_forms_by_each_variable() -> None:
     assert len({form.term.name for form in FORMS}) == len(FORMS)
 
 
-@pytest.mark.parametrize('form', FORMS, ids=lambda form: form.term.form.expression)
+@pytest.mark.parametrize('form', FORMS, ids=lambda form: form.term.term.expression)
 def test_each_acts_at_every_start(form: LearnableForm) -> None:
     scenario = Scenario(speed_m_s=7.0, heading_rad=0.4, day=20005.0, depth_m=15.0)
     frame, speed, after = (

@@ -10,11 +10,12 @@ import pytest
 
 import shipdrag_ros as sd
 from shipdrag_ros.learning import words
-from shipdrag_ros.learning.folder import using
 from shipdrag_ros.learning.search import Learnt
-from shipdrag_ros.learning.term import LearntTerm
+from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Scenario
 from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import using
+from shipdrag_ros.simulation.learnt import force_n
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 # a sharp edge: a broad one looks like a hump about it
@@ -53,8 +54,8 @@ def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
     assert (term.form.variable, term.form.shape) == ('speed', 'step')
     values = tuple(each.value for each in term.parameters.values())
     speed = np.linspace(1.5, 6.5, 60)
-    true = HIDDEN.force_n(FRAME, tuple(SIZES.values()), speed)
-    found = term.force_n(FRAME, values, speed)
+    true = force_n(HIDDEN, FRAME, tuple(SIZES.values()), speed)
+    found = force_n(term, FRAME, values, speed)
     # nine in ten of what it does to the ship are known
     assert np.sqrt(np.mean((found - true) ** 2)) < 0.2 * np.sqrt(np.mean(true**2))
 

@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.learning.folder import using
-from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import (
     Scenario,
     sense,
@@ -28,7 +27,8 @@ from shipdrag_ros.simulation import (
     standard_sensors,
 )
 from shipdrag_ros.simulation.effect import Frame
-from shipdrag_ros.simulation.effects import LIBRARY, parse
+from shipdrag_ros.simulation.effects import LIBRARY, declared, parse, using
+from shipdrag_ros.simulation.learnt import force_n
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')
@@ -86,7 +86,7 @@ def refused(whole: Any) -> None:
     stream = io.StringIO()
     YAML(typ='safe').dump(whole, stream)
     with pytest.raises(EffectFileError):
-        LearntTerm.from_yaml(stream.getvalue())
+        declared(LearntTerm.from_yaml(stream.getvalue()))
 
 
 def test_a_term_acts_as_its_formula_says() -> None:
@@ -96,22 +96,22 @@ def test_a_term_acts_as_its_formula_says() -> None:
     root = math.sqrt(GRAVITY_M_S2 * ship.length_m)
     step = 0.5 * (1.0 + np.tanh((0.09 * root - speed) / (0.02 * root)))
     wanted = 0.5 * ship.water.density_kg_m3 * 0.002 * ship.length_m**2 * speed**2 * step
-    found = term.effect().action(frame, 0.002, 0.09).resistance_n(speed)
+    found = declared(term).action(frame, 0.002, 0.09).resistance_n(speed)
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
 
 
 def test_beyond_its_speeds_a_force_goes_on_as_the_square() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(WEED)
-    inside, beyond = term.force_n(frame_of(ship), (0.002, 0.09), np.array([7.9, 15.8]))
+    inside, beyond = force_n(term, frame_of(ship), (0.002, 0.09), np.array([7.9, 15.8]))
     assert beyond == pytest.approx(4.0 * inside)
-    assert term.force_n(frame_of(ship), (0.002, 0.09), np.array([0.0]))[0] == 0.0
+    assert force_n(term, frame_of(ship), (0.002, 0.09), np.array([0.0]))[0] == 0.0
 
 
 def test_a_force_in_time_is_followed() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(FADING)
     scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
     frame = Frame(ship, scenario, 0.0)
-    action = term.effect().action(frame, 0.02, 100.0)
+    action = declared(term).action(frame, 0.02, 100.0)
     after = np.linspace(0.0, 900.0, 200)
     area = sum(turn.drag_area_m2 * turn.share(after) for turn in action.turns)
     tau_s = 100.0 * math.sqrt(ship.length_m / GRAVITY_M_S2)
@@ -125,7 +125,7 @@ def test_a_force_of_the_earth_turns_with_the_heading() -> None:
     forces = []
     for heading in (0.0, math.pi):
         frame = Frame(ship, Scenario(speed_m_s=6.0, heading_rad=heading), 0.0)
-        forces.append(float(term.effect().action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
+        forces.append(float(declared(term).action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
     assert forces[0] == pytest.approx(-forces[1])
     assert forces[0] > 0.0
 
@@ -143,7 +143,7 @@ def test_a_log_in_time_reads_as_its_formula_says() -> None:
     speed = np.interp(time_s, truth.time_s, truth.speed_through_water_m_s)
     wanted = speed * (1.0 + 0.05 * np.exp(-since / tau_s))
     np.testing.assert_allclose(block.value[:, 0], wanted, atol=2e-4)
-    action = term.effect().action(frame_of(ship), 0.05, 100.0)
+    action = declared(term).action(frame_of(ship), 0.05, 100.0)
     column = simulate_columns(ship, scenario, [action], time_s).log_m_s[0]
     np.testing.assert_allclose(column, wanted, atol=2e-4)
 
@@ -159,7 +159,7 @@ def test_a_log_in_time_reads_as_its_formula_says() -> None:
 def test_a_force_by_depth_or_date_is_of_the_run(
     text: str, runs: tuple[dict[str, float], dict[str, float]], ratio: float
 ) -> None:
-    effect, ship = LearntTerm.from_yaml(text).effect(), Ship.example()
+    effect, ship = declared(LearntTerm.from_yaml(text)), Ship.example()
     one, other = (
         effect.action(Frame(ship, Scenario(speed_m_s=6.0, **run), 0.0), 0.02).resistance_n(3.0)
         for run in runs
@@ -185,7 +185,7 @@ def test_more_of_it_slows_the_ship_more() -> None:
 def test_a_term_survives_its_own_text_and_a_process(text: str) -> None:
     term = LearntTerm.from_yaml(text)
     assert LearntTerm.from_yaml(term.to_yaml()) == term
-    assert pickle.loads(pickle.dumps(term.effect())).act(
+    assert pickle.loads(pickle.dumps(declared(term))).act(
         Frame(Ship.example(), Scenario(speed_m_s=6.0), 0.0), 0.001, 0.1
     )
 
@@ -323,7 +323,7 @@ def test_any_value_of_a_key_passes_or_is_a_plain_error(key: str, value: Any) -> 
     except EffectFileError:
         return
     assert np.isfinite(
-        term.force_n(frame_of(Ship.example()), (0.001, 0.09), np.array([2.0]))
+        force_n(term, frame_of(Ship.example()), (0.001, 0.09), np.array([2.0]))
     ).all()
 
 
