@@ -8,7 +8,8 @@ What `shipdrag learn` makes of effects that the library lacks, on ships that sha
 
 `--show` is the whole way with one stranger: diagnosed, learnt, the gap on a run that was kept,
 and a later run diagnosed by name. Without it every stranger is learnt on every ship, and ships
-without one; a run that was broken off goes on where it was. `--table` shows what is there.
+without one; a run that was broken off goes on where it was. `--table` shows what is there, and
+both write docs/results/learn_strangers.txt.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -44,6 +45,7 @@ from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import declared
 
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
+RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
 GONE = 0.9  # of the gap
 Found = dict[str, Any]
@@ -149,40 +151,47 @@ def _show(what: str, found: Found) -> None:
     print(f'{what}: {found["verdict"]} {names}; where: {found["where"]}')
 
 
-def table(rows: Sequence[Found]) -> None:
+def table(rows: Sequence[Found]) -> Iterator[str]:
     """
-    Print shares with their intervals of 95 %, and each false name.
+    Yield shares with their intervals of 95 %, and each case.
     """
+    yield 'What `python benchmarks/learn_strangers.py` learnt; seeds: the ships of each stranger'
     for runs in sorted({row['runs'] for row in rows}):
         mine = [row for row in rows if row['runs'] == runs]
         plain = [row for row in mine if row['stranger'] in PLAIN]
         other = [row for row in mine if row['stranger'] and row['stranger'] not in PLAIN]
         empty = [row for row in mine if not row['stranger']]
         right = [tuple(row['kind'] or ()) == CURVES[row['stranger']] for row in plain]
-        print(f'\n{runs} runs')
-        _line('the twelve: form right', right)
         wrong = [row['kind'] is not None and not ok for row, ok in zip(plain, right, strict=True)]
-        _line('the twelve: another form', wrong)
-        _line('the others: a form written', [row['kind'] is not None for row in other])
-        _line('without a stranger: a form written', [row['kind'] is not None for row in empty])
-        _line('90 % of the gap of a run that was kept gone', [
-            row['cut'] >= GONE for row in (*plain, *other)
-        ])  # fmt: skip
+        cut = [row['cut'] >= GONE for row in (*plain, *other)]
         written = [row for row in (*plain, *other) if row['kind'] is not None]
-        _line('written, and named in a later run', [row['later'][1] == [NAME] for row in written])
-        print(f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}')
-        for row in mine:
-            kind = ' '.join((row['kind'] or ['-'])[1:])
+        yield f'\n{runs} runs, {len(mine)} cases'
+        yield _line('the twelve: form right', right)
+        yield _line('the twelve: another form', wrong)
+        yield _line('the others: a form written', [row['kind'] is not None for row in other])
+        yield _line('without a stranger: a form written', [r['kind'] is not None for r in empty])
+        yield _line('90 % of the gap of a run that was kept gone', cut)
+        yield _line(
+            'written, and named in a later run', [r['later'][1] == [NAME] for r in written]
+        )
+        alone = [row['alone'][0] == 'named' for row in (*plain, *other)]
+        yield _line('one run diagnosed alone: a name, which is wrong', alone)
+        yield f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}'
+        for row in sorted(mine, key=lambda row: (row['stranger'], row['ship'])):
+            kind = ' '.join(row['kind'] or ['-'])
             likeliest = next(iter(row['probability'].items()), ('-', 0.0))
-            print(f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:18s} '
-                  f'gap gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  '
-                  f'later {row["later"]}')  # fmt: skip
+            yield (
+                f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:24s} gap '
+                f'gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  alone '
+                f'{" ".join([row["alone"][0], *row["alone"][1]])}  later {row["later"]}'
+            )
 
 
-def _line(what: str, hits: Sequence[bool]) -> None:
-    if hits:
-        low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
-        print(f'{what:46s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})')
+def _line(what: str, hits: Sequence[bool]) -> str:
+    if not hits:
+        return f'{what:48s} no case'
+    low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
+    return f'{what:48s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})'
 
 
 def main() -> None:
@@ -212,7 +221,9 @@ def main() -> None:
                     rows.append(tried(name, ship, runs))
                     with OUT.open('a') as file:
                         print(json.dumps(rows[-1]), file=file)
-    table(rows)
+    text = '\n'.join(table(rows))
+    RESULTS.write_text(text + '\n')
+    print(text)
 
 
 if __name__ == '__main__':
