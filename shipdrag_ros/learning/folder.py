@@ -43,8 +43,11 @@ def check_name(name: str) -> str:
     EffectFileError
         If it may not.
     """
-    problems = [] if NAME.fullmatch(name) else ['expected small letters, digits and _']
-    problems += [f'{name!r} is an effect of the library; give it another'] if name in OWN else []
+    problems = []
+    if not NAME.fullmatch(name):
+        problems.append(f'name: {name[:60]!r}, expected small letters, digits and _')
+    if name in OWN:
+        problems.append(f'name: {name!r} is an effect of the library; give it another')
     if problems:
         raise EffectFileError(name[:60], problems)
     return name

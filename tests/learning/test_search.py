@@ -51,7 +51,7 @@ def learnt() -> Learnt:
 def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
     term = learnt.term
     assert term is not None, learnt.reason
-    assert (term.form.variable, term.form.shape) == ('speed', 'step')
+    assert (term.term.variable, term.term.shape) == ('speed', 'step')
     values = tuple(each.value for each in term.parameters.values())
     speed = np.linspace(1.5, 6.5, 60)
     true = force_n(HIDDEN, FRAME, tuple(SIZES.values()), speed)

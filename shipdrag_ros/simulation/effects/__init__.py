@@ -121,7 +121,7 @@ def terms(names: Collection[str] | None = None) -> tuple[LearntTerm, ...]:
 
 def carrying(ship: Ship, more: Sequence[LearntTerm] | None = None) -> Ship:
     """
-    Return a ship whose file holds learnt terms besides; None: those added to the library.
+    Return a ship whose file holds more learnt terms; None: those added to the library.
     """
     own = {term.name for term in ship.learnt}
     wanted = [term for term in (terms() if more is None else more) if term.name not in own]
