@@ -67,14 +67,6 @@ _OWN = (
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),
 )
-VERBS = (
-    *_OWN,
-    *(
-        Verb(study.verb, f'{package}.face.verb', study.summary)
-        for package, study in found(frozenset(verb.name for verb in _OWN))
-    ),
-)
-
 # matrices here are small: threads that wait for each other cost up to twenty times the work
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
@@ -156,6 +148,15 @@ def _error_text(error: OSError) -> str:
     )
 
 
+def verbs() -> tuple[Verb, ...]:
+    """
+    Return all verbs; those of studies are looked for, also in other packages, which takes a while.
+    """
+    studies = found(frozenset(verb.name for verb in _OWN))
+    of_studies = (Verb(each.verb, f'{where}.face.verb', each.summary) for where, each in studies)
+    return (*_OWN, *of_studies)
+
+
 def parser(*of: str) -> argparse.ArgumentParser:
     """
     Return the parser of the command line, with the arguments of the verbs `of`.
@@ -166,9 +167,10 @@ def parser(*of: str) -> argparse.ArgumentParser:
         'Exit status: 0 done, 1 user error, 2 usage.',
     )
     top.add_argument('--version', action='version', version=f'shipdrag_ros {__version__}')
-    verbs = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
-    for known in VERBS:
-        added = verbs.add_parser(
+    added_to = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
+    own = {verb.name for verb in _OWN}
+    for known in _OWN if of and own.issuperset(of) else verbs():
+        added = added_to.add_parser(
             known.name, help=known.summary, description=known.summary, formatter_class=Help
         )
         if known.name in of:
