@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import glob
 import gzip
-import importlib.util
 import os
 import re
 import shlex
@@ -23,6 +22,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import VERBS, main
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
+from tests.sources import log_samples
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
@@ -97,17 +97,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def make_logs(folder: Path) -> None:
     """Make a file of each format that docs/import.md names."""
-    place = ROOT / 'benchmarks' / '_log_samples.py'
-    spec = importlib.util.spec_from_file_location('_log_samples', place)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
     names = {'csv': 'bridge.csv', 'candump': 'candump.log', 'yacht_devices': 'ydwg.raw'}
     names |= {'nmea': 'log.nmea', 'ros1': 'ros1.bag'}
-    for kind, (name, content) in made.samples(folder).items():
+    for kind, (name, content) in log_samples.samples(folder).items():
         (folder / names.get(kind, name)).write_bytes(content)
-    head, *rows = [line.split(',') for line in made.csv().decode().split('\n')]
+    head, *rows = [line.split(',') for line in log_samples.csv().decode().split('\n')]
     for name, columns in (('receiver', (0, 2, 3, 4)), ('speed_log', (0, 1))):
         lines = (','.join(row[column] for column in columns) for row in [head, *rows])
         (folder / f'{name}.csv').write_text('\n'.join(lines))

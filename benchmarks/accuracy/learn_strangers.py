@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What `shipdrag learn` makes of effects that the library lacks, on ships that share no code with it.
+
+    python -m benchmarks.accuracy.learn_strangers --show kelp_below
+    python -m benchmarks.accuracy.learn_strangers --ships 8 --runs 4
+    python -m benchmarks.accuracy.learn_strangers --table
+
+`--show` is the whole way with one stranger: diagnosed, learnt, the gap on a run that was kept,
+and a later run diagnosed by name. Without it every stranger is learnt on every ship, and ships
+without one; a run that was broken off goes on where it was. `--table` shows what is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+os.environ.setdefault('OMP_NUM_THREADS', '1')
+
+import numpy as np
+from scipy.stats import binomtest
+
+from benchmarks.accuracy.diagnosis_score import as_block
+from benchmarks.worlds.strangers import world
+from benchmarks.worlds.strangers.hidden import CURVES, PLAIN, STRANGERS
+from shipdrag_ros import cli
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.learning.folder import using
+from shipdrag_ros.learning.term import LearntTerm
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.simulation import Scenario, simulate
+
+OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
+NAME = 'stranger'
+GONE = 0.9  # of the gap
+Found = dict[str, Any]
+
+
+def verb(line: Sequence[str]) -> Found:
+    """
+    Run a verb in this process and return its JSON.
+    """
+    written, said = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(said):
+        status = cli.main([*line, '--json'])
+    if status:
+        raise RuntimeError(f'shipdrag {line[0]} ended with {status}: {said.getvalue()}')
+    found: Found = json.loads(written.getvalue())
+    return found
+
+
+def write_run(case: world.Case, run: int, folder: Path) -> str:
+    """
+    Write a run as a bag; return its path.
+    """
+    path = folder / f'run_{run}.mcap'
+    with BagWriter(path) as writer:
+        writer.attach('ship.yaml', case.ship_file)
+        writer.write_samples(as_block(case.recording(run)))
+    return str(path)
+
+
+def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
+    """
+    Return which part of what a stranger does to the speed, without noise, a term foretells.
+    """
+    t, log, ground, _ = case.shown(run)
+    ship, setting = Ship.from_yaml(case.ship_file, subject='ship'), case.settings[run]
+    scenario = Scenario(
+        speed_m_s=setting.speed_m_s,
+        lead_in_s=60.0,
+        duration_s=float(t[-1]),
+        heading_rad=setting.heading_rad,
+    )
+    sizes = {name: Parameter(q.value, 0.0) for name, q in term.parameters.items()}
+    with using([term]):
+        speeds = [
+            np.interp(t + 60.0, motion.time_s, motion.speed_through_water_m_s)
+            for effects in ([], [StatedEffect(term.name, sizes)])
+            for motion in [simulate(ship, scenario, effects=effects)]
+        ]
+    change = speeds[1] - speeds[0]
+    gap = np.concatenate([log, ground])
+    left = gap - np.concatenate([change, change])
+    return 1.0 - float(np.sqrt(np.mean(left**2) / np.mean(gap**2)))
+
+
+def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
+    """
+    Learn from some runs of a ship; foretell the one that was kept, and diagnose a later one.
+    """
+    case = world.case(stranger, ship)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        bags = [write_run(case, run, folder) for run in list(world.LEARNT)[:runs]]
+        file = folder / 'effects' / f'{NAME}.yaml'
+        file.parent.mkdir()
+        if show:
+            _show('first run', verb(['diagnose', bags[0]]))
+        start = time.process_time()
+        found = verb(['learn', *bags, '-o', str(file), '--name', NAME])
+        result: Found = {
+            'stranger': stranger,
+            'ship': ship,
+            'runs': runs,
+            'cpu_s': round(time.process_time() - start, 1),
+            'kind': None,
+            'reason': found['reason'],
+            'probability': {k: round(p, 3) for k, p in found['probability'].items() if p > 0.01},
+            'cut': 0.0,
+            'later': None,
+        }
+        if found['learnt'] is None:
+            return result
+        term = LearntTerm.load(file)
+        result['kind'] = [term.form.channel, term.form.variable, term.form.shape]
+        result['parameters'] = {k: [q.value, q.sd] for k, q in term.parameters.items()}
+        result['evidence'] = found['learnt']['evidence']
+        if stranger:
+            result['cut'] = round(gap_cut(case, world.KEPT, term), 3)
+        if show:
+            print(file.read_text())
+            print(f'gap of a run that was kept: {result["cut"]:.0%} gone')
+        bag = write_run(case, world.LATER, folder)
+        later = verb(['diagnose', bag, '--effects', str(file.parent)])
+        result['later'] = [later['verdict'], [each['name'] for each in later['effects']]]
+        if show:
+            _show('later run', later)
+    return result
+
+
+def _show(what: str, found: Found) -> None:
+    names = ', '.join(each['name'] for each in found['effects'])
+    print(f'{what}: {found["verdict"]} {names}; where: {found["where"]}')
+
+
+def table(rows: Sequence[Found]) -> None:
+    """
+    Print shares with their intervals of 95 %, and each false name.
+    """
+    for runs in sorted({row['runs'] for row in rows}):
+        mine = [row for row in rows if row['runs'] == runs]
+        plain = [row for row in mine if row['stranger'] in PLAIN]
+        other = [row for row in mine if row['stranger'] and row['stranger'] not in PLAIN]
+        empty = [row for row in mine if not row['stranger']]
+        right = [tuple(row['kind'] or ()) == CURVES[row['stranger']] for row in plain]
+        print(f'\n{runs} runs')
+        _line('the twelve: form right', right)
+        wrong = [row['kind'] is not None and not ok for row, ok in zip(plain, right, strict=True)]
+        _line('the twelve: another form', wrong)
+        _line('the others: a form written', [row['kind'] is not None for row in other])
+        _line('without a stranger: a form written', [row['kind'] is not None for row in empty])
+        _line('90 % of the gap of a run that was kept gone', [
+            row['cut'] >= GONE for row in (*plain, *other)
+        ])  # fmt: skip
+        written = [row for row in (*plain, *other) if row['kind'] is not None]
+        _line('written, and named in a later run', [row['later'][1] == [NAME] for row in written])
+        print(f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}')
+        for row in mine:
+            kind = ' '.join((row['kind'] or ['-'])[1:])
+            likeliest = next(iter(row['probability'].items()), ('-', 0.0))
+            print(f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:18s} '
+                  f'gap gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  '
+                  f'later {row["later"]}')  # fmt: skip
+
+
+def _line(what: str, hits: Sequence[bool]) -> None:
+    if hits:
+        low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
+        print(f'{what:46s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})')
+
+
+def main() -> None:
+    """
+    Learn on all cases that are not done, or show one.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--show', choices=list(STRANGERS))
+    parser.add_argument('--ships', type=int, default=1)
+    parser.add_argument('--runs', type=int, nargs='+', default=[4])
+    parser.add_argument('--only', nargs='+', choices=[*STRANGERS, 'none'])
+    parser.add_argument('--table', action='store_true')
+    options = parser.parse_args()
+    if options.show:
+        print(json.dumps(tried(options.show, 0, options.runs[0], show=True), indent=1))
+        return
+    OUT.parent.mkdir(exist_ok=True)
+    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
+    if not options.table:
+        done = {(row['stranger'], row['ship'], row['runs']) for row in rows}
+        names = ['' if name == 'none' else name for name in options.only or ['none', *STRANGERS]]
+        for ship in range(options.ships):
+            for name in names:
+                for runs in options.runs:
+                    if (name, ship, runs) in done:
+                        continue
+                    rows.append(tried(name, ship, runs))
+                    with OUT.open('a') as file:
+                        print(json.dumps(rows[-1]), file=file)
+    table(rows)
+
+
+if __name__ == '__main__':
+    main()
