@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.cli import VERBS, main, parser
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 from tests.sources import log_samples
@@ -167,7 +167,7 @@ def make_room(name: str) -> None:
         Path(name).unlink(missing_ok=True)
 
 
-STARTED: set[str] = set()  # processes that need nothing of the lines before them
+STARTED: set[str] = set()  # programs that were started; of more lines the words are read
 
 
 def run(command: str) -> None:
@@ -181,10 +181,13 @@ def run(command: str) -> None:
     if words[0] == 'shipdrag' and words[1] not in ('node', 'watch'):
         assert main(words[1:]) == 0, command
         return
-    if command in STARTED:
+    program = words[1] if words[0] == 'shipdrag' else words[0]
+    if words[0] == 'shipdrag':
+        parser(program).parse_args(words[1:])
+    if program in STARTED:
         return
-    STARTED.add(command)
-    if words[1] == 'watch':
+    STARTED.add(program)
+    if program == 'watch':
         run_watch(words)
         return
     pytest.importorskip('rclpy')
