@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -69,9 +69,13 @@ def help_text(verb: str, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.fixture(scope='module')
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make small files of the names that examples take for granted."""
-    folder = tmp_path_factory.mktemp('made')
+def made(once: Callable[..., Path]) -> Path:
+    """Small files of the names that examples take for granted."""
+    return once('made', make_files)
+
+
+def make_files(folder: Path) -> None:
+    """Make them."""
     ship = ROOT / 'config' / 'vitus_bering.yaml'
     shutil.copy(ship, folder / 'ship.yaml')
     shutil.copy(ROOT / 'config' / 'parameters.yaml', folder / 'parameters.yaml')
@@ -92,7 +96,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'log.csv').write_text('\n'.join(table))
     with gzip.open(folder / 'LOG.nmea.gz', 'wt') as log:
         log.writelines(nmea(second) for second in range(60))
-    return folder
 
 
 def make_logs(folder: Path) -> None:

@@ -2,9 +2,9 @@
 """
 S3's sensitivity analysis: its observations beside ours, its reduced model, what it does not say.
 
-    python -m benchmarks.accuracy.s3_sensitivity [--write]
+    python -m benchmarks.figures s3_sensitivity
 
-prints the page; `--write` puts it into docs/s3_sensitivity.md, its pictures into docs/pictures.
+Prints the tables; `--pictures` draws those of docs/s3_sensitivity.md.
 Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor. Times are of the
 processor, in this process; the batched call is the best of 5, the loop of 161 runs is made once.
 """
@@ -17,7 +17,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -26,10 +26,9 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks._tables import publish
 from benchmarks._tables import table as markdown
 from benchmarks.accuracy import _plain_mariner
-from benchmarks.accuracy._wrong_values import COAST_S, LEAD_IN_S, SPEED_M_S, verdicts
+from benchmarks.accuracy._wrong_values import verdicts
 from shipdrag_ros.display import Table
 from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
@@ -224,185 +223,33 @@ def lines_of(table: Table) -> list[str]:
     return markdown(table.columns, table.rows)
 
 
-def page(
+def tables(
     found: SteeringStudy, shown: Experiment, coast: CoastStudy, timed: Speed, wrong: Table
-) -> list[str]:
+) -> Iterator[str]:
     """
-    Return the page.
+    Yield the lines of the result file.
     """
     root = Observations.of(found.losses)
-    kept = found.selection.kept
-    both = np.degrees(found.check.overshoots_rad)
-    grouped = np.degrees(found.group_check.overshoots_rad[1])
-    single = shown.partial_contribution[np.arange(len(FORM)), np.argmax(shown.loss, axis=1)]
-    circle = shown.manoeuvres.index(turn(35.0))
-    heavier = next(mimic for mimic in coast.mimics if mimic.effect.name == 'displacement')
-    return [
-        '# Sensitivity by a loss function (S3)',
-        '',
-        'Fang Xianghong, Xu Feng: *sensitivity of ship manoeuvring derivatives by a loss '
-        'function*. Written by',
-        '`python -m benchmarks.accuracy.s3_sensitivity --write`. '
-        'The verb is `shipdrag sensitivity`, the analysis '
-        '`shipdrag_ros/studies/sensitivity/loss.py`: it takes any',
-        'simulator and knows no ship.',
-        '',
-        '    shipdrag sensitivity --manoeuvre zigzag:15 --keep 24 --report mariner.html',
-        '    shipdrag sensitivity --ship config/vitus_bering.yaml --manoeuvre coastdown:8.2',
-        '',
-        '## The paper and ours',
-        '',
-        *lines_of(
-            Table(
-                ('', 'paper', 'here'),
-                (
-                    ('derivatives changed, one at a time', '40', str(len(FORM))),
-                    ('zigzag of the losses', '15/15, 1200 samples of 0.5 s', 'the same'),
-                    (
-                        '+10 % and -10 %',
-                        '"basically the same"',
-                        f'differ by {root.unlike[0]:.1%} (median)',
-                    ),
-                    (
-                        '+50 % and -50 %',
-                        'close, differ more',
-                        f'differ by {root.unlike[1]:.1%}',
-                    ),
-                    ('50 % over 10 %', '"basically 5 times"', f'{root.growth:.2f} (median)'),
-                    (
-                        'some losses are nearly 0',
-                        'yes',
-                        f'the least is {np.min(found.losses.mean):.1e}, the largest '
-                        f'{np.max(found.losses.mean):.2f}',
-                    ),
-                    ('kept', '24 of 40', f'{len(kept)}, by both norms'),
-                    (
-                        '25/25 of the reduced model',
-                        '"the change is very small"',
-                        f'overshoots {both[1][0]:.2f} / {both[1][1]:.2f} for '
-                        f'{both[0][0]:.2f} / {both[0][1]:.2f} deg',
-                    ),
-                ),
-            )
-        ),
-        '',
-        "The paper's formula of the loss is lost in the scan. That 50 % costs 5 times 10 % says "
-        'that it is a norm, not a square: the root mean square',
-        'of the differences in u, v (over the speed) and r (over speed per length) is used, the '
-        'mean norm shown beside it.',
-        '',
-        '![Surge speed in a 15/15 zigzag after changes of Xu](pictures/s3_surge.png)',
-        '',
-        '## The helmsman must not be a clock',
-        '',
-        'What the paper saw is clean only where the rudder is reversed at the very heading. A '
-        'helmsman who looks every 0.1 s reverses a whole look earlier or',
-        'later after the smallest change: a floor under all small losses, by which they are '
-        'ranked wrong. The losses here are of the first kind.',
-        '',
-        *lines_of(observations()),
-        '',
-        '## Check of the simulation',
-        '',
-        *lines_of(checks()),
-        '',
-        *lines_of(circles()),
-        '',
-        'Known: figures computed elsewhere with the same values, first to starboard, control '
-        'every 0.1 s. All eight come back to the last digit when the rudder is',
-        f'amidships for {APPROACH_S:g} s before the first order, in which the propeller turns her '
-        'a little, and of the 15/15 the largest to starboard is taken, the third.',
-        'Ordered at once the looks of the helmsman fall otherwise: one is worth up to '
-        '0.1 degrees.',
-        '`tests/studies/manoeuvring` compares the runs with a solve_ivp of their own: u and v '
-        'to 2e-6 m/s, r to 1e-7 rad/s.',
-        '',
-        f'**Speed.** {timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a '
-        f'plain loop of scipy `solve_ivp` (RK45, rtol {RTOL:g}, the reversal an event, the',
-        f'formulas written out): {timed.looped:.1f} s of processor time in the same process, '
-        f'**{timed.looped / timed.batched:.0f} times** as much. Losses agree to '
-        f'{timed.largest:.0e} of the largest; '
-        + ('both keep the same 24.' if timed.same else 'they do not keep the same 24.'),
-        '',
-        '## Losses',
-        '',
-        steering_words.LOSSES + '.',
-        '',
-        '![Mean loss of each derivative](pictures/s3_ranking.png)',
-        '',
-        *lines_of(steering_words.loss_table(found)),
-        '',
-        '## What 24 means',
-        '',
-        f'{len(SHIP.multiples)} of the 40 are exact multiples of others (Yvu = Yv, Yud = 2 Yd, '
-        'Xudd = 2 Xdd, ..): not measured, but a force that grows with the',
-        f'square of the speed written in powers of its change. The model is {len(SHIP.groups)} '
-        f'measurements, and the 24 kept derivatives hold {found.independent} of them: the',
-        '"simplification" drops powers of forces that it keeps. Dropped as measurements, with all '
-        f'that follows from each, the same number of {found.independent} is',
-        f'{len(found.group_derivatives)} derivatives, and overshoots '
-        f'{grouped[0]:.2f} / {grouped[1]:.2f} instead of {both[1][0]:.2f} / {both[1][1]:.2f} deg.',
-        '',
-        *lines_of(steering_words.check_table(found)),
-        '',
-        '![25/25 zigzag of the full and of the reduced models](pictures/s3_check.png)',
-        '',
-        'The reduced 24 keep the form of the motion and lose its timing, a little more with every '
-        'turn.',
-        '',
-        '## Which manoeuvre to sail',
-        '',
-        'Most derivatives are seen best where rudder and drift are largest; the side force of the '
-        'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
-        'To be seen is not to be identified: the partial contribution is the part of a trace that '
-        f'is orthogonal to the other 39. Where it is seen best it is {np.median(single):.1%}',
-        f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in a 35 degree circle, '
-        'which ends as three constants), in all nine together '
-        f'{np.median(shown.partial_contribution_together):.1%}. '
-        'A sensitive derivative is thus not yet one that a',
-        'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
-        'reason, stated and not fitted.',
-        '',
-        '![Loss of each derivative in each manoeuvre](pictures/s3_design.png)',
-        '',
-        steering_words.DESIGN + '.',
-        '',
-        *lines_of(steering_words.design_table(shown)),
-        '',
-        '## The same for a ship file',
-        '',
-        f'{coasting_words.sentence(coast)}',
-        '',
-        *(f'- {note}' for note in coasting_words.notes(coast)),
-        '',
-        '![Change of the record by each value of the ship file](pictures/s3_particulars.png)',
-        '',
-        coasting_words.LOSSES + '.',
-        '',
-        *lines_of(coasting_words.loss_table(coast)),
-        '',
-        f'A ship that is {heavier.size:.0%} heavier than her file says is one whose '
-        f'{heavier.particular.key} is wrong by {heavier.error:+.0%}, but for {heavier.left:.1%} '
-        'of the trace: take the volume',
-        'from the draughts of the day.',
-        '',
-        '![What is left of each effect when a value is blamed](pictures/s3_mimics.png)',
-        '',
-        coasting_words.MIMICS + '.',
-        '',
-        *lines_of(coasting_words.mimic_table(coast)),
-        '',
-        'And what `diagnose` says of a ship of which nothing but one value of the file is wrong: '
-        f'two reciprocal coastdowns of {COAST_S:.0f} s from {SPEED_M_S:g} m/s,',
-        f'{LEAD_IN_S:.0f} s of steady sailing before, log and positions at 1 Hz, one pair a cell '
-        '(seeds 0 and 1); candidates of 5 % and more.',
-        '',
-        *lines_of(wrong),
-        '',
-        'As the losses predict, no other value reaches the verdict than '
-        + ', '.join(row[0] for row in wrong.rows if len(set(row[1:])) > 1)
-        + '.',
-    ]
+    for heading, table in (
+        ('Losses, where the rudder is reversed', observations()),
+        ('Overshoots', checks()),
+        ('Circles', circles()),
+        (steering_words.LOSSES, steering_words.loss_table(found)),
+        ('25/25 of the full and of the reduced models', steering_words.check_table(found)),
+        (steering_words.DESIGN, steering_words.design_table(shown)),
+        (coasting_words.LOSSES, coasting_words.loss_table(coast)),
+        (coasting_words.MIMICS, coasting_words.mimic_table(coast)),
+        ('What diagnose says of one wrong value of the file, seeds 0 and 1', wrong),
+    ):
+        yield from ('', heading, '', *lines_of(table))
+    yield ''
+    yield f'50 % over 10 %: {root.growth:.2f}; kept {len(found.selection.kept)} of {len(FORM)}'
+    yield (
+        f'{timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a loop of scipy '
+        f'(RK45, rtol {RTOL:g}) {timed.looped:.1f} s; losses agree to {timed.largest:.0e}'
+    )
+    yield coasting_words.sentence(coast)
+    yield from (f'- {note}' for note in coasting_words.notes(coast))
 
 
 def _surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Figure:
@@ -421,22 +268,20 @@ def _surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Fi
 
 def main() -> None:
     """
-    Print the page, and write it where that is asked for.
+    Print the tables, and draw where that is asked for.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        '--write', action='store_true', help='docs/s3_sensitivity.md and its pictures'
+        '--pictures', action='store_true', help='draw those of docs/s3_sensitivity.md'
     )
     options = parser.parse_args()
     text = files('shipdrag_ros').joinpath('data', 'vitus_bering.yaml').read_text('utf-8')
     ship = Ship.from_yaml(text, subject='vitus_bering.yaml')
     found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)
     coast = study_coast(ship, coast_from(ship, SHIP_SPEED_M_S))
-    lines = page(found, shown, coast, speed(found), verdicts(ship))
-    print('\n'.join(lines))
-    if not options.write:
+    print(*tables(found, shown, coast, speed(found), verdicts(ship)), sep='\n')
+    if not options.pictures:
         return
-    publish(DOCS / 's3_sensitivity.md', lines, rows=4, keep=1)
     time_s = found.check.full.time_s
     for name, figure in (
         ('surge', _surge_picture(time_s, surge())),

@@ -47,7 +47,7 @@ class Case:
     says
         What the user must read, to the letter.
     process
-        Run in a process of its own, as the node is; else in this one.
+        Run in a process of its own, as a node that starts is; else in this one.
     """
 
     area: str

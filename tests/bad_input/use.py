@@ -88,7 +88,7 @@ def _node(
         where = ['--ship', str(folder / 'ship.yaml'), '--out', str(folder / out)]
         return ['node', *where, *(['--ros-args', *more] if more else [])]
 
-    return Case('Node', kind, line, status, says, process=True)
+    return Case('Node', kind, line, status, says, process=status == 0)
 
 
 PARAMETERS = (
