@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from shipdrag_ros.parameters import Parameters
     from shipdrag_ros.ship import Ship
 
-__version__ = '0.3.0'
+__version__ = '0.4.0'
 
 __all__ = [
     'Coastdown',
