@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
-from shipdrag_ros.cli.arguments import Help
+from shipdrag_ros.cli.arguments import Help, add_effects
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
@@ -67,6 +67,8 @@ _OWN = (
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),
 )
+_WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
+
 # matrices here are small: threads that wait for each other cost up to twenty times the work
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
@@ -132,7 +134,8 @@ def _run(line: list[str]) -> int:
 def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
     if not folders:
         return nullcontext()
-    from shipdrag_ros.learning.folder import read_folders, using
+    from shipdrag_ros.learning.folder import read_folders
+    from shipdrag_ros.simulation.effects import using
 
     return using(read_folders(folders))
 
@@ -178,5 +181,7 @@ def parser(*of: str) -> argparse.ArgumentParser:
             with uncollected():
                 module = import_module(known.module, __name__)
             module.add_arguments(added)
+            if known.name not in _WITHOUT_EFFECTS:
+                add_effects(added)
             added.set_defaults(run=module.run)
     return top
