@@ -219,7 +219,7 @@ TABLES = (
         'words in some cells',
         _TABLE.replace('7.5,', 'error,').replace(',7.9\n', ',n/a\n'),
         0,
-        "1 cell(s) rejected, not a number: line 12: 'n/a'",
+        "1 rejected, not a number: line 12: 'n/a'",
     ),
     _csv(
         'words in all cells',
@@ -233,11 +233,9 @@ TABLES = (
         'NaN and inf in cells',
         _TABLE.replace(',7.9\n', ',nan\n').replace(',7.8\n', ',inf\n'),
         0,
-        "2 cell(s) rejected, not a number: line 12: 'nan', line 22: 'inf'",
+        "2 rejected, not a number: line 12: 'nan', line 22: 'inf'",
     ),
-    _csv(
-        'empty cells', _TABLE.replace(',7.9\n', ',\n'), 0, "1 cell(s) rejected, empty: line 12: ''"
-    ),
+    _csv('empty cells', _TABLE.replace(',7.9\n', ',\n'), 0, "1 rejected, empty: line 12: ''"),
     _csv(
         'dates whose day and month are ambiguous',
         _HEADER + '03/04/2026 08:00:00,8.0\n03/04/2026 08:00:01,7.9\n',
@@ -249,13 +247,13 @@ TABLES = (
         'equal times',
         _TABLE.replace('\n11,', '\n10,').replace('\n12,', '\n10,'),
         0,
-        'In 2 rows the time is that of an earlier row; a replay rejects those.',
+        '2 rows have the stamp of an earlier one; a replay rejects those.',
     ),
     _csv(
         'times that go back',
         _TABLE.replace('\n50,', '\n20,'),
         0,
-        'In 1 rows the time is before that of an earlier row; a replay rejects those.',
+        '1 rows are stamped before an earlier one; a replay rejects those.',
     ),
     _csv(
         'separated by *',
@@ -274,21 +272,21 @@ TABLES = (
         'commas that may be those of thousands',
         'time;speed\n' + ''.join(f'{t};8,{100 + t}\n' for t in range(100)),
         1,
-        "not a number 100 times, line 2: '8,100'",
+        "100 rejected, not a number: line 2: '8,100'",
         'expected numbers with a decimal point',
     ),
     _csv(
         'rows too short and too long',
         _TABLE.replace('10,7.9\n', '10\n11,7.8,3,4\n'),
         0,
-        '1 cell(s) rejected, empty: line 12',
-        "1 cell(s) rejected, more than 2 columns: line 13: '11,7.8,3,4'",
+        '1 rejected, empty: line 12',
+        "1 rejected, more than 2 columns: line 13: '11,7.8,3,4'",
     ),
     _csv(
         'bytes 0 in the middle',
         _TABLE.encode() + bytes(100) + b'\n100,7.0\n',
         0,
-        'time: 1 cell(s) rejected, not a number: line 102',
+        'time: 1 rejected, not a number: line 102',
     ),
     _csv(
         'a spreadsheet (.xlsx)',

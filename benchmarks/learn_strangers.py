@@ -8,7 +8,8 @@ What `shipdrag learn` makes of effects that the library lacks, on ships that sha
 
 `--show` is the whole way with one stranger: diagnosed, learnt, the gap on a run that was kept,
 and a later run diagnosed by name. Without it every stranger is learnt on every ship, and ships
-without one; a run that was broken off goes on where it was. `--table` shows what is there.
+without one; a run that was broken off goes on where it was. `--table` shows what is there, and
+both write docs/results/learn_strangers.txt.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -30,19 +31,21 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from diagnosis_score import as_block
+from hidden_b.cases import EPOCH_NS
 from scipy.stats import binomtest
 from strangers import world
 from strangers.hidden import CURVES, PLAIN, STRANGERS
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.learning.folder import using
-from shipdrag_ros.learning.term import LearntTerm
-from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.ship import Ship, StatedEffect
-from shipdrag_ros.simulation import Scenario, simulate
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.term import LearntTerm
+from shipdrag_ros.simulation import Action, Scenario, simulate_columns
+from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import declared
 
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
+RESULTS = Path(__file__).parents[1] / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
 GONE = 0.9  # of the gap
 Found = dict[str, Any]
@@ -83,18 +86,18 @@ def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
         lead_in_s=60.0,
         duration_s=float(t[-1]),
         heading_rad=setting.heading_rad,
+        depth_m=setting.depth_m,
+        day=(EPOCH_NS * 1e-9 + setting.clock_s) / 86400.0,
     )
-    sizes = {name: Parameter(q.value, 0.0) for name, q in term.parameters.items()}
-    with using([term]):
-        speeds = [
-            np.interp(t + 60.0, motion.time_s, motion.speed_through_water_m_s)
-            for effects in ([], [StatedEffect(term.name, sizes)])
-            for motion in [simulate(ship, scenario, effects=effects)]
-        ]
-    change = speeds[1] - speeds[0]
+    sizes = [q.value for q in term.parameters.values()]
+    acting = declared(term).action(Frame(ship, scenario, setting.first_rad), *sizes)
+    time_s = np.clip(t + 60.0, 0.0, scenario.length_s)
+    read = simulate_columns(ship, scenario, [Action(), acting], time_s)
+    change = np.concatenate(
+        [speed[1] - speed[0] for speed in (read.log_m_s, read.speed_through_water_m_s)]
+    )
     gap = np.concatenate([log, ground])
-    left = gap - np.concatenate([change, change])
-    return 1.0 - float(np.sqrt(np.mean(left**2) / np.mean(gap**2)))
+    return 1.0 - float(np.sqrt(np.mean((gap - change) ** 2) / np.mean(gap**2)))
 
 
 def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
@@ -107,8 +110,9 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
         bags = [write_run(case, run, folder) for run in list(world.LEARNT)[:runs]]
         file = folder / 'effects' / f'{NAME}.yaml'
         file.parent.mkdir()
+        alone = verb(['diagnose', bags[0]])
         if show:
-            _show('first run', verb(['diagnose', bags[0]]))
+            _show('first run', alone)
         start = time.process_time()
         found = verb(['learn', *bags, '-o', str(file), '--name', NAME])
         result: Found = {
@@ -120,6 +124,7 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
             'reason': found['reason'],
             'probability': {k: round(p, 3) for k, p in found['probability'].items() if p > 0.01},
             'cut': 0.0,
+            'alone': [alone['verdict'], [each['name'] for each in alone['effects']]],
             'later': None,
         }
         if found['learnt'] is None:
@@ -146,40 +151,47 @@ def _show(what: str, found: Found) -> None:
     print(f'{what}: {found["verdict"]} {names}; where: {found["where"]}')
 
 
-def table(rows: Sequence[Found]) -> None:
+def table(rows: Sequence[Found]) -> Iterator[str]:
     """
-    Print shares with their intervals of 95 %, and each false name.
+    Yield shares with their intervals of 95 %, and each case.
     """
+    yield 'What `python benchmarks/learn_strangers.py` learnt; seeds: the ships of each stranger'
     for runs in sorted({row['runs'] for row in rows}):
         mine = [row for row in rows if row['runs'] == runs]
         plain = [row for row in mine if row['stranger'] in PLAIN]
         other = [row for row in mine if row['stranger'] and row['stranger'] not in PLAIN]
         empty = [row for row in mine if not row['stranger']]
         right = [tuple(row['kind'] or ()) == CURVES[row['stranger']] for row in plain]
-        print(f'\n{runs} runs')
-        _line('the twelve: form right', right)
         wrong = [row['kind'] is not None and not ok for row, ok in zip(plain, right, strict=True)]
-        _line('the twelve: another form', wrong)
-        _line('the others: a form written', [row['kind'] is not None for row in other])
-        _line('without a stranger: a form written', [row['kind'] is not None for row in empty])
-        _line('90 % of the gap of a run that was kept gone', [
-            row['cut'] >= GONE for row in (*plain, *other)
-        ])  # fmt: skip
+        cut = [row['cut'] >= GONE for row in (*plain, *other)]
         written = [row for row in (*plain, *other) if row['kind'] is not None]
-        _line('written, and named in a later run', [row['later'][1] == [NAME] for row in written])
-        print(f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}')
-        for row in mine:
-            kind = ' '.join((row['kind'] or ['-'])[1:])
+        yield f'\n{runs} runs, {len(mine)} cases'
+        yield _line('the twelve: form right', right)
+        yield _line('the twelve: another form', wrong)
+        yield _line('the others: a form written', [row['kind'] is not None for row in other])
+        yield _line('without a stranger: a form written', [r['kind'] is not None for r in empty])
+        yield _line('90 % of the gap of a run that was kept gone', cut)
+        yield _line(
+            'written, and named in a later run', [r['later'][1] == [NAME] for r in written]
+        )
+        alone = [row['alone'][0] == 'named' for row in (*plain, *other)]
+        yield _line('one run diagnosed alone: a name, which is wrong', alone)
+        yield f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}'
+        for row in sorted(mine, key=lambda row: (row['stranger'], row['ship'])):
+            kind = ' '.join(row['kind'] or ['-'])
             likeliest = next(iter(row['probability'].items()), ('-', 0.0))
-            print(f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:18s} '
-                  f'gap gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  '
-                  f'later {row["later"]}')  # fmt: skip
+            yield (
+                f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:24s} gap '
+                f'gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  alone '
+                f'{" ".join([row["alone"][0], *row["alone"][1]])}  later {row["later"]}'
+            )
 
 
-def _line(what: str, hits: Sequence[bool]) -> None:
-    if hits:
-        low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
-        print(f'{what:46s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})')
+def _line(what: str, hits: Sequence[bool]) -> str:
+    if not hits:
+        return f'{what:48s} no case'
+    low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
+    return f'{what:48s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})'
 
 
 def main() -> None:
@@ -209,7 +221,9 @@ def main() -> None:
                     rows.append(tried(name, ship, runs))
                     with OUT.open('a') as file:
                         print(json.dumps(rows[-1]), file=file)
-    table(rows)
+    text = '\n'.join(table(rows))
+    RESULTS.write_text(text + '\n')
+    print(text)
 
 
 if __name__ == '__main__':

@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.cli import main, verbs
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 
@@ -213,7 +213,7 @@ def run(command: str) -> None:
         recorded.unlink()  # it has heard no ship, and a replay of nothing is an error
 
 
-@pytest.mark.parametrize('verb', [verb.name for verb in VERBS])
+@pytest.mark.parametrize('verb', [verb.name for verb in verbs()])
 def test_the_examples_of_the_help_run(
     folder: Path, verb: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,10 +27,10 @@ from shipdrag_ros.messages import (
     EventNote,
     MalformedMessage,
     event_message,
-    outputs,
     read_event,
     reset_request,
 )
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.ship import Ship
 
 STAMP_NS = 1_700_000_000_000_000_001

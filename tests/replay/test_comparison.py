@@ -12,7 +12,8 @@ import pytest
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import Event, Update
-from shipdrag_ros.messages import OutputMessage, outputs
+from shipdrag_ros.messages import OutputMessage
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.comparison import Comparison
 from shipdrag_ros.replay.words import recorded_sentence

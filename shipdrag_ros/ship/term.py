@@ -3,7 +3,7 @@
 A learnt effect as data: a term with units, what its parameters are, and what it rests on.
 
 A file may come from anywhere. It is read as plain data, every value is checked, and the formula
-is never run: `expression` walks it.
+is never run: `expression` walks it. `simulation.learnt` makes an effect of it.
 """
 
 from __future__ import annotations
@@ -11,22 +11,24 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import StrEnum, auto
-from functools import cached_property, partial
+from functools import cached_property
 from os import PathLike
 
 import numpy as np
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.fields import Key as FieldKey
 from shipdrag_ros.fields import (
+    INVALID,
     Kind,
     Problems,
     choice,
     declare,
+    dotted,
     flag,
+    keys_of,
     list_of,
     named,
     number,
@@ -38,7 +40,8 @@ from shipdrag_ros.fields import (
     text,
     text_of,
 )
-from shipdrag_ros.learning.expression import (
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship.expression import (
     PURE,
     Formula,
     FormulaError,
@@ -50,15 +53,10 @@ from shipdrag_ros.learning.expression import (
     is_finite,
     unit_text,
 )
-from shipdrag_ros.parameter import Parameter, Prior, log_normal, normal
-from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import GRAVITY_M_S2, Ship
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Scope
-from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.simulation.scenario import Turn
+from shipdrag_ros.ship.sections import GRAVITY_M_S2
 
 CHANNELS = ('force', 'water', 'log', 'ground', 'inertia')
+SCOPES = ('hull', 'earth', 'sensor', 'run')
 SHAPES = ('constant', 'power', 'step', 'ramp', 'hump', 'decay', 'periodic')
 
 
@@ -76,9 +74,9 @@ class Variable(StrEnum):
     DATE = auto()
 
 
-ACTING = {'force': ('speed', 'time', 'heading')}
+ACTING = {'force': ('speed', 'time', 'heading', 'date', 'depth'), 'log': ('speed', 'time')}
 """What can be simulated today: variables by channel."""
-RESULT: dict[str, Unit] = {'force': (1.0, 1.0, -2.0)}
+RESULT: dict[str, Unit] = {'force': (1.0, 1.0, -2.0), 'log': (0.0, 1.0, -1.0)}
 NAMES: dict[str, Unit] = {
     'rho': (1.0, -3.0, 0.0),
     'g': (0.0, 1.0, -2.0),
@@ -87,8 +85,13 @@ NAMES: dict[str, Unit] = {
     'u': (0.0, 1.0, -1.0),
     't': (0.0, 0.0, 1.0),
     'psi': PURE,
+    'd': PURE,
+    'h': (0.0, 1.0, 0.0),
 }
-"""Density, gravity, length, displaced volume; speed through water, time since the stop, yaw."""
+"""
+Density, gravity, length, displaced volume; speed through water, time since the stop, yaw, days
+since 1970 and depth of the water at the stop.
+"""
 UNITS: dict[str, Unit] = {
     '1': PURE,
     'rad': PURE,
@@ -101,17 +104,19 @@ UNITS: dict[str, Unit] = {
     'N': (1.0, 1.0, -2.0),
 }
 MOST_PARAMETERS = 6
-OWN = frozenset(LIBRARY)
-"""Names of the library itself."""
 
-_NAME = re.compile(r'[a-z][a-z0-9_]{0,59}')
+NAME = re.compile(r'[a-z][a-z0-9_]{0,59}')
+_ANY = (-math.inf, math.inf)
 _SIDES_SD = 3.0  # of a parameter, inside which a formula must be sound
-_SPEEDS, _TIMES, _HEADINGS = 16, 8, 2  # boxes in which ranges are looked at
-_LENGTHS_M = (2.0, 10.0, 30.0, 100.0, 200.0, 400.0)  # of ships that a term may be carried to
-_LONGEST_S = 86400.0
-_KNOTS = 24  # of a force in time: straight between them
-_FOR_EVER_S = 1e7
-_SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
+_AXES = {
+    'L': (2.0, 10.0, 30.0, 100.0, 200.0, 400.0),  # of ships that a term may be carried to
+    'u': tuple(np.linspace(0.0, 20.0, 17).tolist()),
+    't': tuple(np.linspace(0.0, 86400.0, 9).tolist()),
+    'psi': (-math.pi, 0.0, math.pi),
+    'd': tuple(np.linspace(0.0, 40000.0, 9).tolist()),
+    'h': tuple(np.geomspace(0.5, 1e4, 17).tolist()),
+}
+"""Ends of the boxes in which ranges are looked at, where a term does not say what is valid."""
 _ALIKE = 1e-6  # relative
 _ROUNDING = 1e-3  # of correlations in a text
 
@@ -131,7 +136,7 @@ class TermForm:
     """The key `term` of a file: what acts, where, and by which formula."""
 
     channel: str = declare(choice(*CHANNELS), 'what it adds to')
-    scope: str = declare(choice(*Scope), 'what it belongs to')
+    scope: str = declare(choice(*SCOPES), 'what it belongs to')
     variable: str = declare(choice(*Variable), 'what it goes by')
     shape: str = declare(choice(*SHAPES), 'its curve, in a word')
     expression: str = declare(text(), 'the formula')
@@ -169,45 +174,14 @@ class TermLimit:
     upper_95: float = declare(number(-1e9, 1e9), '95 % quantile')
 
 
-_KEYS = {
-    'name': FieldKey(text(), 'what it is called', MISSING),
-    'term': FieldKey(section(TermForm), 'what it is', MISSING),
-    'parameters': FieldKey(
-        named(section(TermParameter)), 'its parameters, the size first', MISSING
-    ),
-    'covariance': FieldKey(
-        list_of(numbers(-1e12, 1e12, minimum=1)), 'of the parameters, in their order', ()
-    ),
-    'evidence': FieldKey(section(TermEvidence), 'what it rests on', None),
-    'looks_like': FieldKey(list_of(text()), 'effects of nearly the same trace', ()),
-    'limits': FieldKey(named(section(TermLimit)), 'how large parameters can be', None),
-}
-
-
 @dataclass(frozen=True, kw_only=True)
 class LearntTerm:
     """
     A term that was checked.
 
-    Attributes
-    ----------
-    name
-    form
-        What acts, where, and by which formula.
-    parameters
-        By name; the first is the size.
-    covariance
-        Rows, in the order of the parameters; empty where it is not stated.
-    evidence
-        None of a term that somebody declared.
-    looks_like
-        Effects that leave nearly the same trace.
-    limits
-        By parameter.
-
     Examples
     --------
-    >>> from shipdrag_ros.learning.term import LearntTerm
+    >>> from shipdrag_ros.ship import LearntTerm
     >>> term = LearntTerm.from_yaml('''
     ... name: weed
     ... term: {channel: force, scope: hull, variable: speed, shape: step,
@@ -215,17 +189,27 @@ class LearntTerm:
     ...   valid: {u: [1.1, 7.9]}}
     ... parameters: {A: {value: 0.0014, sd: 0.0002, unit: 1}, u_c: {value: 0.09, sd: 0.01}}
     ... ''')
-    >>> term.effect().scope.value
+    >>> term.term.scope
     'hull'
     """
 
-    name: str
-    form: TermForm
-    parameters: Mapping[str, TermParameter] = field(hash=False)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    evidence: TermEvidence | None = None
-    looks_like: tuple[str, ...] = ()
-    limits: Mapping[str, TermLimit] | None = field(default=None, hash=False)
+    name: str = declare(text(), 'what it is called')
+    term: TermForm = declare(section(TermForm), 'what it is')
+    parameters: Mapping[str, TermParameter] = declare(
+        named(section(TermParameter)), 'its parameters, the size first', hashed=False
+    )
+    covariance: tuple[tuple[float, ...], ...] = declare(
+        list_of(numbers(-1e12, 1e12, minimum=1)), 'of the parameters, in their order', default=()
+    )
+    evidence: TermEvidence | None = declare(
+        section(TermEvidence), 'what it rests on; none where somebody declared it', default=None
+    )
+    looks_like: tuple[str, ...] = declare(
+        list_of(text()), 'effects of nearly the same trace', default=()
+    )
+    limits: Mapping[str, TermLimit] | None = declare(
+        named(section(TermLimit)), 'how large parameters can be', default=None, hashed=False
+    )
 
     def __post_init__(self) -> None:
         problems = list(_problems(self))
@@ -262,15 +246,12 @@ class LearntTerm:
             If it cannot be used; with every problem that was found.
         """
         problems: list[str] = []
-        read = read_keys(
-            _KEYS, parse(content, subject=subject, error=EffectFileError), '', problems
-        )
+        data = parse(content, subject=subject, error=EffectFileError)
+        found = learnt_term().read(data, '', problems)
         if problems:
             raise EffectFileError(subject, problems)
-        try:
-            return cls(form=read.pop('term'), **read)
-        except EffectFileError as error:
-            raise EffectFileError(subject, error.problems) from None
+        assert isinstance(found, cls)
+        return found
 
     def to_yaml(self) -> str:
         """
@@ -278,95 +259,33 @@ class LearntTerm:
         """
         from ruamel.yaml import YAML
 
-        whole = {
-            'name': self.name,
-            'term': plain(self.form),
-            'parameters': plain(self.parameters),
-            'covariance': plain(self.covariance) or None,
-            'evidence': plain(self.evidence),
-            'looks_like': plain(self.looks_like) or None,
-            'limits': plain(self.limits),
-        }
         writer, stream = YAML(), io.StringIO()
         writer.default_flow_style = None
         writer.width = 110
-        writer.dump({key: value for key, value in whole.items() if value is not None}, stream)
+        writer.dump({key: value for key, value in plain(self).items() if value != []}, stream)
         return stream.getvalue()
 
     @cached_property
     def formula(self) -> Formula:
         """Of the expression."""
-        return Formula.parse(self.form.expression)
+        return Formula.parse(self.term.expression)
 
-    def force_n(
-        self, ship: Ship, heading_rad: float, values: tuple[float, ...], speed_m_s: Float64
-    ) -> Float64:
+    def worth(self, known: Mapping[str, Float64 | float], values: tuple[float, ...]) -> Float64:
         """
-        Return the force at speeds (n,), at the stop [N].
+        Return what the formula is worth; of time, date and depth, inside of what is valid.
 
-        Beyond the speeds that it holds for it goes on as the square of the speed.
+        Parameters
+        ----------
+        known
+            Of the names of a formula.
+        values
+            Of the parameters, in their order.
         """
-        low, high = self.form.valid.get('u', (0.0, math.inf))
-        inside = np.clip(speed_m_s, low, high)
-        force = self._worth(ship, heading_rad, values, inside, 0.0)
-        beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0) ** 2
-        found: Float64 = np.broadcast_to(force, np.shape(speed_m_s)) * beyond
-        return found
-
-    def act(self, frame: Frame, *values: float) -> Action:
-        """
-        Return what it does, as an effect of the library does.
-        """
-        heading = frame.scenario.heading_rad
-        if 't' not in self.formula.names:
-            return Action(resistance=(partial(self.force_n, frame.ship, heading, values),))
-        return Action(turns=self._in_time(frame, heading, values))
-
-    def effect(self) -> Effect:
-        """
-        Return it as an effect of the library.
-        """
-        size, *_ = self.parameters
-        seen = len(self.evidence.runs) if self.evidence else 0
-        return Effect(
-            name=self.name,
-            scope=Scope(self.form.scope),
-            parameters=tuple(
-                Parameter(
-                    each.value,
-                    name=name,
-                    unit='' if each.unit == '1' else each.unit,
-                    meaning='size' if name == size else 'of its curve',
-                    prior=_prior(each, _SIZE_SD if name == size else _SHAPE_SD),
-                    low=-1e9 if each.value <= 0.0 else 0.0,
-                    high=1e9,
-                )
-                for name, each in self.parameters.items()
-            ),
-            formula=self.form.expression,
-            source=f'learnt from {seen} runs' if seen else 'declared by a file',
-            act=self.act,
-            lasts_s=0.0 if self.form.scope == Scope.RUN else 365.0 * DAY_S,
-        )
-
-    def _worth(
-        self,
-        ship: Ship,
-        heading_rad: float,
-        values: tuple[float, ...],
-        speed_m_s: Float64,
-        time_s: Float64 | float,
-    ) -> Float64:
         names = {
-            'rho': ship.water.density_kg_m3,
-            'g': GRAVITY_M_S2,
-            'L': ship.length_m,
-            'nabla': ship.displaced_volume_m3,
-            'u': speed_m_s,
-            't': time_s,
-            'psi': heading_rad,
-            **dict(zip(self.parameters, values, strict=True)),
+            name: value if name == 'u' else np.clip(value, *self.term.valid.get(name, _ANY))
+            for name, value in known.items()
         }
+        names |= dict(zip(self.parameters, values, strict=True))
         with np.errstate(all='ignore'):
             found = self.formula.walk(
                 Values(), {name: np.asarray(value, np.float64) for name, value in names.items()}
@@ -375,40 +294,31 @@ class LearntTerm:
         result: Float64 = np.nan_to_num(found, nan=0.0, posinf=1e15, neginf=-1e15)
         return result
 
-    def _in_time(
-        self, frame: Frame, heading_rad: float, values: tuple[float, ...]
-    ) -> tuple[Turn, ...]:
-        """Return a drag over the square of the speed that grows and falls in time."""
-        low, high = self.form.valid.get('t', (0.0, _LONGEST_S))
-        last = max(frame.scenario.duration_s, 1.0)
-        knots = np.linspace(0.0, last, _KNOTS + 1)
-        # where much happens early, as of a decay, knots stand closer there
-        knots = last * (knots / last) ** 1.5
-        at = np.clip(knots, low, high)
-        force = self._worth(frame.ship, heading_rad, values, np.asarray(1.0), at)
-        density = frame.ship.water.density_kg_m3
-        area = np.broadcast_to(2.0 * force / density, knots.shape)
-        turns = [Turn(0.0, _FOR_EVER_S, 0.0, float(area[0]))]
-        for start, end, more in zip(knots[:-1], knots[1:], np.diff(area), strict=True):
-            edge = float(end - start)
-            turns.append(
-                Turn(float(start) + 0.5 * edge, _FOR_EVER_S, 0.0, float(more), edge_s=edge)
-            )
-        return tuple(turn for turn in turns if turn.drag_area_m2 != 0.0)
 
+def learnt_term() -> Kind:
+    """
+    Expect a learnt term; it is checked as a whole.
+    """
+    keys = keys_of(LearntTerm)
 
-def _prior(parameter: TermParameter, least_sd: float) -> Prior:
-    """Return what is expected of a parameter in later runs."""
-    value, sd = parameter.value, parameter.sd
-    if value == 0.0 or sd > 0.5 * abs(value):
-        return normal(max(sd, 1e-12), mean=value)
-    return log_normal(value, max(sd / abs(value), least_sd))
+    def read(value: object, path: str, problems: Problems) -> object:
+        before = len(problems)
+        accepted = read_keys(keys, value, path, problems)
+        if len(problems) > before:
+            return INVALID
+        try:
+            return LearntTerm(**accepted)
+        except EffectFileError as error:
+            problems.extend(dotted(path, problem) for problem in error.problems)
+            return INVALID
+
+    return Kind(read, f'the keys {", ".join(keys)}')
 
 
 def _problems(term: LearntTerm) -> list[str]:
     """Return everything that is wrong with a term."""
     found = _plain_problems(term)
-    channel, variable = term.form.channel, term.form.variable
+    channel, variable = term.term.channel, term.term.variable
     if variable not in ACTING.get(channel, ()):
         able = '; '.join(f'{name} by {", ".join(by)}' for name, by in ACTING.items())
         found.append(
@@ -437,16 +347,18 @@ def _problems(term: LearntTerm) -> list[str]:
 
 def _plain_problems(term: LearntTerm) -> list[str]:
     """Return what is wrong beside the formula."""
-    found = list(_name_problems(term.name))
+    found = []
+    if not NAME.fullmatch(term.name):
+        found.append(f'name: {term.name[:60]!r}, expected small letters, digits and _')
     count = len(term.parameters)
     if not 1 <= count <= MOST_PARAMETERS:
         found.append(f'parameters: {count} of them, expected 1..{MOST_PARAMETERS}')
     for name in term.parameters:
         if not re.fullmatch(r'[A-Za-z][A-Za-z0-9_]{0,29}', name) or name in NAMES:
             found.append(f'parameters: {name[:40]!r} cannot be a name of a parameter')
-    for name, ends in term.form.valid.items():
-        if name not in ('u', 't') or len(ends) != 2:
-            found.append(f'term.valid.{name[:40]}: expected u or t, with two ends each')
+    for name, ends in term.term.valid.items():
+        if name not in _AXES or name in ('L', 'psi') or len(ends) != 2:
+            found.append(f'term.valid.{name[:40]}: expected u, t, d or h, with two ends each')
     sizes = {len(row) for row in term.covariance}
     if term.covariance and (len(term.covariance) != count or sizes != {count}):
         found.append(f'covariance: expected {count} rows of {count} numbers')
@@ -475,59 +387,35 @@ def _is_covariance(matrix: Float64) -> bool:
     return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale)).min() > -_ROUNDING)
 
 
-def check_name(name: str) -> str:
-    """
-    Return a name that a term may have.
-
-    Raises
-    ------
-    EffectFileError
-        If it may not.
-    """
-    problems = list(_name_problems(name))
-    if problems:
-        raise EffectFileError(name[:60], problems)
-    return name
-
-
-def _name_problems(name: str) -> Iterator[str]:
-    if not _NAME.fullmatch(name):
-        yield f'name: {name[:60]!r}, expected small letters, digits and _'
-    if name in OWN:
-        yield f'name: {name!r} is an effect of the library; give it another'
-
-
 _NONE = TermEvidence((), 0.0, 0.0, False, 0.0)
-_NEEDS = {'speed': 'u', 'time': 't', 'heading': 'psi'}
+_NEEDS = {'speed': 'u', 'time': 't', 'heading': 'psi', 'date': 'd', 'depth': 'h'}
 
 
 def _refuse_wrong_variable(term: LearntTerm) -> None:
     """Expect the variable that is stated, and of the others the speed at most."""
-    mine = _NEEDS[term.form.variable]
+    mine = _NEEDS[term.term.variable]
     names = set(term.formula.names)
-    if mine not in names and term.form.shape != 'constant':
-        raise FormulaError(f'goes by {term.form.variable}, and {mine} is not in it')
-    for other in {'t', 'psi'} - {mine}:
+    if mine not in names and term.term.shape != 'constant':
+        raise FormulaError(f'goes by {term.term.variable}, and {mine} is not in it')
+    for other in {'t', 'psi', 'd', 'h'} - {mine}:
         if other in names:
-            raise FormulaError(f'goes by {term.form.variable}, and {other} is in it')
-    if mine not in ('psi',) and mine in names and mine not in term.form.valid:
+            raise FormulaError(f'goes by {term.term.variable}, and {other} is in it')
+    if mine != 'psi' and mine in names and mine not in term.term.valid:
         raise FormulaError(f'has {mine} in it, and valid does not say between what it holds')
 
 
 def _boxes(term: LearntTerm) -> dict[str, Range]:
     """Return ranges of all names, in boxes that cover all ships and what is valid."""
-    valid = term.form.valid
-    axes = [
-        np.array(_LENGTHS_M),
-        np.linspace(*valid.get('u', (0.0, 20.0)), _SPEEDS + 1),
-        np.linspace(*valid.get('t', (0.0, _LONGEST_S)), _TIMES + 1),
-        np.linspace(-math.pi, math.pi, _HEADINGS + 1),
-    ]
-    lows = np.meshgrid(*(axis[:-1] for axis in axes), indexing='ij')
-    highs = np.meshgrid(*(axis[1:] for axis in axes), indexing='ij')
+    axes = {}
+    for name, ends in _AXES.items():
+        valid = term.term.valid.get(name)
+        if name in ('L', *term.formula.names):
+            axes[name] = np.linspace(*valid, len(ends)) if valid else np.array(ends)
+    lows = np.meshgrid(*(axis[:-1] for axis in axes.values()), indexing='ij')
+    highs = np.meshgrid(*(axis[1:] for axis in axes.values()), indexing='ij')
     found = {
         name: Range(low.ravel(), high.ravel())
-        for name, low, high in zip(('L', 'u', 't', 'psi'), lows, highs, strict=True)
+        for name, low, high in zip(axes, lows, highs, strict=True)
     }
     length = found['L']
     found['nabla'] = Range(1e-4 * length.low**3, 0.1 * length.high**3)
@@ -544,17 +432,22 @@ def _boxes(term: LearntTerm) -> dict[str, Range]:
 def _refuse_mixed(term: LearntTerm) -> None:
     """Expect what can be simulated: a force in time goes as the square of the speed."""
     values = tuple(each.value for each in term.parameters.values())
-    some = Ship(length_m=100.0, displaced_volume_m3=9000.0)
-    low, high = term.form.valid.get('u', (0.5, 8.0))
+    some: dict[str, Float64 | float] = {
+        'rho': 1000.0,
+        'g': GRAVITY_M_S2,
+        'L': 100.0,
+        'nabla': 9000.0,
+        'psi': 0.3,
+    }
+    low, high = term.term.valid.get('u', (0.5, 8.0))
     speed = np.linspace(max(low, 0.05 * high), high, 7)
-    last = term.form.valid.get('t', (0.0, 1e3))[1]
-    if 't' not in term.formula.names:
-        worth = term._worth(some, 0.3, values, speed, 0.0)
-        if not is_finite(worth):
-            raise FormulaError('is no finite number of newton inside its valid range')
-        return
+    last = term.term.valid.get('t', (0.0, 1e3))[1]
     for share in (0.0, 0.1, 0.5, 1.0):
-        worth = term._worth(some, 0.3, values, speed, share * last) / speed**2
-        worth = np.broadcast_to(worth, speed.shape)
-        if np.ptp(worth) > _ALIKE * np.abs(worth).max():
+        known = some | {'u': speed, 't': share * last, 'd': 20605.0, 'h': 200.0}
+        worth = np.broadcast_to(term.worth(known, values), speed.shape)
+        if not is_finite(worth):
+            raise FormulaError('is no finite number inside its valid range')
+        over = worth / speed**2
+        force_in_time = term.term.channel == 'force' and 't' in term.formula.names
+        if force_in_time and np.ptp(over) > _ALIKE * np.abs(over).max():
             raise FormulaError('goes by time, and is not u**2 times a function of t alone')
