@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.errors import FleetError
+from shipdrag_ros.errors import FleetError, reason_of
 
 if TYPE_CHECKING:  # a verb that needs no folders does not import it
     from fsspec import AbstractFileSystem
@@ -187,7 +187,7 @@ class Tree:
             # not `fs.walk`: it follows no link, and drops what it cannot list below the top
             listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
         except Exception as error:  # each file system has errors of its own
-            why = getattr(error, 'strerror', None) or error
+            why = reason_of(error)
             return [], Folder(path, parts, (), f'cannot be read: {why}')
         folders, files = [], []
         for about in listed:
@@ -241,7 +241,7 @@ def _reached(place: str) -> Iterator[None]:
         yield
     except Exception as error:
         raise FleetError(
-            f'{place!r} cannot be reached: {str(error) or type(error).__name__}; check the '
+            f'{place!r} cannot be reached: {reason_of(error)}; check the '
             'address, and for s3:// the usual AWS variables (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL)'
         ) from error
 

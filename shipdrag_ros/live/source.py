@@ -10,8 +10,9 @@ from typing import Any, Protocol
 
 from shipdrag_ros.bags.run import Run
 from shipdrag_ros.coastdown.events import EndedCoastdown
-from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.errors import ShipdragError, reason_of
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.timeline import Timeline
@@ -22,7 +23,6 @@ from shipdrag_ros.samples import SECOND_NS, concatenate
 from shipdrag_ros.ship import Ship
 
 WAITING = 20_000  # messages heard and not yet looked at; more are dropped and counted
-FASTEST = 1000.0
 
 
 class PictureFeed(Protocol):
@@ -211,8 +211,8 @@ class BagSource:
         line = self._timeline
         try:
             line.read()
-        except ShipdragError as error:
-            line.problem = str(error)
+        except Exception as error:  # a thread that ends unseen would leave the page waiting
+            line.problem = reason_of(error)
 
     def _begin(self, coastdown: EndedCoastdown, window: Window) -> None:
         assert self._diagnosing is not None

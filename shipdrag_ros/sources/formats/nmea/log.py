@@ -11,7 +11,7 @@ from datetime import UTC
 from fractions import Fraction
 from pathlib import Path
 
-from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.errors import ImportDataError, reason_of
 from shipdrag_ros.nmea.reading import START, checksum_of
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
@@ -66,7 +66,7 @@ class NmeaLog:
             with opened(self.path) as (_, file):
                 start = file.read(2)
         except BROKEN as error:
-            reason = getattr(error, 'strerror', None) or str(error)
+            reason = reason_of(error)
             raise ImportDataError(
                 f'{str(path)!r} cannot be read: {reason}; give a log of NMEA 0183'
             ) from error
