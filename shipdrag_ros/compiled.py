@@ -20,6 +20,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, update_wrapper
@@ -43,6 +44,7 @@ _log = logging.getLogger(__name__)
 _not_kept: list[str] = []
 _waiting: set[_LazyFunction] = set()
 _listeners: list[Callable[[], object]] = []
+_importing = threading.Lock()  # numba's modules import each other in a circle
 
 
 @overload
@@ -166,8 +168,9 @@ class _LazyFunction:
 
     def compile_now(self) -> Any:
         """Return what numba makes of it, compiled where a signature says for what."""
-        lock = _numba_lock()
-        with lock:  # another thread may do the same
+        with _importing:  # another thread may do the same
+            lock = _numba_lock()
+        with lock:
             if self._made is None:
                 self._made = _dispatcher(self._function, self._options)
             if self in _waiting:

@@ -239,6 +239,24 @@ def test_the_machine_code_is_for_any_processor_of_its_kind(toy: Path, tmp_path: 
         assert found.split('\n') == ['4.0', 'generic']
 
 
+def test_two_threads_at_once_may_need_the_compiler_first(toy: Path) -> None:
+    """The second comes in the middle of the import, whose modules import each other."""
+    code = """if True:
+        import sys, threading, time
+        from shipdrag_ros.caller import twice
+        def work(): sys.stdout.write(f'{twice(1.0)}\\n')
+        other = threading.Thread(target=work)
+        def watch(event, values):
+            if event == 'import' and values[0] == 'numba.misc.special' and not other.ident:
+                other.start()
+                time.sleep(0.5)
+        sys.addaudithook(watch)
+        work()
+        other.join()
+    """
+    assert run(toy, code) == ('4.0\n4.0', '')
+
+
 def test_a_closure_is_refused() -> None:
     outer = 1.0
     with pytest.raises(TypeError, match='stands in a module'):
