@@ -15,12 +15,20 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import acceptance, signal_k
-from shipdrag_ros.live.acceptance import Held
+from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import recorded_runs
-from shipdrag_ros.live.source import BagSource
-from shipdrag_ros.live.timeline import Timeline
+from shipdrag_ros.live.headline import (
+    Check,
+    Held,
+    course_check,
+    depth_check,
+    lead_check,
+    reciprocal_check,
+    rudder_check,
+    wind_check,
+)
+from shipdrag_ros.live.source import BagSource, Timeline
 from shipdrag_ros.messages.heard import ERROR, Health, NodeMessage, Status, health_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
@@ -264,26 +272,26 @@ def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
 @pytest.mark.parametrize(
     ('check', 'held'),
     [
-        (acceptance.lead_check(599.0, 600.0), Held.WAIT),
-        (acceptance.lead_check(600.0, 600.0), Held.YES),
-        (acceptance.lead_check(None, None), Held.UNKNOWN),
-        (acceptance.wind_check((-8.0, 0.0), 8.0), Held.YES),  # calm: own motion is all
-        (acceptance.wind_check((-8.0, 6.0), 8.0), Held.NO),
-        (acceptance.wind_check(None, 8.0), Held.UNKNOWN),
-        (acceptance.depth_check(42.0, 5.0, Ship.load(SHIP)), Held.YES),
-        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), Held.NO),  # 3 sqrt(B T) = 40.9 m
-        (acceptance.depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
-        (acceptance.depth_check(None, 8.0, None), Held.UNKNOWN),
-        (acceptance.rudder_check(math.radians(-4.0)), Held.YES),
-        (acceptance.rudder_check(math.radians(-6.0)), Held.NO),
-        (acceptance.course_check(math.radians(359.0), coasting=True), Held.YES),
-        (acceptance.course_check(math.radians(-30.0), coasting=True), Held.NO),
-        (acceptance.reciprocal_check(270.0, paired=False), Held.WAIT),
-        (acceptance.reciprocal_check(270.0, paired=False, coasting=True), Held.WAIT),
-        (acceptance.reciprocal_check(None, paired=True), Held.YES),
+        (lead_check(599.0, 600.0), Held.WAIT),
+        (lead_check(600.0, 600.0), Held.YES),
+        (lead_check(None, None), Held.UNKNOWN),
+        (wind_check((-8.0, 0.0), 8.0), Held.YES),  # calm: own motion is all
+        (wind_check((-8.0, 6.0), 8.0), Held.NO),
+        (wind_check(None, 8.0), Held.UNKNOWN),
+        (depth_check(42.0, 5.0, Ship.load(SHIP)), Held.YES),
+        (depth_check(40.0, 5.0, Ship.load(SHIP)), Held.NO),  # 3 sqrt(B T) = 40.9 m
+        (depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
+        (depth_check(None, 8.0, None), Held.UNKNOWN),
+        (rudder_check(math.radians(-4.0)), Held.YES),
+        (rudder_check(math.radians(-6.0)), Held.NO),
+        (course_check(math.radians(359.0), coasting=True), Held.YES),
+        (course_check(math.radians(-30.0), coasting=True), Held.NO),
+        (reciprocal_check(270.0, paired=False), Held.WAIT),
+        (reciprocal_check(270.0, paired=False, coasting=True), Held.WAIT),
+        (reciprocal_check(None, paired=True), Held.YES),
     ],
 )
-def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> None:
+def test_the_checklist_says_what_holds(check: Check, held: Held) -> None:
     assert check.held is held
     assert check.text
 
@@ -291,13 +299,13 @@ def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> N
 @pytest.mark.parametrize(
     ('check', 'text'),
     [
-        (acceptance.wind_check((-8.0, 0.0), 8.0), '0 kn true, at most 10 kn'),
-        (acceptance.wind_check((-8.0, 6.0), 8.0), '12 kn true, over 10 kn'),
-        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), '40 m, less than 41 m'),
-        (acceptance.lead_check(599.0, 600.0), '9:59 of 10:00'),
+        (wind_check((-8.0, 0.0), 8.0), '0 kn true, at most 10 kn'),
+        (wind_check((-8.0, 6.0), 8.0), '12 kn true, over 10 kn'),
+        (depth_check(40.0, 5.0, Ship.load(SHIP)), '40 m, less than 41 m'),
+        (lead_check(599.0, 600.0), '9:59 of 10:00'),
     ],
 )
-def test_the_checklist_shows_what_it_compares(check: acceptance.Check, text: str) -> None:
+def test_the_checklist_shows_what_it_compares(check: Check, text: str) -> None:
     assert check.text == text
 
 
