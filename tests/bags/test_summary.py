@@ -15,8 +15,8 @@ from mcap.writer import IndexType, Writer
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, Compression, open_runs
 from shipdrag_ros.bags.contents import contents_of
-from shipdrag_ros.bags.reader import info
 from shipdrag_ros.bags.records import MAGIC
+from shipdrag_ros.bags.run import info
 from shipdrag_ros.messages import reset_request
 from shipdrag_ros.samples import Block, Channel
 
