@@ -39,10 +39,11 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from shipdrag_ros import __version__
-from shipdrag_ros.display import json_text
+from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
+from shipdrag_ros.live.headline import Tone
 from shipdrag_ros.live.source import PictureFeed
 
 KEPT = 50  # frames: five seconds
@@ -156,6 +157,7 @@ _ON_PAPER = (
 )
 _KEEP_S = 30 * 86400
 _KEPT = 32
+_FAILURES = 20  # that are logged
 FLEET = '/fleet'
 
 
@@ -241,6 +243,7 @@ class LivePage:
         self._token = token
         self._fleet = fleet
         self._mark = mark
+        self._failures: set[str] = set()
         self._started = {
             'version': __version__,
             'notes': list(notes),
@@ -295,9 +298,23 @@ class LivePage:
     async def _tick_for_ever(self) -> None:
         due_s = time.monotonic()
         while True:
-            self.tick()
+            try:
+                self.tick()
+            except Exception as error:  # a task that ends unseen would leave the picture as it was
+                self._fail(error)
             due_s = max(due_s + TICK_S, time.monotonic())
             await asyncio.sleep(due_s - time.monotonic())
+
+    def _fail(self, error: Exception) -> None:
+        """Say on the page that it shows nothing, and why; once in the log."""
+        why = f'{type(error).__name__}: {printable(str(error))}'
+        action = f'Nothing here is of now ({why}). Start the page again, and report this.'
+        said = {'tone': Tone.BAD.value, 'text': 'THE PAGE HAS FAILED', 'action': action}
+        self.frames.add({'headline': said}, [], anew=False)
+        if why not in self._failures and len(self._failures) < _FAILURES:
+            self._failures.add(why)
+            about = {'message': 'the page cannot be made', 'exception': error}
+            asyncio.get_running_loop().call_exception_handler(about)
 
     # the page
 

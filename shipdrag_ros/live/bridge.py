@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
@@ -163,7 +164,7 @@ class Bridge:
         self._found: PagePart | None = None  # the last diagnosis
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
         self._noted: EventKind | None = None
-        self._unread = 0
+        self._unread: set[str] = set()
 
     # heard
 
@@ -183,13 +184,21 @@ class Bridge:
             case NodeMessage(name, payload):
                 try:
                     self._take_output(name, payload)
-                except (MalformedMessage, ValueError, RecursionError):
-                    self._unread += 1
+                except Exception as error:  # whatever a peer sends, the page goes on
+                    self._note_unread(name, error)
             case ShipFile(text):
                 try:
                     self._ship = Ship.from_yaml(text, subject="the node's ship file")
                 except ShipdragError as error:
                     self._notes.append((self._now_ns, str(error)))
+
+    def _note_unread(self, name: str, error: Exception) -> None:
+        """Say of each topic once that it brings what is not understood."""
+        if name not in self._unread:
+            self._unread.add(name)
+            why = f'{type(error).__name__}: {printable(str(error))}'
+            text = f'~/{name} brings what is not understood ({why}); find who publishes it'
+            self._notes.append((self._now_ns, text))
 
     def keep_alive(self, now_s: float) -> None:
         """

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import time
@@ -11,11 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.applications import Starlette
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
+from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import recorded_runs
 from shipdrag_ros.live.headline import (
@@ -28,7 +31,8 @@ from shipdrag_ros.live.headline import (
     rudder_check,
     wind_check,
 )
-from shipdrag_ros.live.source import BagSource, Timeline
+from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
+from shipdrag_ros.messages import EventKind, EventNote, event_message
 from shipdrag_ros.messages.heard import ERROR, Health, NodeMessage, Status, health_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
@@ -254,7 +258,7 @@ def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:
     assert later.parts(0.0)['if_stopped']['hull'].startswith('the coastdown of ')
 
 
-def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
+def test_bytes_that_are_none_of_the_outputs_are_said_once_and_change_nothing_else() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
     for name in (
@@ -266,7 +270,9 @@ def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
         'forecast_path',
     ):
         bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
-    assert bridge.parts(0.0) == before
+    after = bridge.parts(0.0)
+    assert len(after['notes']) == 6
+    assert {**after, 'notes': []} == before
 
 
 @pytest.mark.parametrize(
@@ -338,3 +344,46 @@ def test_a_verdict_whose_document_is_on_its_way_has_every_part() -> None:
         'probabilities': [],
         'decide': [],
     }
+
+
+def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:
+    """A coastdown without its beginning, and figures that are none."""
+    payload = event_message(EventNote(EventKind.ONSET, 5, 'a coastdown began', {})).payload
+    values = {'lifecycle': 'active', 'monitor': 'coastdown'}
+    values |= dict.fromkeys(('coastdown since [ns]', 'steady lead [s]'), 'inf')
+    bridge = Bridge()
+    for _ in range(3):
+        bridge.hear(NodeMessage('events', payload), 0.0)
+        bridge.hear(Health((Status('node', 'state', 0, '', values),)), 0.0)
+    said = str(bridge.parts(1.0)['notes'])
+    assert said.count('events brings what is not understood (KeyError') == 1
+
+
+def test_a_picture_that_cannot_be_made_is_said_on_the_page_until_it_can() -> None:
+    class Failing(NodeSource):
+        fails = True
+
+        def player(self) -> Any:
+            if self.fails:
+                raise RuntimeError('out of order')
+            return super().player()
+
+    source = Failing(None)
+    page = LivePage(source)
+
+    def headline() -> str:
+        _, data = page.frames.after(None)
+        body = data.decode().partition('data: ')[2]
+        return str(json.loads(body).get('headline'))
+
+    async def watch() -> None:
+        async with page._lifespan(Starlette()):
+            for said, fails in ((True, False), (False, False)):
+                end_s = time.monotonic() + 60.0
+                while ('PAGE HAS FAILED' in headline()) != said:
+                    assert time.monotonic() < end_s
+                    await asyncio.sleep(0.05)
+                assert not said or 'RuntimeError: out of order' in headline()
+                source.fails = fails
+
+    asyncio.run(watch())
