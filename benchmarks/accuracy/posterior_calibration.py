@@ -29,6 +29,7 @@ from shipdrag_ros.posterior.laplace import infer
 from shipdrag_ros.posterior.motion import damping_of, predict, shapes_at
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import read
+from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -41,9 +42,10 @@ SPEEDS = np.linspace(LOW_M_S, 7.8, 50)
 
 
 class Place(NamedTuple):
-    """Where the truth lies: cover of the band, chi^2, and the probability of the hypothesis."""
+    """Where the truth lies: cover of both bands, chi^2, and the probability of the hypothesis."""
 
     cover: float
+    in_weather: float
     chi2: float
     name: str
     chance: float
@@ -63,7 +65,14 @@ def model_of(value: Float64) -> RunModel:
     variance = np.tile([LOG_SD**2, POSITION_SD**2], len(time_s))
     steady = 2 * int((time_s < 0.0).sum())
     return RunModel.of(
-        rows, variance, steady, Ship.example(), STOP, speed_m_s=SPEED_M_S, low_m_s=LOW_M_S
+        rows,
+        variance,
+        steady,
+        Ship.example(),
+        STOP,
+        speed_m_s=SPEED_M_S,
+        low_m_s=LOW_M_S,
+        weather=Weather(None, None),
     )
 
 
@@ -73,7 +82,7 @@ def count_of_rows() -> int:
 
 
 def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
-    """Draw a run: its model, the name of what holds, and the true r at `SPEEDS`."""
+    """Draw a run: its model, what holds, and the true r at `SPEEDS`, calm and in its weather."""
     model = model_of(np.zeros(count_of_rows()))
     chances = np.array([each.chance for each in model.families])
     family = model.families[rng.choice(len(chances), p=chances / chances.sum())]
@@ -91,7 +100,11 @@ def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
     whiten(model.rows, whitener, noise)
     disturbed = np.linalg.solve(whitener.T, rng.standard_normal(len(speed)))
     known, columns = shapes_at(model.forces, SPEEDS)
-    return model_of(disturbed - table[0]), family.name, known[0] + unknowns[:k] @ columns[0]
+    whole = known[0] + unknowns[:k] @ columns[0]
+    of_weather = unknowns[model.of_hull : k] @ columns[0, model.of_hull :]
+    for each in model.weather:
+        of_weather = of_weather + np.interp(SPEEDS, model.law.speed_m_s, each.known)
+    return model_of(disturbed - table[0]), family.name, np.stack([whole - of_weather, whole])
 
 
 def place(rng: np.random.Generator) -> Place:
@@ -105,13 +118,16 @@ def place(rng: np.random.Generator) -> Place:
     """
     model, name, true = drawn(rng)
     found = infer(model)
-    part = read(found, SPEEDS)
-    off = (part.resistance_m_s2 - true) / part.sigma_m_s2
+    calm, whole = (
+        (part.resistance_m_s2 - each) / part.sigma_m_s2
+        for part, each in zip((read(found, SPEEDS, calm=which) for which in (True, False)), true)
+    )
     names = list(dict.fromkeys(each.name for each in model.families))
     best = max(names, key=found.chance)
     return Place(
-        float(np.mean(np.abs(off) < WIDE)),
-        float(np.mean(off**2)),
+        float(np.mean(np.abs(calm) < WIDE)),
+        float(np.mean(np.abs(whole) < WIDE)),
+        float(np.mean(calm**2)),
         name,
         found.chance(name),
         best,
@@ -133,12 +149,13 @@ def main() -> None:
             found.append(place(np.random.default_rng([options.seed, number])))
         except EstimationError:
             failed += 1
-    cover, chi2 = (np.array([each[i] for each in found], np.float64) for i in range(2))
+    cover, whole, chi2 = (np.array([each[i] for each in found], np.float64) for i in range(3))
     right = np.array([each.best == each.name for each in found], np.float64)
     said = np.array([each.best_chance for each in found])
     log_chance = np.log(np.maximum([each.chance for each in found], 1e-3))
     print(f'{len(found)} runs, seed {options.seed}; {failed} could not be inferred')
-    print(f'the band of 95 % holds {_mean(100.0 * cover)} % of the speeds')
+    print(f'the band of 95 % holds {_mean(100.0 * cover)} % of the speeds in calm deep water,')
+    print(f'{_mean(100.0 * whole)} % in the weather of the run,')
     print(f'and less than half of them in {_mean(100.0 * (cover < 0.5))} % of the runs')
     print(f'chi^2 {_mean(chi2)}, median {np.median(chi2):.2f}')
     print(f'the most probable hypothesis: said {_mean(said)}, right {_mean(right)}')

@@ -26,8 +26,9 @@ def test_the_summary_gives_knots_and_kilowatts_first(estimate: Estimate, ship: S
     assert first == (
         f'At {speed / 0.5144444:.1f} knots: resistance {force:.0f} ± '
         f'{2.0 * (0.02 * force + 2.0705):.0f} kN, effective power {force * speed:.0f} ± '
-        f'{2.0 * (0.02 * force + 2.0705) * speed:.0f} kW. Known from 3.8 to 13.4 knots; ± is two '
-        'standard deviations.'
+        f'{2.0 * (0.02 * force + 2.0705) * speed:.0f} kW. Known from 3.8 to 13.4 knots, of '
+        'the ship in the wind and depth of the run, which are not known; ± is two standard '
+        'deviations.'
     )
     assert 'states no baseline' in missing
     assert '1.95 to 6.90 m/s' in last
@@ -50,7 +51,7 @@ def test_the_summary_says_what_is_over_the_clean_hull(estimate: Estimate, ship: 
 
 def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, ship: Ship) -> None:
     curve = estimate.curve
-    slow = replace(estimate, curve=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
+    slow = replace(estimate, conditions=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
     model = replace(ship, displaced_volume_m3=14.0 / 1025.0)
     first, _, last = slow.summary(model)
     assert first.startswith('At 0.615 m/s: resistance 0.1765 ± 0.0099 N, effective power 0.1086 ')

@@ -91,7 +91,7 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
         (
             replace(
                 updates[3].estimate,
-                curve=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
+                conditions=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
             ),
             0.01 / 1.01,
         ),
