@@ -68,7 +68,6 @@ class Factored(NamedTuple):
         return 2.0 * float(np.log(np.diag(self.lower)).sum() - np.log(self.scale).sum())
 
 
-_BLOCK = 128
 _FOLLOWS = 1e-14  # of a scaled diagonal
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.

@@ -24,7 +24,7 @@ from shipdrag_ros.inference.gaussian import products_of, substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
@@ -152,7 +152,6 @@ class _RunNoise(NamedTuple):
     settings: Settings
     log_prior: Float64
     typical: Settings
-    learnt: bool
 
 
 class RunResidual(NamedTuple):
@@ -358,6 +357,10 @@ class Comparing:
         whitener = self.white(j, table._replace(along=lines), self.runs.runs[j]).T
         result: Float64 = np.sqrt(np.sum(np.linalg.inv(whitener) ** 2, axis=1))
         return result
+
+    def water_m_s(self, j: int) -> float:
+        """Return the usual size of the slow motion of the water in a run."""
+        return GaussMarkovNoise(*self.noise[j].typical.slow[0].tolist()).water_m_s
 
     @property
     def as_stated(self) -> Fitted:
@@ -850,7 +853,7 @@ def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
     log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt.settings, log_prior, learnt.typical, learnt.learnt)
+    return _RunNoise(learnt.settings, log_prior, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:
