@@ -17,15 +17,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_ndtr
 
-from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference import decision
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis
-from shipdrag_ros.inference.gaussian import products_of, substitute
+from shipdrag_ros.inference.gaussian import products_of
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
-from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
-from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.linear import Families, solve, whitened_products
+from shipdrag_ros.inference.noise import GaussMarkovNoise, whiten
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
@@ -36,13 +36,11 @@ from shipdrag_ros.posterior.hypotheses import (
     IN_SPEED,
     IN_TIME,
     Explanation,
-    PriorFamilies,
     RunSight,
     RunTable,
     ShipRuns,
     half,
 )
-from shipdrag_ros.posterior.laplace import of_family
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
@@ -63,49 +61,6 @@ _RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curv
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
-
-
-@compiled
-def _products(
-    along: Float64, rest: Float64, rows: Rows, white: Noise, steady: int, settings: Settings
-) -> tuple[Float64, Float64]:
-    """Return products of whitened lines, (s, l, l), and log determinants (s,)."""
-    s, lines = len(settings.weight), len(along)
-    found, log_det = np.empty((s, lines, lines)), np.empty(s)
-    for k in range(s):
-        table = along.copy()
-        log_det[k] = whiten(rows, table, noise_of(settings, k, rows, white, steady))
-        found[k] = products_of(table) + rest
-    return found, log_det
-
-
-@compiled
-def _solve(
-    products: Float64, mean: Float64, precision: Float64, first: int, count: int
-) -> tuple[Float64, Float64, Float64]:
-    """
-    Return log evidence (s, f) and step (s, f, p) of linear models.
-
-    With the variance (s, f, count) of some unknowns.
-    """
-    s, f, p = len(products), len(mean), len(products[0]) - 1
-    logs = np.full((s, f), -np.inf)
-    steps, variances = np.zeros((s, f, p)), np.zeros((s, f, count))
-    unit = np.zeros((p, count))
-    for a in range(count):
-        unit[first + a, a] = 1.0
-    for k in range(s):
-        for q in range(f):
-            solved, log, step, lower, scale = of_family(products[k], mean[q], precision[q])
-            if not solved or not np.isfinite(log):
-                continue
-            logs[k, q], steps[k, q] = log, step
-            if count == 0:
-                continue
-            covariance = substitute(lower, scale, unit)
-            for a in range(count):
-                variances[k, q, a] = covariance[first + a, a]
-    return logs, steps, variances
 
 
 @dataclass
@@ -339,7 +294,7 @@ class Comparing:
         """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
         families = self.runs.priors(fit.hypothesis, fit.at)
         total = np.asarray(sum(self.equations(fit)), np.float64)
-        logs, _, _ = _solve(total[None], families.mean, families.precision, 0, 0)
+        logs, _, _ = solve(total[None], families.mean, families.precision, 0, 0)
         best = int(np.argmax(logs[0] + families.log_chance))
         return best, families.mean[best], families.precision[best]
 
@@ -509,7 +464,7 @@ class Comparing:
             - 0.5 * (precision * mean**2).sum(axis=1)
         )
         cost = float(total[0, 0] - 2.0 * np.logaddexp.reduce(density))
-        logs, steps, _ = _solve(total[None], mean, precision, 0, 0)
+        logs, steps, _ = solve(total[None], mean, precision, 0, 0)
         if not np.isfinite(logs).any():
             return math.inf, np.zeros(len(at))
         weight = np.exp(logs[0] + log_chance - (logs[0] + log_chance).max())
@@ -524,8 +479,10 @@ class Comparing:
 
     def _of_run(self, j: int, table: RunTable, settings: Settings) -> tuple[Float64, Float64]:
         model = self.runs.runs[j].model
-        rest = products_of(np.ascontiguousarray(table.rest))
-        return _products(table.along, rest, model.rows, table.white, model.steady, settings)
+        products, log_det = whitened_products(
+            table.along, model.rows, table.white, model.steady, settings
+        )
+        return products + products_of(np.ascontiguousarray(table.rest)), log_det
 
     def _score(
         self, nothing: Fitted, ways: Sequence[EffectWay]
@@ -647,11 +604,10 @@ class Comparing:
                 run.model.steady,
             )
             learnt = learn(seen, run.model.speed_m_s)
-            rest = np.zeros((len(lines), len(lines)))
-            products, log_det = _products(
-                lines, rest, run.model.rows, table.white, run.model.steady, learnt.settings
+            products, log_det = whitened_products(
+                lines, run.model.rows, table.white, run.model.steady, learnt.settings
             )
-            logs, _, _ = _solve(products, seen.mean, seen.precision, 0, 0)
+            logs, _, _ = solve(products, seen.mean, seen.precision, 0, 0)
             alike = np.logaddexp.reduce(logs, axis=1) - 0.5 * log_det - math.log(len(means))
             noise.append(_noise(learnt, alike))
         self.noise = noise
@@ -743,11 +699,11 @@ class Comparing:
         fit.sd = np.sqrt(np.maximum(weight @ (variance + z**2) - mean**2, 0.0))
 
     def _evidence(
-        self, fit: Fitted, products: Float64, families: PriorFamilies
+        self, fit: Fitted, products: Float64, families: Families
     ) -> tuple[Float64, Float64, Float64]:
         """Return log evidence (s,), and mean and variance of the effects' unknowns (s, q)."""
         first, q = self.runs.size, len(fit.hypothesis.unknowns)
-        logs, steps, variances = _solve(products, families.mean, families.precision, first, q)
+        logs, steps, variances = solve(products, families.mean, families.precision, first, q)
         logs = logs + families.log_chance
         own = steps[..., first : first + q]
         for i in half(fit.hypothesis, 0):
