@@ -29,12 +29,12 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effects import carrying, effects_of, terms
+from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
@@ -132,7 +132,8 @@ def diagnose(
         )
     case = _compared((seen, notes), runs, ship, parameters, facts, earlier, progress)
     seen, comparing, found = case.seen, case.comparing, case.found
-    judged = judge(found)
+    never = inseparable(found.effects)
+    judged = judge(found, never)
     verdict = judged.decision.verdict
     would_decide: tuple[Advice, ...] = ()
     if advise and verdict is Verdict.ONE_OF:
@@ -165,7 +166,7 @@ def diagnose(
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if case.earlier is None else case.earlier.judged(found),
-        limits=limits_of(found, comparing, judged.decision.effects),
+        limits=limits_of(judged, comparing, never),
     )
 
 
@@ -192,7 +193,7 @@ class _Case:
 
     seen: tuple[Observation, ...]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
     facts: Facts
     earlier: Carried | None
     notes: tuple[str, ...]

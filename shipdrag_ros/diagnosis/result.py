@@ -382,13 +382,13 @@ class DiagnosisResult:
     candidates: tuple[Candidate, ...]
     nothing: float
     unnamed: float
-    would_decide: tuple[Advice, ...]
-    where: Where | None
     before: Gap
-    after: Gap | None
-    held_out_before: Gap | None
-    held_out_after: Gap | None
     baseline: str
+    would_decide: tuple[Advice, ...] = ()
+    where: Where | None = None
+    after: Gap | None = None
+    held_out_before: Gap | None = None
+    held_out_after: Gap | None = None
     best: tuple[EffectEstimate, ...] = ()
     notes: tuple[str, ...] = ()
     traces: tuple[RunTrace, ...] = ()

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -63,8 +63,30 @@ _EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
+class WeighedFit:
+    """What has been fitted of a hypothesis; `z` and `sd` are of the unknowns of its effects."""
+
+    hypothesis: Explanation
+    log_evidence: float
+    z: Float64 | None
+    sd: Float64 | None
+
+    @property
+    def names(self) -> Names:
+        """As the decision takes them."""
+        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
+
+    @property
+    def log_weight(self) -> float:
+        """Logarithm of evidence times prior odds."""
+        return self.log_evidence + self.hypothesis.log_odds
+
+
+Fit = TypeVar('Fit', bound=WeighedFit)
+
+
 @dataclass
-class Fitted:
+class Fitted(WeighedFit):
     """
     A hypothesis on its way to its best, and then its evidence.
 
@@ -89,16 +111,6 @@ class Fitted:
     log_evidence: float = -math.inf
     z: Float64 | None = None
     sd: Float64 | None = None
-
-    @property
-    def names(self) -> Names:
-        """As the decision takes them."""
-        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
-
-    @property
-    def log_weight(self) -> float:
-        """Logarithm of evidence times prior odds."""
-        return self.log_evidence + self.hypothesis.log_odds
 
 
 class _RunNoise(NamedTuple):
@@ -129,20 +141,19 @@ class RunResidual(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ComparedHypotheses:
+class ComparedHypotheses(Generic[Fit]):
     """
     All hypotheses with their evidence.
 
     Attributes
     ----------
-    runs, effects
+    effects
     fitted
         The best of each.
     """
 
-    runs: ShipRuns
     effects: tuple[Effect, ...]
-    fitted: tuple[Fitted, ...]
+    fitted: tuple[Fit, ...]
 
     @cached_property
     def probability(self) -> dict[Names, float]:
@@ -153,9 +164,9 @@ class ComparedHypotheses:
         )
 
     @cached_property
-    def best(self) -> dict[Names, Fitted]:
+    def best(self) -> dict[Names, Fit]:
         """The likeliest way of each set of names."""
-        found: dict[Names, Fitted] = {}
+        found: dict[Names, Fit] = {}
         for each in self.fitted:
             old = found.get(each.names)
             if old is None or each.log_weight > old.log_weight:
@@ -226,7 +237,7 @@ class Comparing:
         for way in kept:
             self.ways[way.effect.name].append(way)
 
-    def compare(self) -> ComparedHypotheses:
+    def compare(self) -> ComparedHypotheses[Fitted]:
         """
         Fit and weigh nothing, each effect, pairs where they may count, and something smooth.
         """
@@ -253,7 +264,7 @@ class Comparing:
             self._climb(differing)
             every += self._weigh(differing)
         every += self._weigh(self._beside(every))
-        return ComparedHypotheses(self.runs, self.effects, tuple(every))
+        return ComparedHypotheses(self.effects, tuple(every))
 
     def promising(self) -> list[EffectWay]:
         """
@@ -717,7 +728,7 @@ class Comparing:
 
     def _pairs(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return pairs of the likeliest names with all others, that the linear score allows."""
-        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        found = ComparedHypotheses(self.effects, tuple(fits))
         top = max(fit.log_weight for fit in fits)
         names = [each for each in found.probability if each not in (NONE, UNKNOWN)][:_PAIRED]
         # as each was found alone, and as it is looked for at first
@@ -758,7 +769,7 @@ class Comparing:
         count = len(self.runs.runs)
         if count < 2 or not math.isfinite(self.log_differs):
             return []
-        best = ComparedHypotheses(self.runs, self.effects, tuple(fits)).best
+        best = ComparedHypotheses(self.effects, tuple(fits)).best
         of_hull = [
             best[e.name,] for e in self.effects if e.scope is Scope.HULL and (e.name,) in best
         ]
@@ -778,7 +789,7 @@ class Comparing:
 
     def _beside(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return likely names with something smooth besides, linear where the names are best."""
-        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        found = ComparedHypotheses(self.effects, tuple(fits))
         tried = []
         for names, probability in found.probability.items():
             if names in (NONE, UNKNOWN) or probability < _LIKELY:
