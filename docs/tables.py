@@ -44,7 +44,8 @@ _INPUT_MEANING = {
 _OUTPUT_MEANING = {
     'speed': 'estimated speed through water, variance at [0]',
     'resistance': 'specific resistance r as `linear.x` [m/s² = N/kg], retarding positive, '
-    'variance at [0]',
+    'variance at [0]; in calm deep water where wind and depth are measured or stated, else in '
+    'the conditions of the run: /diagnostics says which',
     'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
     'forecast': 'the rest of the glide with a band of 90 %: fields `time, speed, speed_low, '
     'speed_high, distance, distance_low, distance_high` from the stamp on, one point a time; '

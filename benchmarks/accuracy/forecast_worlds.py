@@ -36,7 +36,7 @@ from shipdrag_ros.samples import SECOND_NS, Reason
 from shipdrag_ros.ship import Ship
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'forecast.md'
-KEPT = Path(__file__).parent / 'results' / 'forecast_worlds.json'
+KEPT = Path(__file__).resolve().parents[1] / 'results' / 'forecast_worlds.json'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 Row = tuple[float, bool, float, float]
 

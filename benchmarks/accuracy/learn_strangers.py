@@ -128,7 +128,7 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
         if found['learnt'] is None:
             return result
         term = LearntTerm.load(file)
-        result['kind'] = [term.form.channel, term.form.variable, term.form.shape]
+        result['kind'] = [term.term.channel, term.term.variable, term.term.shape]
         result['parameters'] = {k: [q.value, q.sd] for k, q in term.parameters.items()}
         result['evidence'] = found['learnt']['evidence']
         if stranger:
@@ -153,7 +153,7 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
     """
     Yield shares with their intervals of 95 %, and each case.
     """
-    yield 'What `python benchmarks/learn_strangers.py` learnt; seeds: the ships of each stranger'
+    yield 'What `python -m benchmarks.accuracy.learn_strangers` learnt; seeds: the ships of each stranger'
     for runs in sorted({row['runs'] for row in rows}):
         mine = [row for row in rows if row['runs'] == runs]
         plain = [row for row in mine if row['stranger'] in PLAIN]

@@ -35,13 +35,14 @@ from shipdrag_ros.posterior.start import along_readings
 from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
-_ROUNDS = 12  # linearisations about the mean of the mixture
+_ROUNDS = 20  # linearisations about the mean of the mixture
 _CLOSE = 0.05  # of chi^2, from one step to the next
 _STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
 _UNLIKELY, _QUICK = -7.0, -5.0  # log odds to the likeliest family; less is left out
 _LEAST = 1e-3  # weight of a model; less is left out of the spread
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
+_SHORTEST = 1.0 / 32.0  # part of a step to the mean of the mixture
 
 
 @dataclass(frozen=True)
@@ -309,22 +310,25 @@ def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False
         problem.taught,
         _likely(problem, now, noise.typical, _QUICK if quick else _UNLIKELY),
     )
-    away, part = np.inf, 1.0
+    step, covariance, weight = _mixed(problem, taught, now, noise.settings)
+    away, part = _moved(problem, step, covariance), 1.0
     for _ in range(_ROUNDS):
-        step, covariance, weight = _mixed(problem, taught, now, noise.settings)
-        before, away = away, _moved(problem, step, covariance)
-        if not away < before:
+        if away < _STILL or part < _SHORTEST:
+            break
+        trial = now + part * step
+        there = _mixed(problem, taught, trial, noise.settings)
+        nearer = _moved(problem, *there[:2])
+        if nearer < away:
+            now, away, (step, covariance, weight) = trial, nearer, there
+            part = min(2.0 * part, 1.0)
+        else:  # it leads astray, or the motion runs away
             part *= 0.5
-        if not np.isfinite(away):
-            break
-        now = now + part * step
-        if away < _STILL:
-            break
+    now = now + part * step
     if not away < _SETTLED:
         raise EstimationError(
-            f'the fit of the motion does not settle in {_ROUNDS} rounds: the record allows '
-            'motions that are too different; give a longer window, one without a turn or thrust, '
-            'or a ship file with a baseline'
+            'the fit of the motion does not settle: the record allows motions that are too '
+            'different; give a longer window, one without a turn or thrust, or a ship file with a '
+            'baseline'
         )
     settings = noise.settings._replace(weight=weight.sum(axis=1))
     noise = replace(noise, settings=settings)

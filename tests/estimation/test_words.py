@@ -26,8 +26,9 @@ def test_the_summary_gives_knots_and_kilowatts_first(estimate: Estimate, ship: S
     assert first == (
         f'At {speed / 0.5144444:.1f} knots: resistance {force:.0f} ± '
         f'{2.0 * (0.02 * force + 2.0705):.0f} kN, effective power {force * speed:.0f} ± '
-        f'{2.0 * (0.02 * force + 2.0705) * speed:.0f} kW. Known from 3.8 to 13.4 knots; ± is two '
-        'standard deviations.'
+        f'{2.0 * (0.02 * force + 2.0705) * speed:.0f} kW. Known from 3.8 to 13.4 knots, of '
+        'the ship in the wind and depth of the run, which are not known; ± is two standard '
+        'deviations.'
     )
     assert 'states no baseline' in missing
     assert '1.95 to 6.90 m/s' in last

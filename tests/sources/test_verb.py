@@ -64,7 +64,8 @@ def test_a_table_becomes_a_curve(
     (coastdown,) = json.loads(capsys.readouterr().out)['coastdowns']
     assert coastdown['estimator'] == 'one'
     # -dv/dt = v^2 / 2400, and r = (1 + n_r) times that with n_r of 0.055 to 0.10
-    ratio = np.array(coastdown['resistance_m_s2']) / (np.array(coastdown['speed_m_s']) ** 2 / 2400)
+    slowing = np.array(coastdown['speed_m_s']) ** 2 / 2400
+    ratio = np.array(coastdown['conditions_resistance_m_s2']) / slowing
     assert np.all((ratio > 1.05) & (ratio < 1.11))
 
 
