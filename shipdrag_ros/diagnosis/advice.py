@@ -87,7 +87,7 @@ class Undecided:
     ship: Ship
     seen: Sequence[Observation]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
     facts: Facts
     candidates: Sequence[Candidate]
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
@@ -19,8 +19,8 @@ from shipdrag_ros.diagnosis.result import (
     Advice,
     DiagnosisResult,
     EffectEstimate,
+    SeenRun,
 )
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
@@ -29,15 +29,16 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effects import carrying, effects_of, terms
+from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
+_APART_M_S = 0.15  # slowly: six times what is usual of water
 _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
@@ -131,7 +132,8 @@ def diagnose(
         )
     case = _compared((seen, notes), runs, ship, parameters, facts, earlier, progress)
     seen, comparing, found = case.seen, case.comparing, case.found
-    judged = judge(found)
+    never = inseparable(found.effects)
+    judged = judge(found, never)
     verdict = judged.decision.verdict
     would_decide: tuple[Advice, ...] = ()
     if advise and verdict is Verdict.ONE_OF:
@@ -156,7 +158,7 @@ def diagnose(
         held_out_after=held_out(seen, comparing, best) if judged.missing else None,
         baseline=baseline,
         best=judged.best,
-        notes=(*case.notes, *_without_a_baseline(stated)),
+        notes=(*case.notes, *_besides(case, judged.decision.effects, stated=stated)),
         traces=traces(seen, comparing, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
@@ -164,17 +166,25 @@ def diagnose(
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if case.earlier is None else case.earlier.judged(found),
-        limits=limits_of(found, comparing, judged.decision.effects),
+        limits=limits_of(judged, comparing, never),
     )
 
 
-def _without_a_baseline(stated: bool) -> tuple[str, ...]:
-    if stated:
-        return ()
-    return (
-        'the ship file has no baseline: the runs are compared with the range of all hulls of '
-        'her length and volume, in which fouling, a propeller or a cable cannot be seen',
-    )
+def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[str]:
+    """Say what is not sound, and what cannot be seen."""
+    for j, run in enumerate(case.seen):
+        water_m_s = case.comparing.water_m_s(j)
+        if not named and _has_both(run) and water_m_s > _APART_M_S:
+            yield (
+                f'{run.name}: log and way over ground wander apart by {water_m_s:.2f} m/s (one '
+                'standard deviation), as water seldom makes them; one of them is wrong, and as '
+                'much of the coastdown as is like it passes for noise'
+            )
+    if not stated:
+        yield (
+            'the ship file has no baseline: the runs are compared with the range of all hulls of '
+            'her length and volume, in which fouling, a propeller or a cable cannot be seen'
+        )
 
 
 @dataclass(frozen=True)
@@ -183,7 +193,7 @@ class _Case:
 
     seen: tuple[Observation, ...]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
     facts: Facts
     earlier: Carried | None
     notes: tuple[str, ...]
@@ -317,13 +327,6 @@ def _observed(
         f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
         for run in seen
         if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
-    ]
-    notes += [
-        f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
-        'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
-        'and as much of the coastdown as is like it passes for noise'
-        for run in seen
-        if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
 

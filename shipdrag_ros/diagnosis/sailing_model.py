@@ -9,9 +9,8 @@ it, and it cannot pass for one of them.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -20,10 +19,10 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares, minimize
 
 from shipdrag_ros.diagnosis.legs import Direction, Legs
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis, probabilities
-from shipdrag_ros.posterior import priors
+from shipdrag_ros.inference.decision import NONE, UNKNOWN
+from shipdrag_ros.posterior.compare import ComparedHypotheses, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.posterior.hypotheses import bsplines
+from shipdrag_ros.posterior.hypotheses import IN_LOG, Explanation, bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -49,16 +48,14 @@ _ANY_SHIP = Ship(
 
 
 @dataclass(frozen=True)
-class SailingFit:
+class SailingFit(WeighedFit):
     """
     A hypothesis about legs at its best.
 
     Attributes
     ----------
-    ways
-        Of the effects that are there.
-    smooth
-        Whether the log errs besides in a way that bends with the speed, without a name.
+    hypothesis
+        Something smooth is an error of the log that bends with the speed.
     z, sd : (p,)
         Unknowns, standard normal under the prior, those of the effects first.
     residual_m_s, white : (n,)
@@ -69,8 +66,7 @@ class SailingFit:
         By Laplace's method, without the prior odds.
     """
 
-    ways: tuple[EffectWay, ...]
-    smooth: bool
+    hypothesis: Explanation
     z: Float64
     sd: Float64
     residual_m_s: Float64
@@ -79,49 +75,9 @@ class SailingFit:
     log_evidence: float
 
     @property
-    def names(self) -> Names:
-        """As the decision takes them."""
-        return UNKNOWN if self.smooth else tuple(sorted(way.effect.name for way in self.ways))
-
-    @property
-    def log_odds(self) -> float:
-        """Prior log odds over nothing."""
-        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
-        return sum(way.log_odds for way in self.ways) + unnamed
-
-    @property
     def chi2(self) -> float:
         """Of a leg."""
         return float(np.mean(self.white**2))
-
-
-@dataclass(frozen=True)
-class SailingPosterior:
-    """
-    Hypotheses about legs with their probabilities.
-
-    Attributes
-    ----------
-    probability
-        Of each set of names, most probable first.
-    best
-        The likeliest fit of each.
-    """
-
-    probability: dict[Names, float]
-    best: dict[Names, SailingFit]
-
-    @classmethod
-    def of(cls, fits: Iterable[SailingFit]) -> SailingPosterior:
-        """Give fits their probabilities."""
-        fits = list(fits)
-        best: dict[Names, SailingFit] = {}
-        for fit in fits:
-            old = best.get(fit.names)
-            if old is None or fit.log_evidence + fit.log_odds > old.log_evidence + old.log_odds:
-                best[fit.names] = fit
-        weighed = (WeighedHypothesis(f.names, f.log_evidence, f.log_odds) for f in fits)
-        return cls(probabilities(weighed), best)
 
 
 @dataclass(frozen=True)
@@ -205,14 +161,14 @@ class SailingModel:
     @cached_property
     def all_together(self) -> SailingFit:
         """The fit of all effects that sailing separates at once."""
-        return self.fit(self._plain(self.together))
+        return self.fit(Explanation(self._plain(self.together)))
 
     @staticmethod
     def _plain(effects: Sequence[Effect]) -> tuple[EffectWay, ...]:
         """Return effects whose sizes are any near 0, of either sign."""
         return tuple(next(ways_of(effect, _ANY_SHIP, _LONGEST_S, 1)) for effect in effects)
 
-    def compare(self) -> SailingPosterior:
+    def compare(self) -> ComparedHypotheses[SailingFit]:
         """
         Compare nothing, each effect, pairs of them, and what errs smoothly besides.
         """
@@ -220,15 +176,15 @@ class SailingModel:
         pairs = [
             both for both in combinations(ways, 2) if both[0].effect.goes_with(both[1].effect)
         ]
-        fits = [self.fit(each) for each in ((), *((way,) for way in ways), *pairs)]
-        fits.append(self.fit((), smooth=True))
-        found = SailingPosterior.of(fits)
+        every = [Explanation(each) for each in ((), *((way,) for way in ways), *pairs)]
+        fits = [self.fit(each) for each in (*every, Explanation(smooth=IN_LOG))]
+        found = ComparedHypotheses(self.effects, tuple(fits))
         beside = [
-            self.fit(found.best[names].ways, smooth=True)
+            self.fit(replace(found.best[names].hypothesis, smooth=IN_LOG))
             for names, p in found.probability.items()
             if names not in (NONE, UNKNOWN) and p > _LIKELY
         ]
-        return SailingPosterior.of([*fits, *beside])
+        return ComparedHypotheses(self.effects, (*fits, *beside))
 
     def action(self, ways: Sequence[EffectWay], z: Float64) -> Action:
         """
@@ -241,18 +197,13 @@ class SailingModel:
             found += way.action(self._frame, own)
         return found
 
-    def fit(self, ways: tuple[EffectWay, ...], *, smooth: bool = False) -> SailingFit:
+    def fit(self, hypothesis: Explanation) -> SailingFit:
         """
         Return the fit of a hypothesis.
 
-        Parameters
-        ----------
-        ways
-            Of its effects.
-        smooth
-            Whether the log errs besides, bending with the speed. Where nothing else is there,
-            a scale and an offset are part of it.
+        Where something smooth is there and nothing else, a scale and an offset are part of it.
         """
+        ways, smooth = hypothesis.ways, bool(hypothesis.smooth)
         # what stands alone as an error of the log may also be straight
         straight = [e for e in self.effects if _LOG in e.errs_in] if smooth and not ways else []
         acting = (*ways, *self._plain(straight))
@@ -279,8 +230,7 @@ class SailingModel:
         hessian = slopes.T @ slopes + np.eye(len(best))
         log_det = float(np.linalg.slogdet(hessian)[1])
         return SailingFit(
-            ways,
-            smooth,
+            hypothesis,
             best,
             np.sqrt(np.diag(np.linalg.inv(hessian))),
             self.factor @ both[:n],

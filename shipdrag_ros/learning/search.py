@@ -178,7 +178,7 @@ class _LearningCase:
     forms: dict[str, LearnableForm]
     ways: dict[str, list[EffectWay]]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
 
     @classmethod
     def of(

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
+from shipdrag_ros.inference.linear import Families
 from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.parameter import Parameter, Shape
@@ -190,16 +191,6 @@ class _Asked:
         return run.simulate(actions, np.array([speed for _, speed in self.numbers]))
 
 
-class PriorFamilies(NamedTuple):
-    """
-    Families of one hypothesis, (f, p) and (f,).
-    """
-
-    mean: Float64
-    precision: Float64
-    log_chance: Float64
-
-
 class RunTable(NamedTuple):
     """
     Rows of one run, linear about some unknowns.
@@ -307,7 +298,7 @@ class ShipRuns:
             found += _SMOOTH * len(self.runs)
         return found
 
-    def priors(self, hypothesis: Explanation, now: Float64) -> PriorFamilies:
+    def priors(self, hypothesis: Explanation, now: Float64) -> Families:
         """
         Return the families of a hypothesis; means count from some unknowns (p,).
         """
@@ -343,7 +334,7 @@ class ShipRuns:
                     means.append(mean)
                     precisions.append(precision)
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
-        return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
+        return Families(np.array(means) - now, np.array(precisions), np.log(chances))
 
     @cached_property
     def _stated(self) -> Int64:
