@@ -118,7 +118,7 @@ def diagnose(
     """
     stated = ship.baseline is not None
     baseline = 'stated' if stated else 'fitted_here'
-    seen, notes = _observed(runs, ship, parameters, {}, progress)
+    seen, notes = observed(runs, ship, parameters, {}, progress)
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
@@ -214,18 +214,16 @@ def _compared(
     for look in range(_LOOKS):
         if look:
             # effects are simulated from the stop as the run was seen
-            seen, notes = _observed(runs, ship, parameters, moved_s, progress)
-        stated = _stated(runs, seen, ship, facts)
+            seen, notes = observed(runs, ship, parameters, moved_s, progress)
+        stated = stated_in(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
         progress('comparing hypotheses', 0, 0)
         comparing = compare(seen, ship, stated, before)
         found = comparing.compare()
-        likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
-        more_s = comparing.runs.stop_s(likeliest.at)
-        if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        more_s = moved_stops(seen, comparing, found)
+        if not more_s:
             break
-        for run, by_s in zip(seen, more_s, strict=True):
-            moved_s[run.name] = moved_s.get(run.name, 0.0) + by_s
+        moved_s |= {name: moved_s.get(name, 0.0) + by_s for name, by_s in more_s.items()}
     return _Case(seen, comparing, found, stated, before, notes)
 
 
@@ -263,19 +261,32 @@ def compare(
     )
 
 
-def _stated(
-    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
+def stated_in(
+    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact] = ()
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
-    return stated_facts(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
+    return stated_facts(ship, [(own[run.name], run.stopped_ns) for run in seen], facts)
 
 
 def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
     """Return names and stops of the runs that are diagnosed."""
-    stops = [run.context.stop for run in seen]
-    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    return tuple(SeenRun(run.name, ns) for run, ns in zip(seen, at_ns))
+    return tuple(SeenRun(run.name, run.stopped_ns) for run in seen)
+
+
+def moved_stops(
+    seen: Sequence[Observation], comparing: Comparing, found: ComparedHypotheses[Fitted]
+) -> dict[str, float]:
+    """
+    Return by how much the likeliest hypothesis has the stop of each run later than it was seen.
+
+    Empty where that hardly matters.
+    """
+    likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
+    more_s = comparing.runs.stop_s(likeliest.at)
+    if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        return {}
+    return {run.name: by_s for run, by_s in zip(seen, more_s, strict=True)}
 
 
 def _has_both(run: Observation) -> bool:
@@ -284,7 +295,7 @@ def _has_both(run: Observation) -> bool:
     return bool(by_log.any() and not by_log.all())
 
 
-def _observed(
+def observed(
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,

@@ -44,6 +44,7 @@ from shipdrag_ros.posterior.hypotheses import (
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.effect import Effect, Scope
 
 _ITERATIONS = 8  # of Gauss and Newton
@@ -57,7 +58,7 @@ _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
 _LIKELY = 0.03  # probability of names that may leave something smooth
 _TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
-_RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
+_FEWEST = 5  # rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
@@ -400,7 +401,7 @@ class Comparing:
         shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
         rows, model = run.model.rows, run.model
         by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
-        late = by_log & (rows.time_s > _RUN_DOWNS * max(model.forces.tau_s, 1.0))
+        late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))
         time, lines = rows.time_s[late], shown[:, late]
         if len(time) < _FEWEST or not np.isfinite(lines).all():
             return math.nan
