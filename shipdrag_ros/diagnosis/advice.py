@@ -16,7 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.context import TURNS, Context
+from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.observation import Observation
@@ -29,7 +29,7 @@ from shipdrag_ros.diagnosis.outcomes import (
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.sights import sight
-from shipdrag_ros.estimation.run_down import RunDown
+from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
     CERTAIN,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from shipdrag_ros.estimation.run_down import TURNS
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.posterior import priors
@@ -29,7 +30,6 @@ _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
 _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
 _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
-TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
 _SHORTEST_S = 0.1  # fall of a shaft
 # of the logarithm: thrust is gone before or after its shaft stands, by the propeller and engine

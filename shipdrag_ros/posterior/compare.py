@@ -24,11 +24,12 @@ from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
 from shipdrag_ros.inference.linear import Families, solve, whitened_products
-from shipdrag_ros.inference.noise import GaussMarkovNoise, whiten
+from shipdrag_ros.inference.noise import whiten
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
 from shipdrag_ros.posterior.hypotheses import (
     IN_GROUND,
@@ -41,6 +42,7 @@ from shipdrag_ros.posterior.hypotheses import (
     ShipRuns,
     half,
 )
+from shipdrag_ros.posterior.problem import EXACT
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
@@ -56,11 +58,9 @@ _AT_ONCE = 100  # ways scored together: each is compared with each
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
-_LIKELY = 0.03  # probability of names that may leave something smooth
-_TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
+LIKELY = 0.03  # probability of names that may leave something smooth
 _FEWEST = 5  # rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
-_EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
@@ -115,9 +115,9 @@ class Fitted(WeighedFit):
 
 
 class _RunNoise(NamedTuple):
-    """Noise of a run: settings, weights of their prior (logarithm), and the usual setting."""
+    """Noise of a run, weights of the prior of its settings (logarithm), and the usual one."""
 
-    settings: Settings
+    learnt: NoisePosterior
     log_prior: Float64
     typical: Settings
 
@@ -327,7 +327,7 @@ class Comparing:
 
     def water_m_s(self, j: int) -> float:
         """Return the usual size of the slow motion of the water in a run."""
-        return GaussMarkovNoise(*self.noise[j].typical.slow[0].tolist()).water_m_s
+        return self.noise[j].learnt.slow.water_m_s
 
     @property
     def as_stated(self) -> Fitted:
@@ -594,7 +594,9 @@ class Comparing:
                 prior = self.runs.priors(replace(self.base, smooth=where), nothing.at)
                 for mean, precision in zip(prior.mean, prior.precision):
                     means.append(np.concatenate([mean[table.place], np.zeros(q)]))
-                    precisions.append(np.concatenate([precision[table.place], np.full(q, _EXACT)]))
+                    precisions.append(
+                        np.concatenate([precision[table.place], np.full(q, EXACT**-2.0)])
+                    )
             for i, which in enumerate(taught):
                 amount, held = _amount(ways[which])
                 mean, precision = means[0].copy(), precisions[0].copy()
@@ -604,7 +606,7 @@ class Comparing:
             for i in range(len(smooth)):
                 mean, precision = means[0].copy(), precisions[0].copy()
                 first = p + len(taught) + i * len(smooth[0])
-                precision[first : first + len(smooth[0])] = _TYPICAL_SMOOTH**-2.0
+                precision[first : first + len(smooth[0])] = priors.SMOOTH_SIZES[1] ** -2.0
                 means.append(mean)
                 precisions.append(precision)
             seen = Seen(
@@ -689,7 +691,7 @@ class Comparing:
         log_evidence, weights, moments = 0.0, [], []
         for j, table in enumerate(fit.tables):
             noise = self.noise[j]
-            products, log_det = self._of_run(j, table, noise.settings)
+            products, log_det = self._of_run(j, table, noise.learnt.settings)
             whole = np.repeat(usual[None], len(products), axis=0)
             for k in range(len(products)):
                 _put(whole[k], products[k] - typical[j][0], table.place)
@@ -793,7 +795,7 @@ class Comparing:
         found = ComparedHypotheses(self.effects, tuple(fits))
         tried = []
         for names, probability in found.probability.items():
-            if names in (NONE, UNKNOWN) or probability < _LIKELY:
+            if names in (NONE, UNKNOWN) or probability < LIKELY:
                 continue
             base = found.best[names]
             for where in self.smooth:
@@ -821,7 +823,7 @@ def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
     log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt.settings, log_prior, learnt.typical)
+    return _RunNoise(learnt, log_prior, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:
