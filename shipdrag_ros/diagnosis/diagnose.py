@@ -16,7 +16,6 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
-    Advice,
     DiagnosisResult,
     EffectEstimate,
     SeenRun,
@@ -135,10 +134,7 @@ def diagnose(
     never = inseparable(found.effects)
     judged = judge(found, never)
     verdict = judged.decision.verdict
-    would_decide: tuple[Advice, ...] = ()
-    if advise and verdict is Verdict.ONE_OF:
-        left = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
-        would_decide = advice(left, progress)
+    undecided = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
@@ -148,7 +144,7 @@ def diagnose(
         candidates=judged.candidates,
         nothing=found.probability.get(NONE, 0.0),
         unnamed=found.probability.get(UNKNOWN, 0.0),
-        would_decide=would_decide,
+        would_decide=advice(undecided, progress) if advise and verdict is Verdict.ONE_OF else (),
         where=None
         if verdict is Verdict.NONE
         else where(seen, comparing, found, before, of_force=bool(differ)),

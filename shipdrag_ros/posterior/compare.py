@@ -643,24 +643,25 @@ class Comparing:
             kept[way.mode] = kept.get(way.mode, 0) + 1
             if kept[way.mode] > _STARTS:
                 continue
-            hypothesis = Explanation((*self.stated, way))
-            at = self._widened(nothing, hypothesis)
+            fit = self._begun(nothing, Explanation((*self.stated, way)), float(amounts[i]))
             # at the best of nothing, nuisances stand for the effect as far as they can
-            at[: self.runs.size] = self.runs.as_stated(nothing.at)
-            first = self.runs.size + len(self.base.unknowns)
-            at[first : first + len(way.start)] = way.start
-            at[first] = way.resized(float(amounts[i]))
-            found.append(Fitted(hypothesis, at))
+            fit.at[: self.runs.size] = self.runs.as_stated(nothing.at)
+            found.append(fit)
         return found
+
+    def _begun(self, base: Fitted, hypothesis: Explanation, amount: float) -> Fitted:
+        """Return where the fit of one more way begins, at so much of its trace."""
+        way, at = hypothesis.ways[-1], self._widened(base, hypothesis)
+        first = self.runs.size + len(base.hypothesis.unknowns)
+        at[first : first + len(way.start)] = way.start
+        at[first] = way.resized(amount)
+        return Fitted(hypothesis, at)
 
     def _widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
         """Return where a fit of a larger hypothesis begins."""
         at = np.zeros(self.runs.width(hypothesis))
-        size = self.runs.size
-        at[:size] = base.at[:size]
-        q = len(base.hypothesis.unknowns)
-        own = base.at[size : size + q]
-        at[size : size + q] = own
+        kept = self.runs.size + len(base.hypothesis.unknowns)
+        at[:kept] = base.at[:kept]
         return at
 
     def _weigh(self, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -756,12 +757,7 @@ class Comparing:
             for gain, amount, hypothesis in zip(gains + base.log_weight, amounts, hypotheses):
                 if gain < top - _PAIR_NATS:
                     continue
-                way = hypothesis.ways[-1]
-                at = self._widened(base, hypothesis)
-                to = self.runs.size + len(base.hypothesis.unknowns)
-                at[to : to + len(way.start)] = way.start
-                at[to] = way.resized(float(amount))
-                tried.append((float(gain), Fitted(hypothesis, at)))
+                tried.append((float(gain), self._begun(base, hypothesis, float(amount))))
         kept: dict[Names, Fitted] = {}
         for _, fit in sorted(tried, key=lambda each: -each[0]):
             kept.setdefault(fit.hypothesis.names, fit)
