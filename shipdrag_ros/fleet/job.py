@@ -155,8 +155,8 @@ def _digest(files: Sequence[Path]) -> str:
 
 
 def _recording(files: Sequence[Path]) -> str:
-    from shipdrag_ros.bags.declarations import METADATA
     from shipdrag_ros.bags.mcap_file import McapFile
+    from shipdrag_ros.bags.writer import METADATA
 
     try:
         about = McapFile(files[0]).contents.metadata.get(METADATA, {})

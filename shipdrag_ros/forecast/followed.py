@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
@@ -214,6 +213,8 @@ def _since(window: Window, stamps: object) -> Float64:
 
 def _monotone(values: Float64, weights: Float64 | None = None) -> Float64:
     """Return the ascending values that are nearest in squares (Robertson and others 1988)."""
+    from scipy.optimize import isotonic_regression  # a quarter of a second, for what has followed
+
     return np.asarray(isotonic_regression(values, weights=weights).x)
 
 

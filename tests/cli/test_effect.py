@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.bags.reader import open_runs
+from shipdrag_ros.bags.run import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.store import read_coastdowns
 from shipdrag_ros.ship import LearntTerm, Ship

@@ -6,9 +6,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
@@ -34,6 +34,9 @@ from shipdrag_ros.studies.surface.face.verb import (
     residual_picture,
 )
 from shipdrag_ros.studies.surface.fit import Prediction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _FIT = 'The fit'
 
