@@ -16,7 +16,6 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
-    Advice,
     DiagnosisResult,
     EffectEstimate,
     SeenRun,
@@ -118,7 +117,7 @@ def diagnose(
     """
     stated = ship.baseline is not None
     baseline = 'stated' if stated else 'fitted_here'
-    seen, notes = _observed(runs, ship, parameters, {}, progress)
+    seen, notes = observed(runs, ship, parameters, {}, progress)
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
@@ -135,10 +134,7 @@ def diagnose(
     never = inseparable(found.effects)
     judged = judge(found, never)
     verdict = judged.decision.verdict
-    would_decide: tuple[Advice, ...] = ()
-    if advise and verdict is Verdict.ONE_OF:
-        left = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
-        would_decide = advice(left, progress)
+    undecided = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
@@ -148,7 +144,7 @@ def diagnose(
         candidates=judged.candidates,
         nothing=found.probability.get(NONE, 0.0),
         unnamed=found.probability.get(UNKNOWN, 0.0),
-        would_decide=would_decide,
+        would_decide=advice(undecided, progress) if advise and verdict is Verdict.ONE_OF else (),
         where=None
         if verdict is Verdict.NONE
         else where(seen, comparing, found, before, of_force=bool(differ)),
@@ -214,18 +210,16 @@ def _compared(
     for look in range(_LOOKS):
         if look:
             # effects are simulated from the stop as the run was seen
-            seen, notes = _observed(runs, ship, parameters, moved_s, progress)
-        stated = _stated(runs, seen, ship, facts)
+            seen, notes = observed(runs, ship, parameters, moved_s, progress)
+        stated = stated_in(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
         progress('comparing hypotheses', 0, 0)
         comparing = compare(seen, ship, stated, before)
         found = comparing.compare()
-        likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
-        more_s = comparing.runs.stop_s(likeliest.at)
-        if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        more_s = moved_stops(seen, comparing, found)
+        if not more_s:
             break
-        for run, by_s in zip(seen, more_s, strict=True):
-            moved_s[run.name] = moved_s.get(run.name, 0.0) + by_s
+        moved_s |= {name: moved_s.get(name, 0.0) + by_s for name, by_s in more_s.items()}
     return _Case(seen, comparing, found, stated, before, notes)
 
 
@@ -263,19 +257,32 @@ def compare(
     )
 
 
-def _stated(
-    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
+def stated_in(
+    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact] = ()
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
-    return stated_facts(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
+    return stated_facts(ship, [(own[run.name], run.stopped_ns) for run in seen], facts)
 
 
 def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
     """Return names and stops of the runs that are diagnosed."""
-    stops = [run.context.stop for run in seen]
-    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    return tuple(SeenRun(run.name, ns) for run, ns in zip(seen, at_ns))
+    return tuple(SeenRun(run.name, run.stopped_ns) for run in seen)
+
+
+def moved_stops(
+    seen: Sequence[Observation], comparing: Comparing, found: ComparedHypotheses[Fitted]
+) -> dict[str, float]:
+    """
+    Return by how much the likeliest hypothesis has the stop of each run later than it was seen.
+
+    Empty where that hardly matters.
+    """
+    likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
+    more_s = comparing.runs.stop_s(likeliest.at)
+    if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        return {}
+    return {run.name: by_s for run, by_s in zip(seen, more_s, strict=True)}
 
 
 def _has_both(run: Observation) -> bool:
@@ -284,7 +291,7 @@ def _has_both(run: Observation) -> bool:
     return bool(by_log.any() and not by_log.all())
 
 
-def _observed(
+def observed(
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,

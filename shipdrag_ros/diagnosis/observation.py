@@ -92,6 +92,11 @@ class Observation:
     stop_moved_s: float = 0.0
 
     @property
+    def stopped_ns(self) -> int:
+        """Time of the stop [ns since the epoch]."""
+        return self.context.stop.since_ns + round(self.context.stop.lead_in_s * 1e9)
+
+    @property
     def duration_s(self) -> float:
         """Length of the coastdown."""
         return float(self.time_s[-1]) - self.lead_in_s

@@ -20,9 +20,10 @@ from scipy.optimize import least_squares, minimize
 
 from shipdrag_ros.diagnosis.legs import Direction, Legs
 from shipdrag_ros.inference.decision import NONE, UNKNOWN
-from shipdrag_ros.posterior.compare import ComparedHypotheses, WeighedFit
+from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.compare import LIKELY, ComparedHypotheses, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.posterior.hypotheses import IN_LOG, Explanation, bsplines
+from shipdrag_ros.posterior.hypotheses import IN_LOG, SMOOTH, Explanation, bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -30,7 +31,6 @@ from shipdrag_ros.simulation.effect import Effect, Measure, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
-_SPLINES, _SPLINE_SD = 6, 0.05  # of an error of the log without a name, of the highest speed
 _SCALE_TOLERANCE = 0.005  # that a log in order has
 _CURRENT_TOLERANCE_M_S = 0.02  # steady current that is not worth a word
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
@@ -40,7 +40,6 @@ _SD_OF_LOG = np.array([1.0, 1.0, 0.7, 0.8, 0.8])
 _EVALUATIONS = 400
 _LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
-_LIKELY = 0.03  # probability of names that may leave something smooth
 # what log and track show acts alike on all ships, so that any will do
 _ANY_SHIP = Ship(
     length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
@@ -182,7 +181,7 @@ class SailingModel:
         beside = [
             self.fit(replace(found.best[names].hypothesis, smooth=IN_LOG))
             for names, p in found.probability.items()
-            if names not in (NONE, UNKNOWN) and p > _LIKELY
+            if names not in (NONE, UNKNOWN) and p > LIKELY
         ]
         return ComparedHypotheses(self.effects, (*fits, *beside))
 
@@ -208,7 +207,7 @@ class SailingModel:
         straight = [e for e in self.effects if _LOG in e.errs_in] if smooth and not ways else []
         acting = (*ways, *self._plain(straight))
         own = sum(len(way.unknowns) for way in acting)
-        start = np.zeros(own + (_SPLINES if smooth else 0))
+        start = np.zeros(own + (SMOOTH if smooth else 0))
         start[:own] = [each for way in acting for each in way.start]
         n = len(self.legs)
 
@@ -256,10 +255,10 @@ class SailingModel:
     def _splines(self) -> Float64:
         """What neither a scale nor an offset is, (6, n) [m/s]."""
         speed = self.legs.ground_m_s
-        splines = bsplines(speed / speed.max(), _SPLINES).T
+        splines = bsplines(speed / speed.max(), SMOOTH).T
         line = np.array([np.ones(len(speed)), speed]).T
         bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]
-        found: Float64 = _SPLINE_SD * float(speed.max()) * bent.T
+        found: Float64 = priors.SMOOTH_SIZES[1] * float(speed.max()) * bent.T
         return found
 
 

@@ -24,11 +24,12 @@ from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
 from shipdrag_ros.inference.linear import Families, solve, whitened_products
-from shipdrag_ros.inference.noise import GaussMarkovNoise, whiten
+from shipdrag_ros.inference.noise import whiten
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
 from shipdrag_ros.posterior.hypotheses import (
     IN_GROUND,
@@ -41,9 +42,11 @@ from shipdrag_ros.posterior.hypotheses import (
     ShipRuns,
     half,
 )
+from shipdrag_ros.posterior.problem import EXACT
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.effect import Effect, Scope
 
 _ITERATIONS = 8  # of Gauss and Newton
@@ -55,11 +58,9 @@ _AT_ONCE = 100  # ways scored together: each is compared with each
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
-_LIKELY = 0.03  # probability of names that may leave something smooth
-_TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
-_RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
+LIKELY = 0.03  # probability of names that may leave something smooth
+_FEWEST = 5  # rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
-_EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
@@ -114,9 +115,9 @@ class Fitted(WeighedFit):
 
 
 class _RunNoise(NamedTuple):
-    """Noise of a run: settings, weights of their prior (logarithm), and the usual setting."""
+    """Noise of a run, weights of the prior of its settings (logarithm), and the usual one."""
 
-    settings: Settings
+    learnt: NoisePosterior
     log_prior: Float64
     typical: Settings
 
@@ -326,7 +327,7 @@ class Comparing:
 
     def water_m_s(self, j: int) -> float:
         """Return the usual size of the slow motion of the water in a run."""
-        return GaussMarkovNoise(*self.noise[j].typical.slow[0].tolist()).water_m_s
+        return self.noise[j].learnt.slow.water_m_s
 
     @property
     def as_stated(self) -> Fitted:
@@ -400,7 +401,7 @@ class Comparing:
         shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
         rows, model = run.model.rows, run.model
         by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
-        late = by_log & (rows.time_s > _RUN_DOWNS * max(model.forces.tau_s, 1.0))
+        late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))
         time, lines = rows.time_s[late], shown[:, late]
         if len(time) < _FEWEST or not np.isfinite(lines).all():
             return math.nan
@@ -593,7 +594,9 @@ class Comparing:
                 prior = self.runs.priors(replace(self.base, smooth=where), nothing.at)
                 for mean, precision in zip(prior.mean, prior.precision):
                     means.append(np.concatenate([mean[table.place], np.zeros(q)]))
-                    precisions.append(np.concatenate([precision[table.place], np.full(q, _EXACT)]))
+                    precisions.append(
+                        np.concatenate([precision[table.place], np.full(q, EXACT**-2.0)])
+                    )
             for i, which in enumerate(taught):
                 amount, held = _amount(ways[which])
                 mean, precision = means[0].copy(), precisions[0].copy()
@@ -603,7 +606,7 @@ class Comparing:
             for i in range(len(smooth)):
                 mean, precision = means[0].copy(), precisions[0].copy()
                 first = p + len(taught) + i * len(smooth[0])
-                precision[first : first + len(smooth[0])] = _TYPICAL_SMOOTH**-2.0
+                precision[first : first + len(smooth[0])] = priors.SMOOTH_SIZES[1] ** -2.0
                 means.append(mean)
                 precisions.append(precision)
             seen = Seen(
@@ -640,24 +643,25 @@ class Comparing:
             kept[way.mode] = kept.get(way.mode, 0) + 1
             if kept[way.mode] > _STARTS:
                 continue
-            hypothesis = Explanation((*self.stated, way))
-            at = self._widened(nothing, hypothesis)
+            fit = self._begun(nothing, Explanation((*self.stated, way)), float(amounts[i]))
             # at the best of nothing, nuisances stand for the effect as far as they can
-            at[: self.runs.size] = self.runs.as_stated(nothing.at)
-            first = self.runs.size + len(self.base.unknowns)
-            at[first : first + len(way.start)] = way.start
-            at[first] = way.resized(float(amounts[i]))
-            found.append(Fitted(hypothesis, at))
+            fit.at[: self.runs.size] = self.runs.as_stated(nothing.at)
+            found.append(fit)
         return found
+
+    def _begun(self, base: Fitted, hypothesis: Explanation, amount: float) -> Fitted:
+        """Return where the fit of one more way begins, at so much of its trace."""
+        way, at = hypothesis.ways[-1], self._widened(base, hypothesis)
+        first = self.runs.size + len(base.hypothesis.unknowns)
+        at[first : first + len(way.start)] = way.start
+        at[first] = way.resized(amount)
+        return Fitted(hypothesis, at)
 
     def _widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
         """Return where a fit of a larger hypothesis begins."""
         at = np.zeros(self.runs.width(hypothesis))
-        size = self.runs.size
-        at[:size] = base.at[:size]
-        q = len(base.hypothesis.unknowns)
-        own = base.at[size : size + q]
-        at[size : size + q] = own
+        kept = self.runs.size + len(base.hypothesis.unknowns)
+        at[:kept] = base.at[:kept]
         return at
 
     def _weigh(self, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -688,7 +692,7 @@ class Comparing:
         log_evidence, weights, moments = 0.0, [], []
         for j, table in enumerate(fit.tables):
             noise = self.noise[j]
-            products, log_det = self._of_run(j, table, noise.settings)
+            products, log_det = self._of_run(j, table, noise.learnt.settings)
             whole = np.repeat(usual[None], len(products), axis=0)
             for k in range(len(products)):
                 _put(whole[k], products[k] - typical[j][0], table.place)
@@ -753,12 +757,7 @@ class Comparing:
             for gain, amount, hypothesis in zip(gains + base.log_weight, amounts, hypotheses):
                 if gain < top - _PAIR_NATS:
                     continue
-                way = hypothesis.ways[-1]
-                at = self._widened(base, hypothesis)
-                to = self.runs.size + len(base.hypothesis.unknowns)
-                at[to : to + len(way.start)] = way.start
-                at[to] = way.resized(float(amount))
-                tried.append((float(gain), Fitted(hypothesis, at)))
+                tried.append((float(gain), self._begun(base, hypothesis, float(amount))))
         kept: dict[Names, Fitted] = {}
         for _, fit in sorted(tried, key=lambda each: -each[0]):
             kept.setdefault(fit.hypothesis.names, fit)
@@ -792,7 +791,7 @@ class Comparing:
         found = ComparedHypotheses(self.effects, tuple(fits))
         tried = []
         for names, probability in found.probability.items():
-            if names in (NONE, UNKNOWN) or probability < _LIKELY:
+            if names in (NONE, UNKNOWN) or probability < LIKELY:
                 continue
             base = found.best[names]
             for where in self.smooth:
@@ -820,7 +819,7 @@ def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
     log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt.settings, log_prior, learnt.typical)
+    return _RunNoise(learnt, log_prior, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:
