@@ -451,7 +451,8 @@ def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:
 def _digest(run: CoastRun) -> str:
     """Return what a run is known by: its readings."""
     found = hashlib.sha256()
-    for series in (run.window.speed_through_water, run.window.position):
+    window = run.window
+    for series in (window.speed_through_water, window.position, window.speed_over_ground):
         found.update(np.ascontiguousarray(series.time_ns).tobytes())
         found.update(np.ascontiguousarray(series.value).tobytes())
     return found.hexdigest()[:16]
