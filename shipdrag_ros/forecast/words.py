@@ -33,8 +33,13 @@ def clock(seconds: float) -> str:
 def way(metres: float, mass_kg: float) -> str:
     """
     Return a distance in nautical miles, of a light craft or a short way in metres.
+
+    Examples
+    --------
+    >>> way(-1852.0, 2e7), way(-81.7, 2e7)
+    ('-1.00 nm', '-81.7 m')
     """
-    if mass_kg < LIGHT_KG or metres < 0.1 * _MILE_M:
+    if mass_kg < LIGHT_KG or abs(metres) < 0.1 * _MILE_M:
         return f'{metres:.3g} m'
     return f'{metres / _MILE_M:.2f} nm'
 
