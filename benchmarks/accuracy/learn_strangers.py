@@ -153,7 +153,7 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
     """
     Yield shares with their intervals of 95 %, and each case.
     """
-    yield 'What `python -m benchmarks.accuracy.learn_strangers` learnt; seeds: the ships of each stranger'
+    yield 'What `python -m benchmarks.accuracy.learn_strangers` learnt; seeds: the ships'
     for runs in sorted({row['runs'] for row in rows}):
         mine = [row for row in rows if row['runs'] == runs]
         plain = [row for row in mine if row['stranger'] in PLAIN]

@@ -25,6 +25,7 @@ from shipdrag_ros.simulation.learnt import effect_of
 
 SMOOTH_OVER_FORM = 30.0
 """Prior odds of something smooth without a formula, over each form."""
+_HAPPENS_D = 100.0  # a hull is fouled, cleaned, docked or hit once in so many days
 _SIZE = either_sign(0.008, 1.0)  # of A: 3 to 40 % of the resistance of most hulls
 _GAIN = either_sign(0.04, 0.8)  # of A in a log: share of the speed
 _TURNS_AT = (0.55, 0.45)  # share of the highest speed: median, sd of the logarithm
@@ -77,11 +78,14 @@ class LearnableForm:
         With sizes of what is expected, until it is fitted.
     priors
         Of its parameters.
+    odds
+        Before any data, over those of a form that may act on any day.
     """
 
     kind: tuple[str, str, str]
     term: LearntTerm
     priors: tuple[Prior, ...]
+    odds: float = 1.0
 
     def effect(self) -> Effect:
         """
@@ -92,7 +96,7 @@ class LearnableForm:
             replace(q, prior=prior, low=-math.inf, high=math.inf)
             for q, prior in zip(plain.parameters, self.priors, strict=True)
         )
-        odds = priors.UNNAMED_ODDS / SMOOTH_OVER_FORM
+        odds = self.odds * priors.UNNAMED_ODDS / SMOOTH_OVER_FORM
         return replace(plain, parameters=parameters, odds=odds)
 
     def ways(self, ship: Ship, longest_s: float, runs: int) -> list[EffectWay]:
@@ -141,8 +145,10 @@ def _form(
     valid = {'u': (round(span.low_m_s, 3), round(1.05 * span.top_m_s, 3))}
     if variable == 'time':
         valid['t'] = (0.0, round(1.05 * span.longest_s, 1))
+    odds = 1.0
     if variable == 'date' and span.days:
         valid['d'] = span.days
+        odds = min((span.days[1] - span.days[0]) / _HAPPENS_D, 1.0)
     if variable == 'depth' and span.depth_m:
         valid['h'] = span.depth_m
     scope = 'earth' if variable in _OF_EARTH else 'sensor' if channel == 'log' else 'hull'
@@ -151,7 +157,7 @@ def _form(
         term=TermForm(channel, scope, variable, shape, expression, valid),
         parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
     )
-    return LearnableForm((channel, variable, shape), term, tuple(parameters.values()))
+    return LearnableForm((channel, variable, shape), term, tuple(parameters.values()), odds)
 
 
 def _as_power(power: int) -> str:
