@@ -26,6 +26,13 @@ class ShipdragError(Exception):
     """
 
 
+def reason_of(error: BaseException) -> str:
+    """
+    Return why something failed, as the system or the library says it, for a sentence.
+    """
+    return str(getattr(error, 'strerror', None) or error) or type(error).__name__
+
+
 class ProblemsError(ShipdragError):
     """
     Several findings reported together.

@@ -4,13 +4,16 @@ The one way to check a mapping: keys, each with what it may hold.
 
 Ship files, parameters and the node's settings are read here. A section is a
 dataclass whose fields are declared with a reader; reading a mapping collects
-every problem in it, with its dotted path, before giving up.
+every problem in it, with its dotted path, before giving up. Their files are read so that no
+pipe, device or endless file can hang or fill the reader.
 """
 
 from __future__ import annotations
 
 import difflib
+import os
 import reprlib
+import stat
 from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
@@ -22,7 +25,40 @@ import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ProblemsError
-from shipdrag_ros.plain_file import read_small_text
+
+
+def read_small_text(path: str | PathLike[str], *, most_bytes: int) -> str:
+    """
+    Return the text of a regular file.
+
+    Parameters
+    ----------
+    path
+        The file; a link to one is followed.
+    most_bytes
+        Largest file that is read [bytes].
+
+    Raises
+    ------
+    OSError
+        If it is no regular file, too large, or cannot be read; `strerror` says why.
+    ValueError
+        If it is not UTF-8.
+    """
+    # a pipe without a writer would wait for ever without O_NONBLOCK
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, 'rb') as file:
+        about = os.fstat(descriptor)
+        if stat.S_ISDIR(about.st_mode):
+            raise IsADirectoryError(0, 'Is a directory')
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(0, 'no regular file')
+        # one more than allowed: files of /proc say 0 and go on
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(0, f'more than {most_bytes} bytes, too many')
+    return content.decode('utf-8-sig')
+
 
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]

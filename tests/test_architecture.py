@@ -20,7 +20,7 @@ PACKAGE = ROOT / 'shipdrag_ros'
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
     ('errors', 'samples', 'display', 'progress', 'compiled'),
-    ('imports', 'strict_yaml', 'plain_file'),
+    ('imports', 'strict_yaml'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -67,7 +67,6 @@ GROUND = {
     'progress',
     'compiled',
     'strict_yaml',
-    'plain_file',
     'imports',
 }  # known by the modules that need them
 ROS = {

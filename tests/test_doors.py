@@ -20,7 +20,7 @@ DOORS = (
     ('parameters', 'Parameters.from_mapping'),
     ('regression.orthogonal', 'OrthogonalBasis.on'),
     ('regression.least_squares', 'least_squares'),
-    ('regression.surface', 'fit_surface'),
+    ('studies.surface.fit', 'fit_surface'),
     ('simulation.surge', 'simulate'),
     ('simulation.sensors', 'sense'),
     ('studies.cable.drag', 'Cable'),

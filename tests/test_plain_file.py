@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.plain_file import read_small_text
+from shipdrag_ros.fields import read_small_text
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.strict_yaml import LARGEST
 

@@ -24,12 +24,12 @@ from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
 from benchmarks._tables import publish, table, write_csv
-from shipdrag_ros.regression import OrderTable, Surface, fit_surface, least_squares
-from shipdrag_ros.regression.polynomial import monomials, terms_up_to
-from shipdrag_ros.regression.surface import SIGNIFICANCE
+from shipdrag_ros.regression import OrderTable, least_squares
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.surface.face.verb import contour_picture, degree_picture
+from shipdrag_ros.studies.surface.fit import SIGNIFICANCE, Surface, fit_surface
+from shipdrag_ros.studies.surface.polynomial import monomials, terms_up_to
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / 'docs' / 's5_surfaces.md'

@@ -24,7 +24,7 @@ from benchmarks.accuracy.trend_score import World, ship
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.change_points import search
 from shipdrag_ros.trend.hull_state import Growth, Mixture, Runs, Steps
-from shipdrag_ros.trend.money import CleaningDate, cleaning_date
+from shipdrag_ros.trend.ship_trend import CleaningDate, cleaning_date
 
 YEARS = 5.0
 ASKED_EVERY = 1.0 / 6.0

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """MCAP files in and out; nothing that estimates."""
 
-from shipdrag_ros.bags.reader import BagInfo, info, open_runs
 from shipdrag_ros.bags.run import (
+    BagInfo,
     Mark,
     ResetMark,
     Run,
@@ -10,6 +10,8 @@ from shipdrag_ros.bags.run import (
     SilenceMark,
     StopMark,
     TopicInfo,
+    info,
+    open_runs,
 )
 from shipdrag_ros.bags.writer import BagWriter, Compression
 

@@ -162,7 +162,9 @@ def _by_index(data: Buffer) -> Contents | None:
         raise _BadIndexError('the index has a wrong checksum')
     summary: dict[type, list[Any]] = {}
     try:
-        reader = StreamReader(BytesIO(data[footer.summary_start :]), skip_magic=True)
+        reader = StreamReader(
+            BytesIO(data[footer.summary_start :]), skip_magic=True, emit_chunks=True
+        )
         for record in reader.records:
             summary.setdefault(type(record), []).append(record)
     except READ_ERRORS as error:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain, count, islice
 from pathlib import Path
@@ -20,7 +19,7 @@ from uuid import uuid4
 
 from shipdrag_ros.bags.live import LiveFile, NameTakenError
 from shipdrag_ros.bags.recover import compact
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.errors import BagError, reason_of
 from shipdrag_ros.messages import EncodedMessage
 
 WRITE_S = 0.1  # to the system: survives the end of the process
@@ -76,6 +75,8 @@ class RecordingProgress:
         Why nothing is written now, '' if it is.
     uncompacted
         Finished parts that could not be made compact; they are whole.
+    why_uncompacted
+        Why the last of them could not; '' without any.
     vanished
         Files that somebody removed while they were written.
     """
@@ -90,6 +91,7 @@ class RecordingProgress:
     oldest_s: float
     error: str
     uncompacted: int
+    why_uncompacted: str
     vanished: int
 
 
@@ -149,6 +151,7 @@ class DurableRecording:
         self._retry_s = 0.0
         self._error = ''
         self._uncompacted: list[LiveFile] = []
+        self._why_uncompacted = ''
         self._vanished = 0
         self._compactor: threading.Thread | None = None
         self._ending = threading.Event()
@@ -221,6 +224,7 @@ class DurableRecording:
                 oldest_s=monotonic() - self._oldest_s if waiting else 0.0,
                 error=self._error,
                 uncompacted=len(self._uncompacted),
+                why_uncompacted=self._why_uncompacted if self._uncompacted else '',
                 vanished=self._vanished,
             )
 
@@ -228,14 +232,14 @@ class DurableRecording:
         while True:
             hurry = self._earlier is not None and not self._error
             ending = self._ending.wait(0.0 if hurry else WRITE_S)
-            self._take()
-            if ending or monotonic() >= self._retry_s:
-                try:
+            try:
+                self._take()
+                if ending or monotonic() >= self._retry_s:
                     self._write()
                     if ending or hurry or monotonic() - self._synced_s >= SYNC_S:
                         self._sync()
-                except Exception as error:  # a thread that ends unseen would lose all
-                    self._fail(error)
+            except Exception as error:  # a thread that ends unseen would lose all
+                self._fail(error)
             if ending and (self._error or self._earlier is None):
                 break
         self._finish()
@@ -359,7 +363,7 @@ class DurableRecording:
                 self._leave(file)
         self._due = self._unsynced + self._due
         self._unsynced = []
-        self._error = str(error)
+        self._error = reason_of(error)
         self._retry_s = monotonic() + RETRY_S
         self._tried.set()
 
@@ -368,7 +372,7 @@ class DurableRecording:
             try:
                 self._file.close()
                 self._leave(self._file)
-            except BagError as error:
+            except Exception as error:  # what is safe already is counted below
                 self._fail(error)
         with self._lock:
             if self._wanted:
@@ -382,11 +386,13 @@ class DurableRecording:
 
     def _compact(self) -> None:
         for file in tuple(self._uncompacted):
-            with suppress(BagError):  # it is tried again with the next part, and counted
+            try:
                 if not self._gone(file):
                     compact(file.path, messages=file.synced_messages)
                     file.release()
                 self._uncompacted.remove(file)
+            except Exception as error:  # it is tried again with the next part, and counted
+                self._why_uncompacted = reason_of(error)
 
     def _gone(self, file: LiveFile) -> bool:
         """Say whether somebody removed a file; what was in it is lost, and counted."""

@@ -28,10 +28,18 @@ from mcap.records import (
     Schema,
 )
 
-from shipdrag_ros.bags import declarations
-from shipdrag_ros.bags.declarations import LIBRARY, METADATA, PROFILE, as_bytes
 from shipdrag_ros.bags.records import MAGIC
-from shipdrag_ros.bags.writer import private_opener
+from shipdrag_ros.bags.writer import (
+    LIBRARY,
+    METADATA,
+    PROFILE,
+    as_bytes,
+    attachment,
+    channel,
+    metadata,
+    private_opener,
+    schema,
+)
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 
@@ -94,9 +102,9 @@ class LiveFile:
                 MAGIC
                 + as_bytes(
                     Header(PROFILE, LIBRARY),
-                    Metadata(METADATA, declarations.metadata(recording_id, part)),
+                    Metadata(METADATA, metadata(recording_id, part)),
                 )
-                + as_bytes(*starmap(declarations.attachment, attachments.items()))
+                + as_bytes(*starmap(attachment, attachments.items()))
             )
             self.sync()
             sync_directory(path.parent)
@@ -198,9 +206,9 @@ class LiveFile:
         if key not in self._channels:
             if message.type not in self._schemas:
                 number = len(self._schemas) + 1
-                self._schemas[message.type] = declarations.schema(number, message.type)
+                self._schemas[message.type] = schema(number, message.type)
                 new.append(self._schemas[message.type])
-            self._channels[key] = declarations.channel(
+            self._channels[key] = channel(
                 len(self._channels) + 1, *key, schema_id=self._schemas[message.type].id
             )
             new.append(self._channels[key])

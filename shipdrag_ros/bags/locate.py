@@ -15,10 +15,10 @@ from typing import Any
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags.mcap_file import CONVERT, IMPORT
+from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.errors import BagError
 
 _SUFFIXES = ('.mcap', '.mcap.zstd')
-_MAGIC = b'\x89MCAP0\r\n'
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def is_bag(path: Path) -> bool:
     if not path.is_file() or path.name.endswith(_SUFFIXES):
         return True
     with path.open('rb') as file:
-        return file.read(len(_MAGIC)) == _MAGIC
+        return file.read(len(MAGIC)) == MAGIC
 
 
 def locate(path: Path) -> list[BagFiles]:

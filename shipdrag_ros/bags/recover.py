@@ -24,7 +24,6 @@ from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.declarations import as_bytes
 from shipdrag_ros.bags.live import sync_directory
 from shipdrag_ros.bags.locate import BagFiles, locate
 from shipdrag_ros.bags.mcap_file import unpack_file
@@ -48,7 +47,7 @@ from shipdrag_ros.bags.records import (
     unpack_zstd,
     walk,
 )
-from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter
+from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 

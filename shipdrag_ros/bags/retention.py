@@ -12,13 +12,18 @@ from __future__ import annotations
 import os
 import re
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fcntl import LOCK_EX, LOCK_NB, flock
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from typing import IO
 
-from shipdrag_ros.bags.mcap_file import McapFile
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.bags.contents import contents_of
+from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC, Buffer
+from shipdrag_ros.display import printable
+from shipdrag_ros.errors import reason_of
 from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
 
 DAY_S = 86_400.0
@@ -103,6 +108,8 @@ class Retention:
     ----------
     over_bytes
         By how much the parts that may not be removed exceed the limit [bytes].
+    problem
+        What the last `tidy` could not judge or remove, why, and what to do; '' without any.
     """
 
     def __init__(self, directory: Path, keep: Keep) -> None:
@@ -110,6 +117,7 @@ class Retention:
         self._keep = keep
         self._holds: dict[_BagPart, bool] = {}
         self.over_bytes = 0
+        self.problem = ''
 
     def tidy(self, *, now_s: float) -> list[Removed]:
         """
@@ -119,7 +127,13 @@ class Retention:
         ----------
         now_s
             Present time [s since the epoch].
+
+        Raises
+        ------
+        OSError
+            If the directory cannot be read.
         """
+        self.problem = ''
         if self._keep.everything:
             return []
         parts = self._parts()
@@ -152,20 +166,22 @@ class Retention:
             return self._keep.size_bytes
         try:
             disk = os.statvfs(self._directory)
-        except OSError:  # there is no recording yet
+        except FileNotFoundError:  # there is no recording yet
             return 0
         return int(self._keep.share * disk.f_blocks * disk.f_frsize)
 
     def _parts(self) -> list[_BagPart]:
         """Return the parts in the order of their recording."""
         parts = []
-        with suppress(OSError):
-            for path in sorted(self._directory.iterdir()):
-                if _PART.fullmatch(path.name):
-                    about = path.lstat()
-                    if stat.S_ISREG(about.st_mode):
-                        size = max(about.st_size, _BLOCK_BYTES)
-                        parts.append(_BagPart(path, size, about.st_mtime))
+        paths: list[Path] = []
+        with suppress(FileNotFoundError):  # there is no recording yet
+            paths = sorted(self._directory.iterdir())
+        for path in paths:
+            with suppress(FileNotFoundError):  # somebody has just removed it
+                about = path.lstat()
+                if _PART.fullmatch(path.name) and stat.S_ISREG(about.st_mode):
+                    size = max(about.st_size, _BLOCK_BYTES)
+                    parts.append(_BagPart(path, size, about.st_mtime))
         return parts
 
     def _worth_keeping(self, parts: list[_BagPart]) -> set[_BagPart]:
@@ -174,7 +190,7 @@ class Retention:
         before: _BagPart | None = None
         for part in parts:
             if part not in self._holds:
-                self._holds[part] = _holds_coastdown(part.path)
+                self._holds[part] = self._judged(part.path)
             if self._holds[part]:
                 worth.add(part)
                 if before is not None and _recording(before.path) == _recording(part.path):
@@ -182,17 +198,34 @@ class Retention:
             before = part
         return worth
 
+    def _judged(self, path: Path) -> bool:
+        """Say whether a file is kept as one that holds a coastdown; so is one not understood."""
+        try:
+            return _holds_coastdown(path)
+        except Exception as error:  # whatever is in it, the others are looked at too
+            self._complain(path, f'cannot be read ({reason_of(error)}), so that it stays')
+            return True
+
     def _remove(self, part: _BagPart, why: str, coastdown: bool) -> list[Removed]:
-        # what cannot be locked is written by this node or another, or by nobody knows whom
-        with suppress(OSError), open(part.path, 'rb', opener=_no_link) as file:
-            flock(file, LOCK_EX | LOCK_NB)
-            part.path.unlink()
-            return [Removed(part.path, coastdown, why)]
-        return []
+        try:
+            with open(part.path, 'rb', opener=_no_link) as file:
+                # what cannot be locked is written by this node or another
+                flock(file, LOCK_EX | LOCK_NB)
+                part.path.unlink()
+        except BlockingIOError:
+            return []
+        except OSError as error:
+            self._complain(part.path, f'cannot be removed ({reason_of(error)})')
+            return []
+        return [Removed(part.path, coastdown, why)]
+
+    def _complain(self, path: Path, why: str) -> None:
+        if path.exists():
+            self.problem = f'{printable(path.name)} {why}; move or remove it'
 
 
 def _no_link(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NOFOLLOW)
+    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
 
 
 def _recording(path: Path) -> str:
@@ -200,12 +233,34 @@ def _recording(path: Path) -> str:
     return found[1] if found else path.name
 
 
+@contextmanager
+def _loaded(file: IO[bytes]) -> Iterator[Buffer]:
+    """
+    Give the content of a file.
+
+    One of `CHUNK_LIMIT_BYTES` at most is read: where its disk is pulled out, or somebody cuts
+    it, that is an error then, while a page of a mapped file that is gone ends the process.
+    """
+    if os.fstat(file.fileno()).st_size <= CHUNK_LIMIT_BYTES:
+        yield file.read(CHUNK_LIMIT_BYTES)
+    else:
+        with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+            yield data
+
+
 def _holds_coastdown(path: Path) -> bool:
-    """Say whether figures were published in it; of a file that cannot be read, yes."""
-    try:
-        contents = McapFile(path).contents
-    except (BagError, OSError):
-        return True
+    """
+    Say whether figures were published in it; of a file that is no bag, yes.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    with open(path, 'rb', opener=_no_link) as file, _loaded(file) as data:
+        if data[: len(MAGIC)] != MAGIC:
+            return True
+        contents = contents_of(data)
     return any(
         channel.topic.rpartition('/')[2] in (RESISTANCE.name, RESISTANCE_CURVE.name)
         and contents.counts[number] > 0

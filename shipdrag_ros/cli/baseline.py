@@ -5,19 +5,19 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
-from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.library.diagnosing import coasts_of
-from shipdrag_ros.library.replaying import refuse_overlaps
 from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from shipdrag_ros.diagnosis.learn_baseline import LearntBaseline
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,6 +58,11 @@ def run(options: argparse.Namespace) -> int:
     """
     Learn, write and show it.
     """
+    # what follows takes half a second to import
+    from shipdrag_ros.diagnosis.learn_baseline import learn_baseline
+    from shipdrag_ros.library.diagnosing import coasts_of
+    from shipdrag_ros.library.replaying import refuse_overlaps
+
     output = Output(options.json)
     if options.out.resolve() == options.ship.resolve():
         raise DiagnosisError(
@@ -80,6 +85,8 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
     """
     Return the document of a learnt baseline.
     """
+    from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
+
     return {
         'runs': [
             {
@@ -115,6 +122,8 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
 
 
 def _show(output: Output, found: LearntBaseline) -> None:
+    from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
+
     low, high = found.speed_m_s
     output.say(
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '

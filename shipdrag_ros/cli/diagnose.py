@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import (
     add_json,
@@ -17,18 +18,12 @@ from shipdrag_ros.cli.arguments import (
 )
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
-from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
-from shipdrag_ros.diagnosis import tables as diagnosis_cells
-from shipdrag_ros.diagnosis import words as diagnosis_words
-from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.earlier_file import read_earlier
-from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation import words as estimate_words
-from shipdrag_ros.library.diagnosing import diagnose_runs
-from shipdrag_ros.library.replaying import refuse_overlaps
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
+
+if TYPE_CHECKING:
+    from shipdrag_ros.diagnosis import DiagnosisResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,6 +92,13 @@ def run(options: argparse.Namespace) -> int:
     """
     Diagnose and show it.
     """
+    # what follows takes half a second to import
+    from shipdrag_ros.diagnosis import Verdict, with_effects
+    from shipdrag_ros.diagnosis.document import document
+    from shipdrag_ros.diagnosis.earlier_file import read_earlier
+    from shipdrag_ros.library.diagnosing import diagnose_runs
+    from shipdrag_ros.library.replaying import refuse_overlaps
+
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
     window = None if options.window is None else tuple(options.window)
@@ -115,7 +117,8 @@ def run(options: argparse.Namespace) -> int:
         )
     _show(output, found, ship)
     if options.report is not None:
-        from shipdrag_ros.diagnosis.page import write_diagnosis  # pictures take long to import
+        from shipdrag_ros.diagnosis.page import write_diagnosis
+        from shipdrag_ros.diagnosis.score import Score
 
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')
@@ -140,6 +143,10 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
 
 
 def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
+    from shipdrag_ros.diagnosis import tables as diagnosis_cells
+    from shipdrag_ros.diagnosis import words as diagnosis_words
+    from shipdrag_ros.estimation import words as estimate_words
+
     if found.no_coastdown:
         output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))

@@ -12,9 +12,6 @@ from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.learning import words
-from shipdrag_ros.learning.folder import check_name
-from shipdrag_ros.library.learning import learn_from
 from shipdrag_ros.ship import Ship
 
 
@@ -64,6 +61,11 @@ def run(options: argparse.Namespace) -> int:
     """
     Learn, and write what was learnt.
     """
+    # what follows takes half a second to import
+    from shipdrag_ros.learning import words
+    from shipdrag_ros.learning.folder import check_name
+    from shipdrag_ros.library.learning import learn_from
+
     output = Output(options.json)
     name = check_name(options.name or options.out.stem)
     given = None if options.ship is None else Ship.load(options.ship)

@@ -11,17 +11,20 @@ import stat
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import add_remap, bag, number, whole
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live.app import FLEET, FleetPages, LivePage
-from shipdrag_ros.live.earlier import PastRun, recorded_runs
-from shipdrag_ros.live.serve import listen, serve
-from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, PictureFeed
+from shipdrag_ros.live import FASTEST
 from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from shipdrag_ros.live.app import FleetPages
+    from shipdrag_ros.live.earlier import PastRun
+    from shipdrag_ros.live.source import PictureFeed
 
 SHORTEST_TOKEN = 16
 LOOPBACK = '127.0.0.1'
@@ -104,6 +107,10 @@ def run(options: argparse.Namespace) -> int:
     """
     Serve until SIGINT or SIGTERM.
     """
+    # a server takes long to import
+    from shipdrag_ros.live.app import LivePage
+    from shipdrag_ros.live.serve import listen, serve
+
     output = Output()
     if options.allow_marks and options.bags:
         raise ShipdragError(
@@ -149,6 +156,8 @@ def _source(
     options: argparse.Namespace, ship: Ship | None, past: list[PastRun], output: Output
 ) -> Iterator[tuple[PictureFeed, Callable[[], str] | None]]:
     """Yield what feeds the page, and what tells the node of a stop; end it."""
+    from shipdrag_ros.live.source import BagSource, NodeSource
+
     if options.bags:
         runs = open_sources(options.bags, output, remap=dict(options.remap))
         bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
@@ -176,6 +185,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     # Parquet and pictures take long to import
     from shipdrag_ros.fleet.store import read_coastdowns
     from shipdrag_ros.library.trends import trends_of
+    from shipdrag_ros.live.app import FLEET, FleetPages
     from shipdrag_ros.trend.coastdown_page import links
     from shipdrag_ros.trend.page import fleet_text
 
@@ -186,6 +196,8 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
     """Yield the coastdowns of a folder; what gave none is said."""
+    from shipdrag_ros.live.earlier import recorded_runs
+
     for found in recorded_runs(folder):
         if isinstance(found, str):
             notes.append(found)

@@ -29,7 +29,7 @@ from shipdrag_ros.diagnosis.outcomes import (
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.sights import sight
-from shipdrag_ros.estimation.run_down import RunDown
+from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
     CERTAIN,
@@ -54,7 +54,6 @@ _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
 _READING_S = 1.0  # between readings of an instrument
 _TURNING, _STANDING = 0.5, 0.0  # shaft speed over that under power
-_TURNS = 0.05
 _SHALLOW_DRAUGHTS = 4.0
 _GUSTS_M_S = 0.2  # median change from minute to minute of a mean wind
 _HARDLY = 0.05  # probability below which nothing is gained
@@ -87,7 +86,7 @@ class Undecided:
     ship: Ship
     seen: Sequence[Observation]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
     facts: Facts
     candidates: Sequence[Candidate]
 
@@ -287,7 +286,7 @@ def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOut
         }
         found.append((with_known(case.comparing, fits, outcomes, sd), values))
     (where_turning, values), (where_standing, _) = found
-    seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]
+    seen_to_stand = [int(np.median(value[:3]) <= TURNS) for value in values]
     return [where_turning, where_standing], seen_to_stand
 
 

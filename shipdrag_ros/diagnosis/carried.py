@@ -19,10 +19,10 @@ from functools import cached_property
 
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, check
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.seen_runs import CarriedEffect, SeenRun, WeighedEarlier
+from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier
 from shipdrag_ros.inference.decision import UNKNOWN, marginals
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
-from shipdrag_ros.posterior.compare import ComparedHypotheses
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import EffectWay, kept_way
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
@@ -170,7 +170,7 @@ class Carried:
                 found[name] = self._sizes(find(name), source)
         return {name: priors for name, priors in found.items() if priors}
 
-    def judged(self, found: ComparedHypotheses) -> tuple[WeighedEarlier, ...]:
+    def judged(self, found: ComparedHypotheses[Fitted]) -> tuple[WeighedEarlier, ...]:
         """
         Return what of each diagnosis counts, and what has become of it; the latest first.
         """
@@ -221,7 +221,7 @@ class Carried:
         return tuple(priors) if all(prior.second > 0.0 for prior in priors) else ()
 
 
-def _resized(name: str, found: ComparedHypotheses) -> bool:
+def _resized(name: str, found: ComparedHypotheses[Fitted]) -> bool:
     """Say whether an effect is likelier of any size than as it was found."""
     for names in found.probability:
         if name in names and names != UNKNOWN:

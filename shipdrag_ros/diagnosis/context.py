@@ -16,23 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from shipdrag_ros.estimation.run_down import TURNS
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import bin_means
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
+from shipdrag_ros.simulation.columns import RUN_DOWNS
 
 _BIN_S = 60.0
-_WIND_SD_M_S, _WIND_RELATIVE_SD = 0.6, 0.05  # of a true wind: the ship bends the flow
-_VANE_SD_RAD = 0.05  # by which an anemometer is turned
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
-_DEPTH_SD = 0.03  # relative
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
 _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
 _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
-_TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
-_FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft speaks of the propeller
 _SHORTEST_S = 0.1  # fall of a shaft
 # of the logarithm: thrust is gone before or after its shaft stands, by the propeller and engine
 _RUN_DOWN_SD = 0.6
@@ -131,7 +129,7 @@ class Context:
         if draught_m is not None:
             draughts = float(np.median(depth)) / draught_m
             values.append(np.log([min(draughts, _DEEP_DRAUGHTS)]))
-            blocks.append(np.array([[_DEPTH_SD**2]]))
+            blocks.append(np.array([[priors.DEPTH_READ.sd**2]]))
         if len(shaft):
             values += [shaft, np.array([0.0])]
             blocks.append(np.eye(len(shaft)) * _SHAFT_SD**2 + _SHAFT_OFF_SD**2)
@@ -227,14 +225,14 @@ def _shaft(
         return nothing
     steady = float(np.median(np.abs(window.before.shaft.value)))
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
-    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * max(run_down_s, stop.shaft_s)
+    fallen_s = stop.lead_in_s + RUN_DOWNS * max(run_down_s, stop.shaft_s)
     time_s, value = _binned(window, 'shaft', stop, edges)
     late = time_s > fallen_s
     if steady <= 0.0 or not late.any():
         return nothing
     shaft = value[late, 0] / steady
     # soon after the fall, before it may stall
-    turns = bool(np.median(shaft[:3]) > _TURNS)
+    turns = bool(np.median(shaft[:3]) > TURNS)
     return time_s[late], shaft, turns
 
 
@@ -264,9 +262,9 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     if n == 0:
         return np.zeros((0, 0))
     scatter = max(_GUSTY * float(np.median(np.abs(np.diff(values)))), 0.1) if n > 1 else 0.3
-    turned = _VANE_SD_RAD**2 * np.outer(other, other)
-    gain = _WIND_RELATIVE_SD**2 * np.outer(values, values)
-    return np.eye(n) * scatter**2 + _WIND_SD_M_S**2 + gain + turned
+    turned = priors.WIND_TURNED.sd**2 * np.outer(other, other)
+    gain = priors.WIND_GAIN.sd**2 * np.outer(values, values)
+    return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:

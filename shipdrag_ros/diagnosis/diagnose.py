@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
@@ -16,11 +16,10 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
-    Advice,
     DiagnosisResult,
     EffectEstimate,
+    SeenRun,
 )
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
@@ -29,15 +28,16 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effects import carrying, effects_of, terms
+from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
+_APART_M_S = 0.15  # slowly: six times what is usual of water
 _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
@@ -117,7 +117,7 @@ def diagnose(
     """
     stated = ship.baseline is not None
     baseline = 'stated' if stated else 'fitted_here'
-    seen, notes = _observed(runs, ship, parameters, {}, progress)
+    seen, notes = observed(runs, ship, parameters, {}, progress)
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
@@ -131,12 +131,10 @@ def diagnose(
         )
     case = _compared((seen, notes), runs, ship, parameters, facts, earlier, progress)
     seen, comparing, found = case.seen, case.comparing, case.found
-    judged = judge(found)
+    never = inseparable(found.effects)
+    judged = judge(found, never)
     verdict = judged.decision.verdict
-    would_decide: tuple[Advice, ...] = ()
-    if advise and verdict is Verdict.ONE_OF:
-        left = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
-        would_decide = advice(left, progress)
+    undecided = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
@@ -146,7 +144,7 @@ def diagnose(
         candidates=judged.candidates,
         nothing=found.probability.get(NONE, 0.0),
         unnamed=found.probability.get(UNKNOWN, 0.0),
-        would_decide=would_decide,
+        would_decide=advice(undecided, progress) if advise and verdict is Verdict.ONE_OF else (),
         where=None
         if verdict is Verdict.NONE
         else where(seen, comparing, found, before, of_force=bool(differ)),
@@ -156,7 +154,7 @@ def diagnose(
         held_out_after=held_out(seen, comparing, best) if judged.missing else None,
         baseline=baseline,
         best=judged.best,
-        notes=(*case.notes, *_without_a_baseline(stated)),
+        notes=(*case.notes, *_besides(case, judged.decision.effects, stated=stated)),
         traces=traces(seen, comparing, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
@@ -164,17 +162,25 @@ def diagnose(
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if case.earlier is None else case.earlier.judged(found),
-        limits=limits_of(found, comparing, judged.decision.effects),
+        limits=limits_of(judged, comparing, never),
     )
 
 
-def _without_a_baseline(stated: bool) -> tuple[str, ...]:
-    if stated:
-        return ()
-    return (
-        'the ship file has no baseline: the runs are compared with the range of all hulls of '
-        'her length and volume, in which fouling, a propeller or a cable cannot be seen',
-    )
+def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[str]:
+    """Say what is not sound, and what cannot be seen."""
+    for j, run in enumerate(case.seen):
+        water_m_s = case.comparing.water_m_s(j)
+        if not named and _has_both(run) and water_m_s > _APART_M_S:
+            yield (
+                f'{run.name}: log and way over ground wander apart by {water_m_s:.2f} m/s (one '
+                'standard deviation), as water seldom makes them; one of them is wrong, and as '
+                'much of the coastdown as is like it passes for noise'
+            )
+    if not stated:
+        yield (
+            'the ship file has no baseline: the runs are compared with the range of all hulls of '
+            'her length and volume, in which fouling, a propeller or a cable cannot be seen'
+        )
 
 
 @dataclass(frozen=True)
@@ -183,7 +189,7 @@ class _Case:
 
     seen: tuple[Observation, ...]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
     facts: Facts
     earlier: Carried | None
     notes: tuple[str, ...]
@@ -204,18 +210,16 @@ def _compared(
     for look in range(_LOOKS):
         if look:
             # effects are simulated from the stop as the run was seen
-            seen, notes = _observed(runs, ship, parameters, moved_s, progress)
-        stated = _stated(runs, seen, ship, facts)
+            seen, notes = observed(runs, ship, parameters, moved_s, progress)
+        stated = stated_in(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
         progress('comparing hypotheses', 0, 0)
         comparing = compare(seen, ship, stated, before)
         found = comparing.compare()
-        likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
-        more_s = comparing.runs.stop_s(likeliest.at)
-        if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        more_s = moved_stops(seen, comparing, found)
+        if not more_s:
             break
-        for run, by_s in zip(seen, more_s, strict=True):
-            moved_s[run.name] = moved_s.get(run.name, 0.0) + by_s
+        moved_s |= {name: moved_s.get(name, 0.0) + by_s for name, by_s in more_s.items()}
     return _Case(seen, comparing, found, stated, before, notes)
 
 
@@ -253,19 +257,32 @@ def compare(
     )
 
 
-def _stated(
-    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
+def stated_in(
+    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact] = ()
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
-    return stated_facts(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
+    return stated_facts(ship, [(own[run.name], run.stopped_ns) for run in seen], facts)
 
 
 def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
     """Return names and stops of the runs that are diagnosed."""
-    stops = [run.context.stop for run in seen]
-    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    return tuple(SeenRun(run.name, ns) for run, ns in zip(seen, at_ns))
+    return tuple(SeenRun(run.name, run.stopped_ns) for run in seen)
+
+
+def moved_stops(
+    seen: Sequence[Observation], comparing: Comparing, found: ComparedHypotheses[Fitted]
+) -> dict[str, float]:
+    """
+    Return by how much the likeliest hypothesis has the stop of each run later than it was seen.
+
+    Empty where that hardly matters.
+    """
+    likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
+    more_s = comparing.runs.stop_s(likeliest.at)
+    if all(abs(by_s) <= _NEAR_S for by_s in more_s):
+        return {}
+    return {run.name: by_s for run, by_s in zip(seen, more_s, strict=True)}
 
 
 def _has_both(run: Observation) -> bool:
@@ -274,7 +291,7 @@ def _has_both(run: Observation) -> bool:
     return bool(by_log.any() and not by_log.all())
 
 
-def _observed(
+def observed(
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,
@@ -317,13 +334,6 @@ def _observed(
         f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
         for run in seen
         if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
-    ]
-    notes += [
-        f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
-        'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
-        'and as much of the coastdown as is like it passes for noise'
-        for run in seen
-        if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
 

@@ -9,10 +9,10 @@ from os import PathLike
 from typing import Any, NoReturn
 
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import SeenRun
 from shipdrag_ros.errors import DiagnosisError, SimulationError
+from shipdrag_ros.fields import read_small_text
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.plain_file import read_small_text
 from shipdrag_ros.simulation.effects import find
 
 _LARGEST = 1_000_000  # bytes of a file

@@ -16,7 +16,7 @@ from typing import Protocol
 
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.inference.decision import UNKNOWN, Names
-from shipdrag_ros.posterior.compare import ComparedHypotheses
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect
@@ -89,7 +89,7 @@ class Facts:
         )
 
     def weighed(
-        self, posterior: ComparedHypotheses, runs: Sequence[str]
+        self, posterior: ComparedHypotheses[Fitted], runs: Sequence[str]
     ) -> tuple[WeighedFact, ...]:
         """
         Return how probable it is that each fact is wrong.
@@ -125,7 +125,9 @@ class Facts:
         return tuple(found)
 
     def naming(
-        self, posterior: ComparedHypotheses, decides: Callable[[Mapping[Names, float]], bool]
+        self,
+        posterior: ComparedHypotheses[Fitted],
+        decides: Callable[[Mapping[Names, float]], bool],
     ) -> dict[str, float]:
         """
         Return how probably something is named once a fact more is known.

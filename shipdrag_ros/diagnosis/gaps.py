@@ -126,7 +126,7 @@ def _given_shared(
 def where(
     seen: Sequence[Observation],
     comparing: Comparing,
-    found: ComparedHypotheses,
+    found: ComparedHypotheses[Fitted],
     before: Fitted,
     *,
     of_force: bool,
@@ -178,7 +178,7 @@ def where(
     )
 
 
-def _channel(found: ComparedHypotheses) -> str:
+def _channel(found: ComparedHypotheses[Fitted]) -> str:
     """Return where something smooth explains most."""
     smooth = [fit for fit in found.fitted if fit.names == UNKNOWN and not fit.hypothesis.names]
     best = max(smooth, key=lambda fit: fit.log_evidence)
@@ -242,7 +242,7 @@ def _compared(
     ]
     if run.across is not None:
         a, across = len(run.across), run.across.rows
-        noise = np.linalg.inv(run.across.whitener)
+        noise = np.linalg.inv(run.across_whitener)
         found.append(
             Compared(
                 'position_across',

@@ -112,9 +112,9 @@ def of_another_run(
         matrix = np.diag(runs.priors(hypothesis, begun).precision[family])
         learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
         matrix[np.ix_(place, place)] += learnt
-        covariance = _inverse(matrix)[np.ix_(table.place, table.place)]
+        covariance = inverse_of(matrix)[np.ix_(table.place, table.place)]
         lines = np.hstack([comparing.white(0, table, run), table.rest])
-        found.append(PredictedOutcome(-lines[0], lines[1:], covariance, _inverse(covariance)))
+        found.append(PredictedOutcome(-lines[0], lines[1:], covariance, inverse_of(covariance)))
     return found
 
 
@@ -153,7 +153,7 @@ def of_instrument(
             whole[table.place] = table.rest[1:]
             slope.append(whole)
         mean = -np.concatenate([table.rest[0] for table in tables])
-        outcomes.append(PredictedOutcome(mean, np.hstack(slope), _inverse(precision), precision))
+        outcomes.append(PredictedOutcome(mean, np.hstack(slope), inverse_of(precision), precision))
         values.append(-np.concatenate([table.residual for table in tables]))
     return outcomes, values
 
@@ -212,7 +212,7 @@ def _of_old_runs(hypothesis: Explanation) -> Explanation:
     return replace(hypothesis, ways=ways)
 
 
-def _inverse(matrix: Float64) -> Float64:
+def inverse_of(matrix: Float64) -> Float64:
     """Return the inverse of a positive definite matrix whose unknowns have many units."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
     result: Float64 = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)

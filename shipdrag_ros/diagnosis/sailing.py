@@ -17,19 +17,18 @@ from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_text
 from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
-    Candidate,
     DiagnosisResult,
-    EffectEstimate,
     Gap,
     Where,
 )
-from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, SailingPosterior, shown
+from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, shown
 from shipdrag_ros.diagnosis.units import asked, waiting
+from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, Verdict, decide, mixture
-from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.compare import ComparedHypotheses
 from shipdrag_ros.simulation.effect import Scope, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -88,28 +87,23 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
     found = model.compare()
-    decided = decide(found.probability, model.inseparable)
-    top = next(names for names in found.probability if names != UNKNOWN)
-    missing = bool(top) and decided.verdict in (Verdict.NAMED, Verdict.ONE_OF)
-    candidates = tuple(Candidate(n, p, _sized(found, n, p)) for n, p in decided.candidates)
-    best = found.best[top]
+    judged = judge(found, model.inseparable)
+    verdict, best = judged.decision.verdict, found.best[judged.top]
     return DiagnosisResult(
-        verdict=decided.verdict,
-        effects=tuple(_named(found, name, p) for name, p in sorted(decided.effects.items())),
-        candidates=candidates,
+        verdict=verdict,
+        effects=judged.effects,
+        candidates=judged.candidates,
         nothing=found.probability.get(NONE, 0.0),
         unnamed=found.probability.get(UNKNOWN, 0.0),
-        would_decide=declared(candidates) if decided.verdict is Verdict.ONE_OF else (),
-        where=None if decided.verdict is Verdict.NONE else _where(model, best),
+        would_decide=declared(judged.candidates) if verdict is Verdict.ONE_OF else (),
+        where=None if verdict is Verdict.NONE else _where(model, best),
         before=_gap(found.best[NONE]),
-        after=_gap(best) if missing else None,
-        held_out_before=None,
-        held_out_after=None,
+        after=_gap(best) if judged.missing else None,
         baseline='none',
-        best=_sized(found, top, found.probability[top]),
+        best=judged.best,
         notes=(
             *_about(model, int(outlier.sum())),
-            *(_why(model, found, best) if missing else ()),
+            *(_why(model, found, best) if judged.missing else ()),
         ),
         examined=(LOG_TRACK,),
         no_coastdown=no_coastdown,
@@ -118,38 +112,6 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
 
 def _gap(fit: SailingFit) -> Gap:
     return Gap(float(np.sqrt(np.mean(fit.residual_m_s**2))), None, fit.chi2)
-
-
-def _sized(
-    found: SailingPosterior, names: Names, probability: float
-) -> tuple[EffectEstimate, ...]:
-    """Return the effects of a hypothesis with their sizes, by name."""
-    if names == UNKNOWN:
-        return ()
-    fit, sized, place = found.best[names], [], 0
-    for way in fit.ways:
-        sizes = {}
-        for i, q in enumerate(way.unknowns, place):
-            z, sd = float(fit.z[i]), float(fit.sd[i])
-            sizes[q.name] = Parameter(q.prior.at(z), abs(q.prior.slope(z)) * sd)
-        place += len(way.unknowns)
-        sized.append(EffectEstimate(way.effect.name, probability, sizes))
-    return tuple(sorted(sized, key=lambda effect: effect.name))
-
-
-def _named(found: SailingPosterior, name: str, probability: float) -> EffectEstimate:
-    """Return an effect with its sizes over all hypotheses that hold it."""
-    holding = [
-        (p, effect.parameters)
-        for names, p in found.probability.items()
-        for effect in _sized(found, names, p)
-        if effect.name == name
-    ]
-    sizes = {
-        key: Parameter(*mixture((p, e[key].value, e[key].sd) for p, e in holding))
-        for key in holding[0][1]
-    }
-    return EffectEstimate(name, probability, sizes)
 
 
 def _where(model: SailingModel, best: SailingFit) -> Where:
@@ -186,11 +148,13 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
     return found
 
 
-def _why(model: SailingModel, found: SailingPosterior, best: SailingFit) -> list[str]:
+def _why(
+    model: SailingModel, found: ComparedHypotheses[SailingFit], best: SailingFit
+) -> list[str]:
     """Say why it is this and none of the others."""
     legs, names = model.legs, best.names
     lines = [f'log over ground: {_by_speed(legs)}']
-    action = model.action(best.ways, best.z)
+    action = model.action(best.hypothesis.ways, best.z)
     if any(action.current_m_s):
         east, north = action.current_m_s
         lines.append(f'the water moves by {east:+.3f} m/s to the east, {north:+.3f} to the north')

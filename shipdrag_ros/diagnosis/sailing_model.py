@@ -9,9 +9,8 @@ it, and it cannot pass for one of them.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -20,10 +19,11 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares, minimize
 
 from shipdrag_ros.diagnosis.legs import Direction, Legs
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis, probabilities
+from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.compare import LIKELY, ComparedHypotheses, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.posterior.hypotheses import bsplines
+from shipdrag_ros.posterior.hypotheses import IN_LOG, SMOOTH, Explanation, bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -31,7 +31,6 @@ from shipdrag_ros.simulation.effect import Effect, Measure, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
-_SPLINES, _SPLINE_SD = 6, 0.05  # of an error of the log without a name, of the highest speed
 _SCALE_TOLERANCE = 0.005  # that a log in order has
 _CURRENT_TOLERANCE_M_S = 0.02  # steady current that is not worth a word
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
@@ -41,7 +40,6 @@ _SD_OF_LOG = np.array([1.0, 1.0, 0.7, 0.8, 0.8])
 _EVALUATIONS = 400
 _LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
-_LIKELY = 0.03  # probability of names that may leave something smooth
 # what log and track show acts alike on all ships, so that any will do
 _ANY_SHIP = Ship(
     length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
@@ -49,16 +47,14 @@ _ANY_SHIP = Ship(
 
 
 @dataclass(frozen=True)
-class SailingFit:
+class SailingFit(WeighedFit):
     """
     A hypothesis about legs at its best.
 
     Attributes
     ----------
-    ways
-        Of the effects that are there.
-    smooth
-        Whether the log errs besides in a way that bends with the speed, without a name.
+    hypothesis
+        Something smooth is an error of the log that bends with the speed.
     z, sd : (p,)
         Unknowns, standard normal under the prior, those of the effects first.
     residual_m_s, white : (n,)
@@ -69,8 +65,7 @@ class SailingFit:
         By Laplace's method, without the prior odds.
     """
 
-    ways: tuple[EffectWay, ...]
-    smooth: bool
+    hypothesis: Explanation
     z: Float64
     sd: Float64
     residual_m_s: Float64
@@ -79,49 +74,9 @@ class SailingFit:
     log_evidence: float
 
     @property
-    def names(self) -> Names:
-        """As the decision takes them."""
-        return UNKNOWN if self.smooth else tuple(sorted(way.effect.name for way in self.ways))
-
-    @property
-    def log_odds(self) -> float:
-        """Prior log odds over nothing."""
-        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
-        return sum(way.log_odds for way in self.ways) + unnamed
-
-    @property
     def chi2(self) -> float:
         """Of a leg."""
         return float(np.mean(self.white**2))
-
-
-@dataclass(frozen=True)
-class SailingPosterior:
-    """
-    Hypotheses about legs with their probabilities.
-
-    Attributes
-    ----------
-    probability
-        Of each set of names, most probable first.
-    best
-        The likeliest fit of each.
-    """
-
-    probability: dict[Names, float]
-    best: dict[Names, SailingFit]
-
-    @classmethod
-    def of(cls, fits: Iterable[SailingFit]) -> SailingPosterior:
-        """Give fits their probabilities."""
-        fits = list(fits)
-        best: dict[Names, SailingFit] = {}
-        for fit in fits:
-            old = best.get(fit.names)
-            if old is None or fit.log_evidence + fit.log_odds > old.log_evidence + old.log_odds:
-                best[fit.names] = fit
-        weighed = (WeighedHypothesis(f.names, f.log_evidence, f.log_odds) for f in fits)
-        return cls(probabilities(weighed), best)
 
 
 @dataclass(frozen=True)
@@ -205,14 +160,14 @@ class SailingModel:
     @cached_property
     def all_together(self) -> SailingFit:
         """The fit of all effects that sailing separates at once."""
-        return self.fit(self._plain(self.together))
+        return self.fit(Explanation(self._plain(self.together)))
 
     @staticmethod
     def _plain(effects: Sequence[Effect]) -> tuple[EffectWay, ...]:
         """Return effects whose sizes are any near 0, of either sign."""
         return tuple(next(ways_of(effect, _ANY_SHIP, _LONGEST_S, 1)) for effect in effects)
 
-    def compare(self) -> SailingPosterior:
+    def compare(self) -> ComparedHypotheses[SailingFit]:
         """
         Compare nothing, each effect, pairs of them, and what errs smoothly besides.
         """
@@ -220,15 +175,15 @@ class SailingModel:
         pairs = [
             both for both in combinations(ways, 2) if both[0].effect.goes_with(both[1].effect)
         ]
-        fits = [self.fit(each) for each in ((), *((way,) for way in ways), *pairs)]
-        fits.append(self.fit((), smooth=True))
-        found = SailingPosterior.of(fits)
+        every = [Explanation(each) for each in ((), *((way,) for way in ways), *pairs)]
+        fits = [self.fit(each) for each in (*every, Explanation(smooth=IN_LOG))]
+        found = ComparedHypotheses(self.effects, tuple(fits))
         beside = [
-            self.fit(found.best[names].ways, smooth=True)
+            self.fit(replace(found.best[names].hypothesis, smooth=IN_LOG))
             for names, p in found.probability.items()
-            if names not in (NONE, UNKNOWN) and p > _LIKELY
+            if names not in (NONE, UNKNOWN) and p > LIKELY
         ]
-        return SailingPosterior.of([*fits, *beside])
+        return ComparedHypotheses(self.effects, (*fits, *beside))
 
     def action(self, ways: Sequence[EffectWay], z: Float64) -> Action:
         """
@@ -241,23 +196,18 @@ class SailingModel:
             found += way.action(self._frame, own)
         return found
 
-    def fit(self, ways: tuple[EffectWay, ...], *, smooth: bool = False) -> SailingFit:
+    def fit(self, hypothesis: Explanation) -> SailingFit:
         """
         Return the fit of a hypothesis.
 
-        Parameters
-        ----------
-        ways
-            Of its effects.
-        smooth
-            Whether the log errs besides, bending with the speed. Where nothing else is there,
-            a scale and an offset are part of it.
+        Where something smooth is there and nothing else, a scale and an offset are part of it.
         """
+        ways, smooth = hypothesis.ways, bool(hypothesis.smooth)
         # what stands alone as an error of the log may also be straight
         straight = [e for e in self.effects if _LOG in e.errs_in] if smooth and not ways else []
         acting = (*ways, *self._plain(straight))
         own = sum(len(way.unknowns) for way in acting)
-        start = np.zeros(own + (_SPLINES if smooth else 0))
+        start = np.zeros(own + (SMOOTH if smooth else 0))
         start[:own] = [each for way in acting for each in way.start]
         n = len(self.legs)
 
@@ -279,8 +229,7 @@ class SailingModel:
         hessian = slopes.T @ slopes + np.eye(len(best))
         log_det = float(np.linalg.slogdet(hessian)[1])
         return SailingFit(
-            ways,
-            smooth,
+            hypothesis,
             best,
             np.sqrt(np.diag(np.linalg.inv(hessian))),
             self.factor @ both[:n],
@@ -306,10 +255,10 @@ class SailingModel:
     def _splines(self) -> Float64:
         """What neither a scale nor an offset is, (6, n) [m/s]."""
         speed = self.legs.ground_m_s
-        splines = bsplines(speed / speed.max(), _SPLINES).T
+        splines = bsplines(speed / speed.max(), SMOOTH).T
         line = np.array([np.ones(len(speed)), speed]).T
         bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]
-        found: Float64 = _SPLINE_SD * float(speed.max()) * bent.T
+        found: Float64 = priors.SMOOTH_SIZES[1] * float(speed.max()) * bent.T
         return found
 
 

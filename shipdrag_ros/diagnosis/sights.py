@@ -45,7 +45,7 @@ def day_of(run: Observation) -> float:
     return (run.context.stop.since_ns * 1e-9 + run.lead_in_s) / DAY_S
 
 
-def _lowest(run: Observation) -> float:
+def lowest_m_s(run: Observation) -> float:
     """Return about the speed at the end."""
     speeds = [
         run.along.rows.value[run.along.rows.kind == kind][-5:]
@@ -69,7 +69,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     ship
     """
     top = max(each.speed_m_s for each in seen)
-    low = min(_lowest(each) for each in seen)
+    low = min(lowest_m_s(each) for each in seen)
     scenario = Scenario(
         speed_m_s=run.speed_m_s,
         lead_in_s=run.lead_in_s,
@@ -94,7 +94,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     value, blocks = [run.context.value], [run.context.whitener]
     if across is not None:
         value.insert(0, across.rows.value)
-        blocks.insert(0, across.whitener)
+        blocks.insert(0, run.across_whitener)
     stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
     return RunSight(
         model,

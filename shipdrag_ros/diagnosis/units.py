@@ -56,12 +56,7 @@ def waiting(question: str, **rest: Any) -> DiagnosisResult:
         candidates=(),
         nothing=0.0,
         unnamed=0.0,
-        would_decide=(),
-        where=None,
         before=Gap(None, None, math.nan),
-        after=None,
-        held_out_before=None,
-        held_out_after=None,
         question=question,
         **rest,
     )

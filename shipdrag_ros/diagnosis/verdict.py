@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Generic
 
 from shipdrag_ros.diagnosis.result import Candidate, EffectEstimate, Limit, RunSize
 from shipdrag_ros.inference.decision import (
@@ -18,15 +19,14 @@ from shipdrag_ros.inference.decision import (
 )
 from shipdrag_ros.inference.limits import quantile
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fit, Fitted, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay
-from shipdrag_ros.simulation.effects import inseparable
 
 _SHARE = 0.95  # of a size, below its limit
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Judgement(Generic[Fit]):
     """
     A verdict, and what it rests on.
 
@@ -39,7 +39,7 @@ class Judgement:
     candidates
     """
 
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fit]
     decision: Decision
     effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
@@ -55,7 +55,7 @@ class Judgement:
         return bool(self.top) and self.decision.verdict in (Verdict.NAMED, Verdict.ONE_OF)
 
     @property
-    def explained(self) -> Fitted:
+    def explained(self) -> Fit:
         """What explains the runs: nothing, the likeliest names or something without a name."""
         if self.decision.verdict is Verdict.UNKNOWN:
             return self.found.best[UNKNOWN]
@@ -67,11 +67,13 @@ class Judgement:
         return sized(self.found.best[self.top], self.found.probability[self.top])
 
 
-def judge(found: ComparedHypotheses) -> Judgement:
+def judge(
+    found: ComparedHypotheses[Fit], inseparable: Sequence[Collection[str]]
+) -> Judgement[Fit]:
     """
     Return the decision that the posterior probabilities alone make.
     """
-    decided = decide(found.probability, inseparable(found.effects))
+    decided = decide(found.probability, inseparable)
     return Judgement(
         found,
         decided,
@@ -83,7 +85,7 @@ def judge(found: ComparedHypotheses) -> Judgement:
     )
 
 
-def sized(fit: Fitted, probability: float) -> tuple[EffectEstimate, ...]:
+def sized(fit: WeighedFit, probability: float) -> tuple[EffectEstimate, ...]:
     """
     Return the effects of a hypothesis with their sizes, by name; of runs that differ the last.
     """
@@ -95,7 +97,7 @@ def sized(fit: Fitted, probability: float) -> tuple[EffectEstimate, ...]:
     return tuple(found[name] for name in sorted(found))
 
 
-def _sizes(fit: Fitted) -> list[tuple[EffectWay, dict[str, Parameter]]]:
+def _sizes(fit: WeighedFit) -> list[tuple[EffectWay, dict[str, Parameter]]]:
     """Return the parameters of each way."""
     found, place = [], 0
     assert fit.z is not None
@@ -110,7 +112,7 @@ def _sizes(fit: Fitted) -> list[tuple[EffectWay, dict[str, Parameter]]]:
     return found
 
 
-def runs_differ(fit: Fitted, names: Sequence[str]) -> tuple[RunSize, ...]:
+def runs_differ(fit: WeighedFit, names: Sequence[str]) -> tuple[RunSize, ...]:
     """
     Return the size in each run, where a hypothesis has one for each.
 
@@ -130,7 +132,7 @@ def runs_differ(fit: Fitted, names: Sequence[str]) -> tuple[RunSize, ...]:
     return tuple(found)
 
 
-def _named(found: ComparedHypotheses, name: str, probability: float) -> EffectEstimate:
+def _named(found: ComparedHypotheses[Fit], name: str, probability: float) -> EffectEstimate:
     """Return an effect with its sizes over all hypotheses that hold it."""
     holding = [
         (p, effect)
@@ -150,12 +152,13 @@ def _named(found: ComparedHypotheses, name: str, probability: float) -> EffectEs
 
 
 def limits_of(
-    found: ComparedHypotheses, comparing: Comparing, named: Collection[str]
+    judged: Judgement[Fitted], comparing: Comparing, never: Sequence[frozenset[str]]
 ) -> dict[str, Limit]:
     """
     Return the limit of each effect that is not named, by name.
     """
-    amounts = comparing.named_from(inseparable(found.effects))
+    found, named = judged.found, judged.decision.effects
+    amounts = comparing.named_from(never)
     limits = {}
     for effect in found.effects:
         sizes = found.sizes(effect.name)

@@ -16,7 +16,7 @@ from shipdrag_ros.ship import Ship
 
 _SUDDEN_S = 30.0  # slower than this, a shaft that follows the ship seems to run down
 ONSET_SD_S = STOP.sd  # of an onset found from the speed alone: a loose bound, the fit finds it
-_KEPT = 0.05  # of the steady shaft speed: less is not measured
+TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
 
@@ -142,7 +142,7 @@ def _kept(window: Window, falls: list[tuple[int, str, Fall]]) -> Iterator[str]:
         after_s = fall.stop_s + _FALLEN * fall.run_down_s
         since_ns = window.start_ns + round(after_s * 1e9)
         shaft = window.shafts[number]
-        if fall.kept > _KEPT and 'shaft' in name and np.any(shaft.time_ns >= since_ns):
+        if fall.kept > TURNS and 'shaft' in name and np.any(shaft.time_ns >= since_ns):
             yield say(name, shaft, window, since_ns)
 
 

@@ -118,21 +118,13 @@ class Window:
                 series.variance[inside].copy(),
             )
 
-        return replace(
-            self,
-            start_ns=start_ns,
-            end_ns=end_ns,
-            speed_through_water=cut(self.speed_through_water),
-            speed_over_ground=cut(self.speed_over_ground),
-            position=cut(self.position),
-            heading=cut(self.heading),
-            shafts=tuple(cut(each) for each in self.shafts),
-            pitches=tuple(cut(each) for each in self.pitches),
-            rudder=cut(self.rudder),
-            wind_apparent=cut(self.wind_apparent),
-            depth=cut(self.depth),
-            before=self.before if start_ns == self.start_ns else None,
-        )
+        changes: dict[str, Any] = {
+            name: tuple(map(cut, found)) if isinstance(found, tuple) else cut(found)
+            for name, found in vars(self).items()
+            if name not in ('start_ns', 'end_ns', 'notes', 'before')
+        }
+        before = self.before if start_ns == self.start_ns else None
+        return replace(self, start_ns=start_ns, end_ns=end_ns, before=before, **changes)
 
     def without(self, name: str, why: str) -> Window:
         """
@@ -208,6 +200,21 @@ class Window:
                 value, variance = value.reshape(-1), variance.reshape(-1)
             return Series(time_ns, value, variance)
 
+        def part(first_ns: int, last_ns: int, position: Series) -> Window:
+            return cls(
+                first_ns,
+                last_ns,
+                series(Channel.SPEED_THROUGH_WATER),
+                series(Channel.SPEED_OVER_GROUND),
+                position,
+                series(Channel.HEADING),
+                tuple(map(series, SHAFTS)),
+                tuple(map(series, PITCHES)),
+                series(Channel.RUDDER),
+                series(Channel.WIND_APPARENT),
+                series(Channel.DEPTH),
+            )
+
         metres, degrees = series(Channel.POSITION), series(Channel.POSITION_GEODETIC)
         notes: tuple[str, ...] = ()
         if len(metres) and len(degrees):
@@ -215,41 +222,17 @@ class Window:
                 f'position came as metres ({len(metres)}) and as latitude and longitude '
                 f'({len(degrees)}): the larger part was used, the other left out',
             )
-        in_degrees = len(degrees) > len(metres)
-        window = cls(
-            start_ns,
-            end_ns,
-            series(Channel.SPEED_THROUGH_WATER),
-            series(Channel.SPEED_OVER_GROUND),
-            _local_plane(degrees, degrees.value[0]) if in_degrees else metres,
-            series(Channel.HEADING),
-            tuple(series(channel) for channel in SHAFTS),
-            tuple(series(channel) for channel in PITCHES),
-            series(Channel.RUDDER),
-            series(Channel.WIND_APPARENT),
-            series(Channel.DEPTH),
-            notes,
-        )
+
+        def position() -> Series:
+            if len(degrees) <= len(metres):
+                return series(Channel.POSITION)
+            return _local_plane(series(Channel.POSITION_GEODETIC), degrees.value[0])
+
+        window = replace(part(start_ns, end_ns, position()), notes=notes)
         if before_ns is None or before_ns >= start_ns:
             return window
         inside = (block.stamp_ns >= before_ns) & (block.stamp_ns < start_ns)
-        metres_before = series(Channel.POSITION)
-        if in_degrees:
-            metres_before = _local_plane(series(Channel.POSITION_GEODETIC), degrees.value[0])
-        before = cls(
-            before_ns,
-            start_ns,
-            series(Channel.SPEED_THROUGH_WATER),
-            series(Channel.SPEED_OVER_GROUND),
-            metres_before,
-            series(Channel.HEADING),
-            tuple(series(channel) for channel in SHAFTS),
-            tuple(series(channel) for channel in PITCHES),
-            series(Channel.RUDDER),
-            series(Channel.WIND_APPARENT),
-            series(Channel.DEPTH),
-        )
-        return replace(window, before=before)
+        return replace(window, before=part(before_ns, start_ns, position()))
 
 
 def _local_plane(geodetic: Series, origin: Float64) -> Series:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
@@ -89,8 +88,9 @@ class Checked:
 
     @property
     def interval_score(self) -> float | None:
-        """Mean of `interval_score`; None where nothing followed."""
-        return _mean([each.score for each in self.pairs])
+        """Mean of `interval_score`, of ways ahead of the stop; None where nothing followed."""
+        scored = (each for each in self.pairs if each.done + min(each.band.low, each.was) > 0.0)
+        return _mean([each.score for each in scored])
 
 
 def _mean(values: Sequence[float]) -> float | None:
@@ -160,10 +160,7 @@ class Followed:
         name = next((each for each in whole.tracks if each.startswith('speed')), None)
         way = None
         if len(window.position) > _BEHIND and 'position' in whole.samples:
-            stamps = window.position.time_ns
-            half = 0.5 * float(stamps[-1] - stamps[0])
-            time = (stamps - stamps[0]) / half - 1.0
-            way = _since(window, stamps), _monotone(along_track(time, window.position.value))
+            way = _way(window, whole)
         if name is not None:
             series = getattr(window, name)
             if len(series) <= _BEHIND:
@@ -212,8 +209,20 @@ def _since(window: Window, stamps: object) -> Float64:
     return np.asarray((np.asarray(stamps) - window.start_ns) / SECOND_NS)
 
 
+def _way(window: Window, whole: Estimate) -> tuple[Float64, Float64]:
+    """Return times and ways of places: she advances, but where a current sets her back."""
+    stamps = window.position.time_ns
+    half = 0.5 * float(stamps[-1] - stamps[0])
+    way = along_track((stamps - stamps[0]) / half - 1.0, window.position.value)
+    time_s, current = _since(window, stamps), whole.current_m_s or 0.0
+    back_m = current * time_s if current < -whole.last_speed_m_s else np.zeros(len(way))
+    return time_s, _monotone(way - back_m) + back_m
+
+
 def _monotone(values: Float64, weights: Float64 | None = None) -> Float64:
     """Return the ascending values that are nearest in squares (Robertson and others 1988)."""
+    from scipy.optimize import isotonic_regression  # a quarter of a second, for what has followed
+
     return np.asarray(isotonic_regression(values, weights=weights).x)
 
 

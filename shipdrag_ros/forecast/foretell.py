@@ -140,10 +140,11 @@ def foretell_from(
     wanted.add(float(ship.speed(froude_min)))
     targets = tuple(sorted((u for u in wanted if 0.0 < u < now.speed_m_s), reverse=True))
     if not targets:
+        given = ', '.join(f'{each:.3g}' for each in speeds_m_s)
         raise EstimationError(
             f'nothing is left to foretell: at {now.speed_m_s:.3g} m/s she is slower than '
             f'{FRACTIONS[-1]:.0%} of {now.stop_m_s:.3g} m/s and than '
-            f'{", ".join(map(str, speeds_m_s))} m/s: give a lower speed in forecast_speeds'
+            f'{given} m/s: give a lower speed in forecast_speeds'
         )
     u = np.exp(np.linspace(math.log(now.speed_m_s), math.log(_BEYOND * targets[-1]), _NODES))
     found = deceleration(known, ship, np.append(u, now.stop_m_s))
@@ -160,11 +161,13 @@ def foretell_from(
     reading = (_reading_sd(now) / a[:-1]) ** 2
     held, held_way = _run_down(now.run_down_s, gliding, a[:-1], ground)
     longer, longer_way = _run_down(now.run_down_s + now.run_down_sd_s, gliding, a[:-1], ground)
+    time = gliding + held
     times = _bands(
-        gliding + held, _variance(weights, covariance), late + reading + (longer - held) ** 2
+        time, time, _variance(weights, covariance), late + reading + (longer - held) ** 2
     )
     ways = _bands(
         by_way.sum(axis=1) + held_way,
+        np.abs(by_way).sum(axis=1) + np.abs(held_way),
         _variance(by_way, covariance),
         late * ground[0] ** 2 + reading * ground**2 + drift + (longer_way - held_way) ** 2,
     )
@@ -232,17 +235,23 @@ def _reading_sd(now: Beginning) -> float:
     return max(priors.READING.sd * now.stop_m_s, priors.READING_OF_WHITE.sd * now.white_m_s)
 
 
-def _bands(median: Float64, scaled: Float64, added: Float64) -> Float64:
+def _bands(median: Float64, size: Float64, scaled: Float64, added: Float64) -> Float64:
     """
     Return median, low and high (n, 3).
 
-    A variance is of what scales a figure, which is then log-normal, or is added to it.
+    A variance is of what scales a figure, which is then log-normal, or is added to it. The size
+    is that of a way without its direction: where a current sets her back it is above the median,
+    and a weak deceleration may bring her farther on, or farther back.
     """
-    spread = Z * np.sqrt(scaled) / np.maximum(median, 1e-12)
+    spread = Z * np.sqrt(scaled) / np.maximum(size, 1e-12)
     spread = np.minimum(spread, _WIDEST)
     beside = Z * np.sqrt(added)
-    low = median - np.hypot(median * -np.expm1(-spread), beside)
-    high = median + np.hypot(median * np.expm1(spread), beside)
+    back = size > median
+    less, more = -np.expm1(-spread), np.expm1(spread)
+    low = median - np.hypot(size * np.where(back, more, less), beside)
+    high = median + np.hypot(size * more, beside)
+    if back.any():
+        return np.column_stack([median, low, high])
     # a lower speed comes later, and farther on
     bands = np.column_stack([median, np.maximum(low, 0.0), high])
     return np.asarray(np.maximum.accumulate(bands, axis=0))

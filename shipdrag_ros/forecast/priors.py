@@ -2,7 +2,8 @@
 """
 Every prior of the forecast, as data; docs/model.md prints this table (`python docs/tables.py`).
 
-Chosen on world A, cases 0 to 59, and on the measured records (`benchmarks/forecast_*.py`).
+Chosen on world A, cases 0 to 59, and on the measured records, as docs/forecast.md says
+(`benchmarks/accuracy/forecast_*.py`).
 """
 
 from __future__ import annotations

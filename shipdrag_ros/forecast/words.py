@@ -33,8 +33,13 @@ def clock(seconds: float) -> str:
 def way(metres: float, mass_kg: float) -> str:
     """
     Return a distance in nautical miles, of a light craft or a short way in metres.
+
+    Examples
+    --------
+    >>> way(-1852.0, 2e7), way(-81.7, 2e7)
+    ('-1.00 nm', '-81.7 m')
     """
-    if mass_kg < LIGHT_KG or metres < 0.1 * _MILE_M:
+    if mass_kg < LIGHT_KG or abs(metres) < 0.1 * _MILE_M:
         return f'{metres:.3g} m'
     return f'{metres / _MILE_M:.2f} nm'
 
@@ -65,6 +70,13 @@ def apart(milestones: Sequence[_T], speed: Callable[[_T], str]) -> list[_T]:
     return list({speed(each): each for each in reversed(milestones)}.values())[::-1]
 
 
+def apart_passed(compared: Sequence[Passed], mass_kg: float) -> list[Passed]:
+    """
+    Return those beside what followed, `apart`.
+    """
+    return apart(compared, lambda each: ship_speed(each.foretold.speed_m_s, mass_kg))
+
+
 def table(compared: Sequence[Passed], mass_kg: float) -> Table:
     """
     Show milestones beside what followed, a line each.
@@ -81,6 +93,6 @@ def table(compared: Sequence[Passed], mass_kg: float) -> Table:
             *cells(each.foretold.distance_m, far),
             _NOT_SHOWN if each.was_m is None else far(each.was_m),
         )
-        for each in apart(compared, lambda each: ship_speed(each.foretold.speed_m_s, mass_kg))
+        for each in apart_passed(compared, mass_kg)
     )
     return Table(('down to', 'in', '90 %', 'was', 'after', '90 %', 'was'), rows)

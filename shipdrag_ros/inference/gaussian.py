@@ -46,7 +46,7 @@ class Factored(NamedTuple):
         numpy.linalg.LinAlgError
             If it is not positive, or a column follows from others.
         """
-        solved, lower, scale = cholesky(np.ascontiguousarray(matrix), 0.0)
+        solved, lower, scale = cholesky(np.ascontiguousarray(matrix))
         if not solved:
             raise np.linalg.LinAlgError('the matrix is not positive')
         return cls(lower, scale)
@@ -68,7 +68,6 @@ class Factored(NamedTuple):
         return 2.0 * float(np.log(np.diag(self.lower)).sum() - np.log(self.scale).sum())
 
 
-_BLOCK = 128
 _FOLLOWS = 1e-14  # of a scaled diagonal
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.
@@ -122,16 +121,14 @@ def factor(matrix: Float64) -> bool:
 
 
 @compiled
-def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
+def cholesky(matrix: Float64) -> tuple[bool, Float64, Float64]:
     """
-    Return the lower factor of M + damping diag M, M scaled to unit diagonal.
+    Return the lower factor of M scaled to unit diagonal.
 
     Parameters
     ----------
     matrix : (p, p)
         Symmetric.
-    damping
-        Of Levenberg and Marquardt; 0: none.
 
     Returns
     -------
@@ -148,7 +145,7 @@ def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
     for a in range(p):
         for b in range(a):
             lower[a, b] = matrix[a, b] * scale[a] * scale[b]
-        lower[a, a] = 1.0 + damping
+        lower[a, a] = 1.0
     solved = factor(lower)
     for a in range(p):
         # what is left of a column that follows from others is rounding

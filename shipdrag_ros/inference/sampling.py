@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.gaussian import cholesky, products_of
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.linear import evidence_of, whitened_products
+from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import Rows
-from shipdrag_ros.inference.settings import HOLD, SIZE, SOURCES, WHITE_OF, Settings, noise_of
+from shipdrag_ros.inference.settings import HOLD, SIZE, SOURCES, WHITE_OF, Settings
 from shipdrag_ros.samples import Float64, Int64
 
 _SHORTEST_S, _LONGEST_S = 2.0, 3600.0
@@ -102,13 +102,10 @@ def _log_posterior(z: Float64, seen: Seen, prior: SizePrior) -> float:
     """Return the logarithm of evidence times prior, less a constant; -inf where it fails."""
     value = values(z, prior).reshape(1, SIZE)
     setting = Settings(value[:, :WHITE_OF], value[:, WHITE_OF:HOLD], value[:, HOLD], np.ones(1))
-    noise = noise_of(setting, 0, seen.rows, seen.noise, seen.steady)
-    table = seen.table.copy()
-    log_det = whiten(seen.rows, table, noise)
-    products = products_of(table)
+    products, log_det = whitened_products(seen.table, seen.rows, seen.noise, seen.steady, setting)
     best, total = -np.inf, 0.0
     for q in range(len(seen.mean)):
-        each = _of_model(products, seen.mean[q], seen.precision[q])
+        each = evidence_of(products[0], seen.mean[q], seen.precision[q])
         if each > best:
             total = total * np.exp(best - each) + 1.0
             best = each
@@ -119,31 +116,8 @@ def _log_posterior(z: Float64, seen: Seen, prior: SizePrior) -> float:
     square = 0.0
     for i in prior.which:
         square += z[i] * z[i]
-    result = best + np.log(total) - 0.5 * log_det - 0.5 * square
+    result = best + np.log(total) - 0.5 * log_det[0] - 0.5 * square
     return float(result) if np.isfinite(result) else -np.inf
-
-
-@compiled
-def _of_model(products: Float64, mean: Float64, precision: Float64) -> float:
-    """Return the logarithm of the evidence of a linear model with whitened rows."""
-    p = len(mean)
-    matrix, right = products[1:, 1:].copy(), products[1:, 0].copy()
-    result = -0.5 * products[0, 0]
-    for a in range(p):
-        matrix[a, a] += precision[a]
-        right[a] += precision[a] * mean[a]
-        if precision[a] > 0.0:
-            result += 0.5 * np.log(precision[a]) - 0.5 * precision[a] * mean[a] ** 2
-    solved, lower, scale = cholesky(matrix, 0.0)
-    if not solved:
-        return -np.inf
-    for a in range(p):
-        value = right[a] * scale[a]
-        for b in range(a):
-            value -= lower[a, b] * right[b]
-        right[a] = value / lower[a, a]
-        result += 0.5 * right[a] ** 2 - np.log(lower[a, a]) + np.log(scale[a])
-    return float(result)
 
 
 @compiled

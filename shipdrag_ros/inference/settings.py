@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, Rows
 from shipdrag_ros.samples import Float64
 
@@ -45,9 +45,6 @@ class Settings(NamedTuple):
     white: Float64
     hold: Float64
     weight: Float64
-
-
-SENSORS_ALONE = Settings(np.array([WHITE]), np.ones((1, KIND_COUNT)), np.ones(1), np.ones(1))
 
 
 @compiled

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.ship import LearntTerm
-from shipdrag_ros.ship.term import NAME
+from shipdrag_ros.ship.term import EXPECTED_NAME, NAME
 from shipdrag_ros.simulation.effects import OWN
 
 MOST_FILES = 200
@@ -27,11 +27,27 @@ def read_folders(folders: Sequence[Path]) -> tuple[LearntTerm, ...]:
     found: dict[str, LearntTerm] = {}
     for folder in folders:
         for path in _files(folder):
-            term = LearntTerm.load(path)
+            term = read_term(path)
             if term.name in found:
                 raise EffectFileError(str(path), [f'name: {term.name!r} is that of another file'])
             found[term.name] = term
     return tuple(found.values())
+
+
+def read_term(path: Path) -> LearntTerm:
+    """
+    Return the term of a file.
+
+    Raises
+    ------
+    EffectFileError
+        If it cannot be used, or has the name of an effect of the library.
+    """
+    term = LearntTerm.load(path)
+    if term.name in OWN:
+        why = f'name: {term.name!r} is an effect of the library; give it another'
+        raise EffectFileError(str(path), [why])
+    return term
 
 
 def check_name(name: str) -> str:
@@ -45,7 +61,7 @@ def check_name(name: str) -> str:
     """
     problems = []
     if not NAME.fullmatch(name):
-        problems.append(f'name: {name[:60]!r}, expected small letters, digits and _')
+        problems.append(f'name: {name[:60]!r}, expected {EXPECTED_NAME}')
     if name in OWN:
         problems.append(f'name: {name!r} is an effect of the library; give it another')
     if problems:

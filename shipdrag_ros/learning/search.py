@@ -17,12 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.facts import stated_facts
+from shipdrag_ros.diagnosis.diagnose import moved_stops, observed, stated_in
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.outcomes import inverse_of
 from shipdrag_ros.diagnosis.result import Where
-from shipdrag_ros.diagnosis.sights import day_of, ship_runs
-from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.diagnosis.sights import day_of, lowest_m_s, ship_runs
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
@@ -44,7 +45,7 @@ _BEGUN = 2  # starts of each
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
-_LOOKS, _NEAR_S = 2, 4.0  # at runs, and by which a stop may move without another
+_LOOKS = 2  # at runs
 _UPPER = 1.645
 _MANY, _APART_D, _DEEPER = 3, 0.5, 1.1  # runs, days and ratio of depths that can show a form
 
@@ -128,44 +129,15 @@ def learn(
             f'ship {ship.name!r} has no baseline, and what is learnt is what it lacks; add '
             '`baseline` to her ship file, or learn one with `shipdrag baseline`'
         )
-    seen, notes = _observed(runs, ship, parameters, {}, progress)
+    seen, notes = observed(runs, ship, parameters, {}, progress)
     case = _LearningCase.of(runs, seen, ship, progress)
     for _ in range(_LOOKS - 1):
-        moved = case.moved_s()
-        if all(abs(by_s) <= _NEAR_S for by_s in moved.values()):
+        moved = moved_stops(seen, case.comparing, case.found)
+        if not moved:
             break
-        seen, notes = _observed(runs, ship, parameters, moved, progress)
+        seen, notes = observed(runs, ship, parameters, moved, progress)
         case = _LearningCase.of(runs, seen, ship, progress)
     return _Judged(case, name, notes, progress).answer()
-
-
-def _observed(
-    runs: Sequence[CoastRun],
-    ship: Ship,
-    parameters: Parameters,
-    moved_s: dict[str, float],
-    progress: Progress,
-) -> tuple[list[Observation], tuple[str, ...]]:
-    """Return the runs that can be used, and why others cannot."""
-    seen, refused = [], {}
-    for done, run in enumerate(runs):
-        progress('learning the noise before the stop, of each run', done, len(runs))
-        try:
-            seen.append(
-                Observation.of(
-                    run.window,
-                    run.ship or ship,
-                    parameters,
-                    name=run.name,
-                    stop_moved_s=moved_s.get(run.name, 0.0),
-                )
-            )
-        except (DiagnosisError, EstimationError) as error:
-            refused[run.name] = error
-    if not seen:
-        which, why = next(iter(refused.items()))
-        raise DiagnosisError(f'{which}: {why}')
-    return seen, tuple(f'left out: {which}: {why}' for which, why in refused.items())
 
 
 @dataclass(frozen=True)
@@ -178,7 +150,7 @@ class _LearningCase:
     forms: dict[str, LearnableForm]
     ways: dict[str, list[EffectWay]]
     comparing: Comparing
-    found: ComparedHypotheses
+    found: ComparedHypotheses[Fitted]
 
     @classmethod
     def of(
@@ -213,12 +185,6 @@ class _LearningCase:
         comparing = _comparing(runs, seen, ship, ways, library=True)
         return cls(tuple(runs), tuple(seen), ship, kept, ways, comparing, comparing.compare())
 
-    def moved_s(self) -> dict[str, float]:
-        """Return by how much each stop is later than it is taken for."""
-        likeliest = max(self.found.fitted, key=lambda fit: fit.log_weight)
-        more_s = self.comparing.runs.stop_s(likeliest.at)
-        return {run.name: by_s for run, by_s in zip(self.seen, more_s, strict=True)}
-
     def half(self, which: int, progress: Progress) -> _LearningCase:
         """Return the same of every second run."""
         return _LearningCase.compared(
@@ -251,11 +217,7 @@ def _comparing(
     """Return a comparison of forms, beside the library or not."""
     own = [e for e in effects_of(ship).values() if not e.missing(ship)] if library else []
     effects = [*own, *(each[0].effect for each in ways.values())]
-    facts_of = {run.name: run.facts for run in runs}
-    stops = [run.context.stop for run in seen]
-    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    stated = [(facts_of[run.name], ns) for run, ns in zip(seen, at_ns, strict=True)]
-    known = stated_facts(ship, stated).log_likelihood
+    known = stated_in(runs, seen, ship).log_likelihood
     comparing = Comparing(ship_runs(seen, ship), ship, effects, known)
     comparing.ways.update(ways)
     return comparing
@@ -276,7 +238,7 @@ def _span(seen: Sequence[Observation]) -> Span:
     depths = [run.context.depth_m or 0.0 for run in seen]
     several = len(seen) >= _MANY
     return Span(
-        min(_slowest(run) for run in seen),
+        min(lowest_m_s(run) for run in seen),
         max(run.speed_m_s for run in seen),
         max(run.duration_s for run in seen),
         log=any((kind == LOG).any() and (kind != LOG).any() for kind in rows),
@@ -287,14 +249,6 @@ def _span(seen: Sequence[Observation]) -> Span:
         if several and max(depths) > _DEEPER * min(depths) > 0.0
         else None,
     )
-
-
-def _slowest(run: Observation) -> float:
-    """Return about the speed at the end."""
-    late = run.along.rows.value[run.along.rows.kind == run.along.rows.kind.min()][-5:]
-    if run.along.rows.kind.min() > 1:  # places alone
-        return 0.3 * run.speed_m_s
-    return max(float(np.median(late)), 0.05 * run.speed_m_s)
 
 
 @dataclass(frozen=True)
@@ -432,7 +386,7 @@ class _Judged:
         assert fit.z is not None
         values = [q.prior.at(z) for q, z in zip(way.unknowns, fit.z[-len(way.unknowns) :])]
         run = case.comparing.runs.runs[0]
-        speed = np.linspace(_slowest(case.seen[0]), case.seen[0].speed_m_s, 50)
+        speed = np.linspace(lowest_m_s(case.seen[0]), case.seen[0].speed_m_s, 50)
         action = way.effect.action(run.frame, *values)
         if action.log_error:
             after = np.linspace(0.0, case.seen[0].duration_s, 50)
@@ -486,10 +440,8 @@ def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:
     z, sd = fit.z[-count:], fit.sd[-count:]
     _, _, precision = comparing.prior_of(fit)
     total = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:] + np.diag(precision)
-    scale = 1.0 / np.sqrt(np.diag(total))
-    inverse = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
     first = comparing.runs.size + len(fit.hypothesis.unknowns) - count
-    own = inverse[first : first + count, first : first + count]
+    own = inverse_of(total)[first : first + count, first : first + count]
     spread = np.sqrt(np.diag(own))
     slopes = np.array([q.prior.slope(at) for q, at in zip(way.unknowns, z)]) * sd / spread
     values = np.array([q.prior.at(at) for q, at in zip(way.unknowns, z)])
@@ -499,7 +451,8 @@ def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:
 def _digest(run: CoastRun) -> str:
     """Return what a run is known by: its readings."""
     found = hashlib.sha256()
-    for series in (run.window.speed_through_water, run.window.position):
+    window = run.window
+    for series in (window.speed_through_water, window.position, window.speed_over_ground):
         found.update(np.ascontiguousarray(series.time_ns).tobytes())
         found.update(np.ascontiguousarray(series.value).tobytes())
     return found.hexdigest()[:16]

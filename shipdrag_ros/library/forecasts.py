@@ -181,10 +181,8 @@ def _line(each: GlideForecast) -> str:
     head = f'{words.clock(each.after_s)} after the stop of {utc(each.stop_ns)}'
     if each.checked is None:
         return f'{head}: no forecast: {each.why}.'
-    said = '; '.join(
-        words.sentence(one.foretold, each.ship.mass_kg, one.was_s)
-        for one in each.checked.milestones
-    )
+    shown = words.apart_passed(each.checked.milestones, each.ship.mass_kg)
+    said = '; '.join(words.sentence(one.foretold, each.ship.mass_kg, one.was_s) for one in shown)
     inside = each.checked.inside
     judged = '' if inside is None else f' {inside:.0%} of what followed lies inside the bands.'
     beside = f' Not compared: {each.why}.' if each.why else ''
@@ -207,7 +205,8 @@ def forecast(runs: Sequence[RunResult], after_s: float | Sequence[float]) -> For
         If a time is not above 0, or there is none.
     """
     try:
-        times_s = np.atleast_1d(np.asarray(after_s, np.float64)).tolist()
+        given = np.atleast_1d(np.asarray(after_s, np.float64))
+        times_s = given.tolist() if given.ndim == 1 else []
     except (TypeError, ValueError):
         times_s = []
     if not times_s or not all(0.0 < each < math.inf for each in times_s):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from shipdrag_ros.learning.folder import check_name
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library.diagnosing import coasts_of
@@ -92,6 +93,7 @@ def learn_from(
     progress
         Called with each stage, how much of it is done, and of how much.
     """
+    check_name(name)
     refuse_overlaps(runs)
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)

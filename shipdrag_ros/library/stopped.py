@@ -130,12 +130,17 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
     speed, sd = float(series.value.mean()), float(series.value.std() / np.sqrt(len(series)))
     hull = HullNow.of_file(last.ship) if coastdown is None else _hull(coastdown)
     gliding = coastdown is not None and run is last and _goes_on(coastdown, speed)
+    now_ns = window.end_ns
+    if gliding and coastdown is not None and coastdown.end_ns >= window.start_ns:
+        assert coastdown.estimate is not None  # a mean lags behind a ship that slows
+        speed, sd = coastdown.estimate.last_speed_m_s, coastdown.estimate.last_speed_sigma_m_s
+        now_ns, measured = coastdown.estimate.end_ns, 'through water, estimated'
     assert last.replayed is not None
     found = if_stopped(
         hull,
         last.ship,
         speed,
-        window.end_ns,
+        now_ns,
         speed_sd_m_s=sd,
         gliding=gliding,
         speeds_m_s=last.replayed.parameters.forecast_speeds,
@@ -146,9 +151,11 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
 def _goes_on(coastdown: EndedCoastdown, speed_m_s: float) -> bool:
     """Say whether a coastdown goes on after its end, as nothing has driven her since."""
     assert coastdown.estimate is not None
-    undriven = coastdown.ended_by in (EndedBy.SPEED, EndedBy.RECORD_END)
+    if coastdown.ended_by is EndedBy.RECORD_END:
+        return True
     slack = _SLACK * coastdown.estimate.curve.speed_m_s[-1]
-    return undriven and speed_m_s < coastdown.estimate.last_speed_m_s + slack
+    slow = speed_m_s < coastdown.estimate.last_speed_m_s + slack
+    return coastdown.ended_by is EndedBy.SPEED and slow
 
 
 def _named(coastdown: EndedCoastdown) -> str:

@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K."""
+"""
+Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K.
+
+Frames for many viewers: encoded once, and never queued for one who is slow.
+
+The last frames are kept. A viewer who has fallen behind them gets the whole
+picture instead, and what he missed is counted; memory does not grow with
+viewers, and nobody waits for one.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +15,7 @@ import asyncio
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
@@ -30,11 +39,113 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from shipdrag_ros import __version__
+from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
-from shipdrag_ros.live.frames import Frames
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
+from shipdrag_ros.live.headline import Tone
 from shipdrag_ros.live.source import PictureFeed
+
+KEPT = 50  # frames: five seconds
+HISTORY = 'rows'  # part of a frame that adds up; all others replace what was
+
+
+class Frames:
+    """
+    The picture as it is now, and the frames that led to it.
+
+    Parameters
+    ----------
+    history
+        Returns all rows of the traces, for a viewer who has none.
+
+    Attributes
+    ----------
+    number
+        Of the last frame.
+    viewers
+        Who read now.
+    dropped
+        Frames that a slow viewer did not get.
+    """
+
+    def __init__(self, history: Callable[[], list[Any]]) -> None:
+        self.number = 0
+        self.viewers = 0
+        self.dropped = 0
+        self._history = history
+        self._parts: dict[str, str] = {}
+        self._kept: deque[bytes] = deque(maxlen=KEPT)
+        self._whole: tuple[int, bytes] | None = None
+        self._first = 1  # a viewer who has not seen this frame needs the whole picture
+        self._event = asyncio.Event()
+
+    def add(self, parts: Mapping[str, Any], rows: list[Any], *, anew: bool = False) -> None:
+        """
+        Make a frame of what has changed; nothing changed, no frame.
+
+        Parameters
+        ----------
+        parts
+            Everything but the traces, JSON by name.
+        rows
+            New rows of the traces.
+        anew
+            Everybody must forget what was: the picture jumps.
+        """
+        texts = {name: json_text(part, indent=None) for name, part in parts.items()}
+        changed = {name: text for name, text in texts.items() if self._parts.get(name) != text}
+        if not changed and not rows and not anew:
+            return
+        self._parts |= changed
+        self.number += 1
+        self._kept.append(self._frame('frame', changed, rows))
+        if anew:
+            self._first = self.number + 1
+            self._kept.clear()
+        elif len(self._kept) == KEPT:
+            self._first = max(self._first, self.number - KEPT + 1)
+        self._whole = None
+        event, self._event = self._event, asyncio.Event()
+        event.set()
+
+    def after(self, number: int | None) -> tuple[int, bytes]:
+        """
+        Return what a viewer lacks who has seen a frame, and the number he has then.
+
+        Parameters
+        ----------
+        number
+            None for a viewer who has seen nothing.
+        """
+        if number is None or number + 1 < self._first or number > self.number:
+            if number is not None:
+                self.dropped += max(self.number - number, 0)
+            return self.number, self.whole()
+        missing = self.number - number
+        return self.number, b''.join(list(self._kept)[len(self._kept) - missing :])
+
+    def whole(self) -> bytes:
+        """
+        Return the whole picture, as a viewer who comes gets it.
+        """
+        if self._whole is None or self._whole[0] != self.number:
+            self._whole = self.number, self._frame('whole', self._parts, self._history())
+        return self._whole[1]
+
+    async def more(self, number: int) -> None:
+        """
+        Wait until there is a frame after one.
+        """
+        while self.number <= number:
+            await self._event.wait()
+
+    def _frame(self, kind: str, parts: Mapping[str, str], rows: list[Any]) -> bytes:
+        body = ','.join(f'{json.dumps(name)}:{text}' for name, text in parts.items())
+        if rows or kind == 'whole':
+            body += f'{"," if body else ""}"{HISTORY}":{json_text(rows, indent=None)}'
+        return f'event: {kind}\nid: {self.number}\ndata: {{{body}}}\n\n'.encode()
+
 
 PAGE = Path(__file__).parent / 'page'
 TICK_S = 0.1
@@ -46,6 +157,7 @@ _ON_PAPER = (
 )
 _KEEP_S = 30 * 86400
 _KEPT = 32
+_FAILURES = 20  # that are logged
 FLEET = '/fleet'
 
 
@@ -131,6 +243,7 @@ class LivePage:
         self._token = token
         self._fleet = fleet
         self._mark = mark
+        self._failures: set[str] = set()
         self._started = {
             'version': __version__,
             'notes': list(notes),
@@ -185,9 +298,23 @@ class LivePage:
     async def _tick_for_ever(self) -> None:
         due_s = time.monotonic()
         while True:
-            self.tick()
+            try:
+                self.tick()
+            except Exception as error:  # a task that ends unseen would leave the picture as it was
+                self._fail(error)
             due_s = max(due_s + TICK_S, time.monotonic())
             await asyncio.sleep(due_s - time.monotonic())
+
+    def _fail(self, error: Exception) -> None:
+        """Say on the page that it shows nothing, and why; once in the log."""
+        why = f'{type(error).__name__}: {printable(str(error))}'
+        action = f'Nothing here is of now ({why}). Start the page again, and report this.'
+        said = {'tone': Tone.BAD.value, 'text': 'THE PAGE HAS FAILED', 'action': action}
+        self.frames.add({'headline': said}, [], anew=False)
+        if why not in self._failures and len(self._failures) < _FAILURES:
+            self._failures.add(why)
+            about = {'message': 'the page cannot be made', 'exception': error}
+            asyncio.get_running_loop().call_exception_handler(about)
 
     # the page
 

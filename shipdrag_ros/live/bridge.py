@@ -3,22 +3,24 @@
 What the bridge sees: all that was heard, as parts of a page.
 
 Plain figures in SI units; the page turns them into knots, kN and kW.
+
+A diagnosis for the page, from its document: that of a node's topic or of a bag.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import acceptance
-from shipdrag_ros.live.acceptance import Check, Held
-from shipdrag_ros.live.ahead import Ahead
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
+    Ahead,
     PagePart,
     at_usual_speed,
     curve_part,
@@ -26,7 +28,23 @@ from shipdrag_ros.live.figures import (
     ship_part,
     to_go_s,
 )
-from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
+from shipdrag_ros.live.headline import (
+    ENDED_S,
+    GOAL,
+    SILENT_S,
+    Check,
+    Ended,
+    Held,
+    Recent,
+    Situation,
+    course_check,
+    depth_check,
+    headline,
+    lead_check,
+    reciprocal_check,
+    rudder_check,
+    wind_check,
+)
 from shipdrag_ros.live.outputs import (
     Curve,
     Figure,
@@ -37,7 +55,6 @@ from shipdrag_ros.live.outputs import (
     read_speed,
 )
 from shipdrag_ros.live.trace import Trace
-from shipdrag_ros.live.verdicts import verdict_part
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
 from shipdrag_ros.messages.heard import (
     ERROR,
@@ -52,6 +69,45 @@ from shipdrag_ros.messages.heard import (
 )
 from shipdrag_ros.samples import MOTION_INPUTS, Channel
 from shipdrag_ros.ship import Ship
+
+_OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
+_SETS_SIZED = 3  # candidates whose sizes are shown
+_OTHERWISE = {'none': 'nothing is missing', 'unknown': 'something without a name'}
+
+
+def verdict_part(found: Mapping[str, Any]) -> dict[str, Any]:
+    """
+    Return what the page shows of a document.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError, AttributeError
+        If it is none of this package.
+    """
+    sized = [(effect['name'], effect) for effect in found['effects']]
+    if not sized:  # a set: what each would have
+        sized = [
+            (
+                ' + '.join(each['names']) + (f', {effect["name"]}' if each['names'][1:] else ''),
+                effect,
+            )
+            for each in found['candidates'][:_SETS_SIZED]
+            for effect in each['effects']
+        ]
+        sized = [(f'if {name}', effect) for name, effect in sized]
+    named = [(' + '.join(each['names']), each['probability']) for each in found['candidates']]
+    return {
+        'state': 'done',
+        'sentence': ' '.join(filter(None, [found['sentence'], found.get('caveat', '')])),
+        'sizes': [
+            f'{name}, {size["text"]}'.replace('_', ' ')
+            for name, effect in sized
+            for size in effect['parameters'].values()
+        ],
+        'probabilities': [[_OTHERWISE.get(name, name), float(share)] for name, share in named],
+        'decide': [_OPTION.sub('', each['text']) for each in found['advice']],
+    }
+
 
 PAST_RUNS = 50  # that are listed
 _MESSAGES = 20
@@ -94,7 +150,7 @@ class Bridge:
         self._ship = ship
         self._heard_s: float | None = None
         self._health: Health | None = None
-        self._recent = acceptance.Recent()
+        self._recent = Recent()
         self._courses: deque[tuple[int, float]] = deque()
         self._course_at_stop: float | None = None
         self._lead_at_stop: float | None = None
@@ -108,7 +164,7 @@ class Bridge:
         self._found: PagePart | None = None  # the last diagnosis
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
         self._noted: EventKind | None = None
-        self._unread = 0
+        self._unread: set[str] = set()
 
     # heard
 
@@ -128,13 +184,21 @@ class Bridge:
             case NodeMessage(name, payload):
                 try:
                     self._take_output(name, payload)
-                except (MalformedMessage, ValueError, RecursionError):
-                    self._unread += 1
+                except Exception as error:  # whatever a peer sends, the page goes on
+                    self._note_unread(name, error)
             case ShipFile(text):
                 try:
                     self._ship = Ship.from_yaml(text, subject="the node's ship file")
                 except ShipdragError as error:
                     self._notes.append((self._now_ns, str(error)))
+
+    def _note_unread(self, name: str, error: Exception) -> None:
+        """Say of each topic once that it brings what is not understood."""
+        if name not in self._unread:
+            self._unread.add(name)
+            why = f'{type(error).__name__}: {printable(str(error))}'
+            text = f'~/{name} brings what is not understood ({why}); find who publishes it'
+            self._notes.append((self._now_ns, text))
 
     def keep_alive(self, now_s: float) -> None:
         """
@@ -456,12 +520,12 @@ class Bridge:
         depth = self._recent.mean(Channel.DEPTH, second)
         rudder = self._recent.mean(Channel.RUDDER, second)
         checks = [
-            acceptance.lead_check(lead_s, now.ready_s),
-            acceptance.wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
-            acceptance.depth_check(depth and depth[0], speed_m_s, self._ship),
-            acceptance.rudder_check(rudder and rudder[0]),
-            acceptance.course_check(turned, coasting=coasting),
-            acceptance.reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
+            lead_check(lead_s, now.ready_s),
+            wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
+            depth_check(depth and depth[0], speed_m_s, self._ship),
+            rudder_check(rudder and rudder[0]),
+            course_check(turned, coasting=coasting),
+            reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
         ]
         checks = [self._unless_silent(check) for check in checks]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]

@@ -160,11 +160,7 @@ class Connection(H11Protocol):
         if len(self.connections) <= CONNECTIONS:
             return
         waiting = [each for each in self._others() if each.owes_request]
-        if waiting:
-            min(waiting, key=lambda each: each.since_s).leave()
-            return
-        transport.write(_FULL)
-        transport.close()
+        min(waiting, key=lambda each: each.since_s, default=self).leave()
 
     @property
     def owes_request(self) -> bool:
@@ -177,9 +173,11 @@ class Connection(H11Protocol):
                 yield each
 
     def leave(self) -> None:
-        """Close it at once, and give its place away at once."""
+        """Say that there are too many, and give its place away at once."""
         self.connections.discard(self)
-        self.transport.abort()
+        # its request may have come already, and was not read yet: who waits for an answer gets one
+        self.transport.write(_FULL)
+        self.transport.close()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""

@@ -56,7 +56,12 @@ async def serve_deltas(
     try:
         while True:
             await asyncio.sleep(EVERY_S)
-            found = b''.join(_line(each) for each in latest())
+            try:
+                found = b''.join(_line(each) for each in latest())
+            except Exception as error:  # a task that ends unseen would leave all without figures
+                about = {'message': 'no Signal K deltas now', 'exception': error}
+                asyncio.get_running_loop().call_exception_handler(about)
+                found = b''
             if not found:
                 continue
             for writer in list(listeners):

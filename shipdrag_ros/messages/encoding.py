@@ -282,11 +282,7 @@ _ENCODERS: dict[Channel, _Encoder] = {
             'position_covariance[0]': _variance_y,
             'position_covariance_type': _kind_of_covariance,
         },
-        {
-            'altitude': nan,
-            'status.status': types.class_of('sensor_msgs/msg/NavSatStatus').STATUS_FIX,
-            'status.service': types.class_of('sensor_msgs/msg/NavSatStatus').SERVICE_UNKNOWN,
-        },
+        {'altitude': nan},  # and 0: STATUS_FIX, SERVICE_UNKNOWN
     ),
     Channel.HEADING: _Encoder(
         types.QUATERNION,
@@ -303,6 +299,6 @@ _ENCODERS: dict[Channel, _Encoder] = {
         types.RANGE,
         'base_link',
         {'range': _x, 'variance': _variance_x},
-        {'radiation_type': types.class_of(types.RANGE).ULTRASOUND, 'max_range': inf},
+        {'max_range': inf},  # and 0: ULTRASOUND
     ),
 }

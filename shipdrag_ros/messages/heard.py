@@ -7,6 +7,7 @@ The same whether it comes over topics or from a bag that is played.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -84,14 +85,15 @@ class Status:
 
     def number(self, key: str) -> float | None:
         """
-        Return a figure, None where there is none; the unit need not be given.
+        Return a finite figure, None where there is none; the unit need not be given.
         """
         for name, text in self.values.items():
             if name == key or name.partition(' [')[0] == key:
                 try:
-                    return float(text)
+                    value = float(text)
                 except ValueError:
                     return None
+                return value if math.isfinite(value) else None
         return None
 
 

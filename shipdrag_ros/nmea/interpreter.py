@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
-from shipdrag_ros.nmea.clock import WireClock
-from shipdrag_ros.nmea.reading import START, Sentence, SentenceReader, SentenceSource, best
+from shipdrag_ros.nmea.clock import Stamped, WireClock
+from shipdrag_ros.nmea.reading import START, SentenceReader, SentenceSource, best
 from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting
 from shipdrag_ros.samples import Block, Channel
 
@@ -120,7 +120,9 @@ class Interpreter:
 
     def messages(self, text: str, address: str, read_ns: int) -> list[EncodedMessage]:
         """
-        Return what a line says of the inputs.
+        Return what is known of the inputs with this line.
+
+        Lines of a backlog that state no time are held until the next one that does.
 
         Parameters
         ----------
@@ -141,7 +143,10 @@ class Interpreter:
             if isinstance(sentence, str):
                 self.rejected[sentence] += 1
             else:
-                found += self._of_sentence(sentence, address, read_ns)
+                self.sentences += 1
+                clock = self._clocks.setdefault(address, WireClock())
+                for stamped in clock.stamped(sentence, read_ns):
+                    found += self._of_sentence(stamped, address)
         return found
 
     def feeding(self) -> dict[str, str]:
@@ -154,9 +159,8 @@ class Interpreter:
                 by_input.setdefault(channel.input, {})[str(choice.held[0])] = None
         return {name: ', '.join(sources) for name, sources in by_input.items()}
 
-    def _of_sentence(self, sentence: Sentence, address: str, read_ns: int) -> list[EncodedMessage]:
-        self.sentences += 1
-        stamp_ns = self._clocks.setdefault(address, WireClock()).stamp_ns(sentence, read_ns)
+    def _of_sentence(self, stamped: Stamped, address: str) -> list[EncodedMessage]:
+        sentence, stamp_ns, read_ns = stamped
         if stamp_ns < read_ns:
             _count(self.behind, address)
         if sentence.kind not in READERS:

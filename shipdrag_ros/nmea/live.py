@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import serial
 
+from shipdrag_ros.errors import reason_of
 from shipdrag_ros.nmea.address import Address, Way
 
 LINES_A_SECOND = 1000.0  # a serial line of 38400 baud brings about 60
@@ -190,8 +191,8 @@ class LineListener:
                     self.counts.problem = ''
                     self._hear(read)
                 why = 'the other side closed the connection'
-            except (OSError, serial.SerialException) as error:
-                why = getattr(error, 'strerror', None) or str(error)
+            except Exception as error:  # a thread that ends unseen would not be tried again
+                why = reason_of(error)
             failures = 0 if self.counts.opened > opened else failures + 1
             self.counts.problem = f'{why}; opened again and again until it works'
             self._closing.wait(_RETRY_S[min(failures, len(_RETRY_S) - 1)])

@@ -146,8 +146,8 @@ class Diagnosing:
         assert running.coastdown is not None
         try:
             answer = self._answer(task)
-        except (OSError, subprocess.SubprocessError, ValueError) as error:
-            answer = {'state': 'failed', 'reason': str(error)}
+        except Exception as error:  # nobody asks this thread: it would seem to run for ever
+            answer = {'state': 'failed', 'reason': str(error) or type(error).__name__}
         if 'reason' in answer:
             state = DiagnosisState(answer['state'])
             self._status = replace(running, state=state, reason=answer['reason'])

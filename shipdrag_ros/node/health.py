@@ -222,7 +222,7 @@ def recording_status(status: RecordingStatus) -> Status:
     Say how the recording stands.
     """
     progress = status.progress
-    level = WARN if status.lost or status.slow else OK
+    level = WARN if status.lost or status.slow or status.untidy else OK
     if status.state is RecordingState.FAILED:
         level = ERROR
     values: dict[str, object] = {'state': status.state.value}
@@ -237,6 +237,8 @@ def recording_status(status: RecordingStatus) -> Status:
             'messages lost': status.lost,
             'parts left uncompacted': progress.uncompacted,
         }
+        if progress.why_uncompacted:
+            values['why left uncompacted'] = progress.why_uncompacted
     values['quota'] = status.kept
     values['memory for a later start'] = 'too small' if status.ring_cut else 'sufficient'
     return Status.of('recording', level, status.text, values)

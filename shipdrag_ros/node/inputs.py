@@ -4,15 +4,27 @@ Input topics: found in the graph, subscribed as bytes, counted.
 
 Nobody has to say which of the accepted types a driver publishes, or whether it
 sends reliably, and nobody is left wondering why a topic is silent.
+
+What waits at all inputs, in the order in which it came.
+
+An executor takes one message of each topic in turn. After a pause, a topic at
+1 Hz would so be ten times further in time than one at 10 Hz, whose readings
+would then be rejected as late.
+
+What publishers sent and this node never got, from the sequence numbers of DDS.
+
+A middleware says that a queue ran over, if at all, only where it notices; the
+numbers that a publisher gives its messages show every hole.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
+import sys
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from statistics import median
 from typing import Any, NamedTuple
 
@@ -38,7 +50,108 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.judging import Counts, InputFacts
-from shipdrag_ros.node.losses import Sequences
+
+Publishers = Callable[[], frozenset[str]]
+
+
+class Sequences:
+    """
+    Holes in the sequence numbers of the publishers of one topic.
+
+    Parameters
+    ----------
+    publishers
+        Returns the identities of the publishers there are now.
+
+    Attributes
+    ----------
+    lost
+        Messages that were sent and not heard.
+    numbered
+        Whether the middleware gives numbers at all.
+
+    Notes
+    -----
+    A message does not say who sent it. Its number is taken to follow the nearest one
+    below it, which counts right as long as no publisher comes while another loses messages.
+    What was sent before the first message heard is not lost: nobody listened.
+    """
+
+    def __init__(self, publishers: Publishers) -> None:
+        self.lost = 0
+        self.numbered = False
+        self._publishers = publishers
+        self._known: frozenset[str] = frozenset()
+        self._last: list[int] = []  # of each stream, the one heard longest ago first
+
+    def take(self, number: int | None) -> None:
+        """
+        Take the sequence number of the next message, None if it has none.
+        """
+        if number is None:
+            return
+        self.numbered = True
+        if not self._known:
+            self.look()
+        before = max((last for last in self._last if last < number), default=None)
+        if before is not None and number != before + 1:
+            self.look()  # a hole, or a publisher that nobody knew
+            if len(self._last) < len(self._known):
+                before = None
+            else:
+                before = max((last for last in self._last if last < number), default=None)
+        if before is not None:
+            self.lost += number - before - 1
+            self._last.remove(before)
+        self._last.append(number)
+
+    def look(self) -> None:
+        """
+        Note which publishers there are.
+        """
+        now = self._publishers()
+        if self._known - now:
+            self._last.clear()  # whose stream has ended is not known
+        self._known = now
+        del self._last[: max(len(self._last) - max(len(now), 1), 0)]
+
+
+MOST = 200  # messages of a topic at once: some tens of ms, so that timers are kept
+
+
+class Mailbox:
+    """
+    The messages of some topics, merged.
+
+    Parameters
+    ----------
+    topics
+        Where they wait.
+    ahead
+        Whether to take what the executor has not come to. Not under simulated time: /clock
+        waits among its messages, and what overtakes it seems to come from the future.
+    """
+
+    def __init__(self, topics: Sequence[InputTopic], *, ahead: bool) -> None:
+        self._topics = topics
+        self._ahead = ahead
+        self._waiting: list[HeardMessage] = []
+
+    def take(self) -> list[HeardMessage]:
+        """
+        Return what has come so far, or the older part of it where that is much.
+        """
+        until_ns = sys.maxsize
+        for topic in self._topics:
+            taken = topic.take(MOST, ahead=self._ahead)
+            self._waiting += taken
+            if len(taken) == MOST:  # there may be more, that the others must wait for
+                until_ns = min(until_ns, taken[-1].received_ns)
+        self._waiting.sort(key=lambda heard: heard.received_ns)
+        ready = sum(heard.received_ns <= until_ns for heard in self._waiting)
+        taken, self._waiting = self._waiting[:ready], self._waiting[ready:]
+        return taken
+
 
 # As deep as Fast DDS goes unless set otherwise, some seconds of a flood: one estimate may take
 # as long as many messages.

@@ -43,8 +43,7 @@ from shipdrag_ros.node.health import (
     recording_status,
     state_status,
 )
-from shipdrag_ros.node.inputs import InputTopic, message_class
-from shipdrag_ros.node.mailbox import Mailbox
+from shipdrag_ros.node.inputs import InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder

@@ -24,6 +24,8 @@ from typing import NamedTuple
 
 from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
 from shipdrag_ros.bags.retention import Keep, Removed, Retention
+from shipdrag_ros.display import printable
+from shipdrag_ros.errors import reason_of
 from shipdrag_ros.messages import EncodedMessage, OutputMessage
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -147,7 +149,9 @@ class Housekeeping:
 
     def __init__(self, directory: Path, keep: Keep) -> None:
         self._retention = Retention(directory, keep)
+        self._directory = directory
         self._keep = keep
+        self._failure = ''
         self._removed: deque[Removed] = deque(maxlen=1000)
         self._ending = threading.Event()
         # a disk that hangs must not keep the process
@@ -178,9 +182,19 @@ class Housekeeping:
         """
         self._ending.set()
 
+    @property
+    def problem(self) -> str:
+        """Why old recordings cannot be removed as they should, and what to do; '' if they can."""
+        return self._failure or self._retention.problem
+
     def _run(self) -> None:
         while True:
-            self._removed += self._retention.tidy(now_s=time.time())
+            try:
+                self._removed += self._retention.tidy(now_s=time.time())
+                self._failure = ''
+            except Exception as error:  # a thread that ends unseen would let the disk fill
+                where = printable(str(self._directory))
+                self._failure = f'{where} ({reason_of(error)}); look at it, and at its disk'
             if self._ending.wait(EVERY_S):
                 return
 
@@ -209,6 +223,8 @@ class RecordingStatus:
         begin with; its replay may then differ from the live figures at first.
     kept
         What is removed to keep room on the disk.
+    untidy
+        Why that cannot be done, and what to do; '' where it can.
     """
 
     state: RecordingState
@@ -216,10 +232,16 @@ class RecordingStatus:
     lost: int
     ring_cut: bool
     kept: str
+    untidy: str
 
     @property
     def text(self) -> str:
         """One line for a log or for an operator."""
+        untidy = f'; old recordings cannot be removed: {self.untidy}' if self.untidy else ''
+        return f'{self._text}{untidy}'
+
+    @property
+    def _text(self) -> str:
         if self.progress is None:
             return 'not recording'
         lost = f'{self.lost} message(s) lost'
@@ -385,7 +407,8 @@ class Recorder:
             state = RecordingState.FAILED
         else:
             state = RecordingState.OFF if self._recording is None else RecordingState.RECORDING
-        return RecordingStatus(state, progress, lost, self._ring.cut, self._housekeeping.text)
+        kept = self._housekeeping
+        return RecordingStatus(state, progress, lost, self._ring.cut, kept.text, kept.problem)
 
     def _begin(self) -> DurableRecording:
         stamp = datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')

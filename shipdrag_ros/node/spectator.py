@@ -11,7 +11,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Self
 
 import rclpy
@@ -21,6 +20,8 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from shipdrag_ros.display import printable
+from shipdrag_ros.errors import reason_of
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Source, decode
 from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
 from shipdrag_ros.messages.heard import read_health as decode_health
@@ -28,6 +29,7 @@ from shipdrag_ros.messages.topics import RESISTANCE_CURVE
 from shipdrag_ros.node.inputs import is_installed, message_class
 
 LOOK_S = 1.0
+SAID_S = 10.0  # a message that cannot be shown is said so often at most
 ANSWER_S = 5.0  # that a mark waits for the node
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
 _RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
@@ -90,12 +92,7 @@ class Spectator:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._context.try_shutdown()
         self._thread.join()
         self._ros.destroy_node()
@@ -116,11 +113,17 @@ class Spectator:
         return str(asked.result().message)
 
     def _spin(self) -> None:
-        try:
-            while self._context.ok():
+        while self._context.ok():
+            try:
                 self._executor.spin_once(timeout_sec=0.5)
-        except ExternalShutdownException:
-            pass
+            except ExternalShutdownException:
+                return
+            except Exception as error:  # of what one peer sent; the next may be sound
+                why = printable(reason_of(error))
+                self._ros.get_logger().error(
+                    f'a message is not shown: {why}; find who publishes it',
+                    throttle_duration_sec=SAID_S,
+                )
 
     def _look(self) -> None:
         """Find the node by the curve that it offers, and hear it."""

@@ -12,23 +12,24 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.special import log_ndtr
 
-from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference import decision
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis
-from shipdrag_ros.inference.gaussian import products_of, substitute
+from shipdrag_ros.inference.gaussian import products_of
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
-from shipdrag_ros.inference.noise import Noise, whiten
-from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.linear import Families, solve, whitened_products
+from shipdrag_ros.inference.noise import whiten
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
 from shipdrag_ros.posterior.hypotheses import (
     IN_GROUND,
@@ -36,16 +37,16 @@ from shipdrag_ros.posterior.hypotheses import (
     IN_SPEED,
     IN_TIME,
     Explanation,
-    PriorFamilies,
     RunSight,
     RunTable,
     ShipRuns,
     half,
 )
-from shipdrag_ros.posterior.laplace import of_family
+from shipdrag_ros.posterior.problem import EXACT
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.effect import Effect, Scope
 
 _ITERATIONS = 8  # of Gauss and Newton
@@ -57,59 +58,36 @@ _AT_ONCE = 100  # ways scored together: each is compared with each
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
-_LIKELY = 0.03  # probability of names that may leave something smooth
-_TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
-_RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
+LIKELY = 0.03  # probability of names that may leave something smooth
+_FEWEST = 5  # rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
-_EXACT = 1e16  # precision of what does not act
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
-@compiled
-def _products(
-    along: Float64, rest: Float64, rows: Rows, white: Noise, steady: int, settings: Settings
-) -> tuple[Float64, Float64]:
-    """Return products of whitened lines, (s, l, l), and log determinants (s,)."""
-    s, lines = len(settings.weight), len(along)
-    found, log_det = np.empty((s, lines, lines)), np.empty(s)
-    for k in range(s):
-        table = along.copy()
-        log_det[k] = whiten(rows, table, noise_of(settings, k, rows, white, steady))
-        found[k] = products_of(table) + rest
-    return found, log_det
+class WeighedFit:
+    """What has been fitted of a hypothesis; `z` and `sd` are of the unknowns of its effects."""
+
+    hypothesis: Explanation
+    log_evidence: float
+    z: Float64 | None
+    sd: Float64 | None
+
+    @property
+    def names(self) -> Names:
+        """As the decision takes them."""
+        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
+
+    @property
+    def log_weight(self) -> float:
+        """Logarithm of evidence times prior odds."""
+        return self.log_evidence + self.hypothesis.log_odds
 
 
-@compiled
-def _solve(
-    products: Float64, mean: Float64, precision: Float64, first: int, count: int
-) -> tuple[Float64, Float64, Float64]:
-    """
-    Return log evidence (s, f) and step (s, f, p) of linear models.
-
-    With the variance (s, f, count) of some unknowns.
-    """
-    s, f, p = len(products), len(mean), len(products[0]) - 1
-    logs = np.full((s, f), -np.inf)
-    steps, variances = np.zeros((s, f, p)), np.zeros((s, f, count))
-    unit = np.zeros((p, count))
-    for a in range(count):
-        unit[first + a, a] = 1.0
-    for k in range(s):
-        for q in range(f):
-            solved, log, step, lower, scale = of_family(products[k], mean[q], precision[q])
-            if not solved or not np.isfinite(log):
-                continue
-            logs[k, q], steps[k, q] = log, step
-            if count == 0:
-                continue
-            covariance = substitute(lower, scale, unit)
-            for a in range(count):
-                variances[k, q, a] = covariance[first + a, a]
-    return logs, steps, variances
+Fit = TypeVar('Fit', bound=WeighedFit)
 
 
 @dataclass
-class Fitted:
+class Fitted(WeighedFit):
     """
     A hypothesis on its way to its best, and then its evidence.
 
@@ -135,24 +113,13 @@ class Fitted:
     z: Float64 | None = None
     sd: Float64 | None = None
 
-    @property
-    def names(self) -> Names:
-        """As the decision takes them."""
-        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
-
-    @property
-    def log_weight(self) -> float:
-        """Logarithm of evidence times prior odds."""
-        return self.log_evidence + self.hypothesis.log_odds
-
 
 class _RunNoise(NamedTuple):
-    """Noise of a run: settings, weights of their prior (logarithm), and the usual setting."""
+    """Noise of a run, weights of the prior of its settings (logarithm), and the usual one."""
 
-    settings: Settings
+    learnt: NoisePosterior
     log_prior: Float64
     typical: Settings
-    learnt: bool
 
 
 class RunResidual(NamedTuple):
@@ -175,20 +142,19 @@ class RunResidual(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ComparedHypotheses:
+class ComparedHypotheses(Generic[Fit]):
     """
     All hypotheses with their evidence.
 
     Attributes
     ----------
-    runs, effects
+    effects
     fitted
         The best of each.
     """
 
-    runs: ShipRuns
     effects: tuple[Effect, ...]
-    fitted: tuple[Fitted, ...]
+    fitted: tuple[Fit, ...]
 
     @cached_property
     def probability(self) -> dict[Names, float]:
@@ -199,9 +165,9 @@ class ComparedHypotheses:
         )
 
     @cached_property
-    def best(self) -> dict[Names, Fitted]:
+    def best(self) -> dict[Names, Fit]:
         """The likeliest way of each set of names."""
-        found: dict[Names, Fitted] = {}
+        found: dict[Names, Fit] = {}
         for each in self.fitted:
             old = found.get(each.names)
             if old is None or each.log_weight > old.log_weight:
@@ -272,7 +238,7 @@ class Comparing:
         for way in kept:
             self.ways[way.effect.name].append(way)
 
-    def compare(self) -> ComparedHypotheses:
+    def compare(self) -> ComparedHypotheses[Fitted]:
         """
         Fit and weigh nothing, each effect, pairs where they may count, and something smooth.
         """
@@ -299,7 +265,7 @@ class Comparing:
             self._climb(differing)
             every += self._weigh(differing)
         every += self._weigh(self._beside(every))
-        return ComparedHypotheses(self.runs, self.effects, tuple(every))
+        return ComparedHypotheses(self.effects, tuple(every))
 
     def promising(self) -> list[EffectWay]:
         """
@@ -340,7 +306,7 @@ class Comparing:
         """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
         families = self.runs.priors(fit.hypothesis, fit.at)
         total = np.asarray(sum(self.equations(fit)), np.float64)
-        logs, _, _ = _solve(total[None], families.mean, families.precision, 0, 0)
+        logs, _, _ = solve(total[None], families.mean, families.precision, 0, 0)
         best = int(np.argmax(logs[0] + families.log_chance))
         return best, families.mean[best], families.precision[best]
 
@@ -358,6 +324,10 @@ class Comparing:
         whitener = self.white(j, table._replace(along=lines), self.runs.runs[j]).T
         result: Float64 = np.sqrt(np.sum(np.linalg.inv(whitener) ** 2, axis=1))
         return result
+
+    def water_m_s(self, j: int) -> float:
+        """Return the usual size of the slow motion of the water in a run."""
+        return self.noise[j].learnt.slow.water_m_s
 
     @property
     def as_stated(self) -> Fitted:
@@ -431,7 +401,7 @@ class Comparing:
         shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
         rows, model = run.model.rows, run.model
         by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
-        late = by_log & (rows.time_s > _RUN_DOWNS * max(model.forces.tau_s, 1.0))
+        late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))
         time, lines = rows.time_s[late], shown[:, late]
         if len(time) < _FEWEST or not np.isfinite(lines).all():
             return math.nan
@@ -506,7 +476,7 @@ class Comparing:
             - 0.5 * (precision * mean**2).sum(axis=1)
         )
         cost = float(total[0, 0] - 2.0 * np.logaddexp.reduce(density))
-        logs, steps, _ = _solve(total[None], mean, precision, 0, 0)
+        logs, steps, _ = solve(total[None], mean, precision, 0, 0)
         if not np.isfinite(logs).any():
             return math.inf, np.zeros(len(at))
         weight = np.exp(logs[0] + log_chance - (logs[0] + log_chance).max())
@@ -521,8 +491,10 @@ class Comparing:
 
     def _of_run(self, j: int, table: RunTable, settings: Settings) -> tuple[Float64, Float64]:
         model = self.runs.runs[j].model
-        rest = products_of(np.ascontiguousarray(table.rest))
-        return _products(table.along, rest, model.rows, table.white, model.steady, settings)
+        products, log_det = whitened_products(
+            table.along, model.rows, table.white, model.steady, settings
+        )
+        return products + products_of(np.ascontiguousarray(table.rest)), log_det
 
     def _score(
         self, nothing: Fitted, ways: Sequence[EffectWay]
@@ -622,7 +594,9 @@ class Comparing:
                 prior = self.runs.priors(replace(self.base, smooth=where), nothing.at)
                 for mean, precision in zip(prior.mean, prior.precision):
                     means.append(np.concatenate([mean[table.place], np.zeros(q)]))
-                    precisions.append(np.concatenate([precision[table.place], np.full(q, _EXACT)]))
+                    precisions.append(
+                        np.concatenate([precision[table.place], np.full(q, EXACT**-2.0)])
+                    )
             for i, which in enumerate(taught):
                 amount, held = _amount(ways[which])
                 mean, precision = means[0].copy(), precisions[0].copy()
@@ -632,7 +606,7 @@ class Comparing:
             for i in range(len(smooth)):
                 mean, precision = means[0].copy(), precisions[0].copy()
                 first = p + len(taught) + i * len(smooth[0])
-                precision[first : first + len(smooth[0])] = _TYPICAL_SMOOTH**-2.0
+                precision[first : first + len(smooth[0])] = priors.SMOOTH_SIZES[1] ** -2.0
                 means.append(mean)
                 precisions.append(precision)
             seen = Seen(
@@ -644,11 +618,10 @@ class Comparing:
                 run.model.steady,
             )
             learnt = learn(seen, run.model.speed_m_s)
-            rest = np.zeros((len(lines), len(lines)))
-            products, log_det = _products(
-                lines, rest, run.model.rows, table.white, run.model.steady, learnt.settings
+            products, log_det = whitened_products(
+                lines, run.model.rows, table.white, run.model.steady, learnt.settings
             )
-            logs, _, _ = _solve(products, seen.mean, seen.precision, 0, 0)
+            logs, _, _ = solve(products, seen.mean, seen.precision, 0, 0)
             alike = np.logaddexp.reduce(logs, axis=1) - 0.5 * log_det - math.log(len(means))
             noise.append(_noise(learnt, alike))
         self.noise = noise
@@ -670,24 +643,25 @@ class Comparing:
             kept[way.mode] = kept.get(way.mode, 0) + 1
             if kept[way.mode] > _STARTS:
                 continue
-            hypothesis = Explanation((*self.stated, way))
-            at = self._widened(nothing, hypothesis)
+            fit = self._begun(nothing, Explanation((*self.stated, way)), float(amounts[i]))
             # at the best of nothing, nuisances stand for the effect as far as they can
-            at[: self.runs.size] = self.runs.as_stated(nothing.at)
-            first = self.runs.size + len(self.base.unknowns)
-            at[first : first + len(way.start)] = way.start
-            at[first] = way.resized(float(amounts[i]))
-            found.append(Fitted(hypothesis, at))
+            fit.at[: self.runs.size] = self.runs.as_stated(nothing.at)
+            found.append(fit)
         return found
+
+    def _begun(self, base: Fitted, hypothesis: Explanation, amount: float) -> Fitted:
+        """Return where the fit of one more way begins, at so much of its trace."""
+        way, at = hypothesis.ways[-1], self._widened(base, hypothesis)
+        first = self.runs.size + len(base.hypothesis.unknowns)
+        at[first : first + len(way.start)] = way.start
+        at[first] = way.resized(amount)
+        return Fitted(hypothesis, at)
 
     def _widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
         """Return where a fit of a larger hypothesis begins."""
         at = np.zeros(self.runs.width(hypothesis))
-        size = self.runs.size
-        at[:size] = base.at[:size]
-        q = len(base.hypothesis.unknowns)
-        own = base.at[size : size + q]
-        at[size : size + q] = own
+        kept = self.runs.size + len(base.hypothesis.unknowns)
+        at[:kept] = base.at[:kept]
         return at
 
     def _weigh(self, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -718,7 +692,7 @@ class Comparing:
         log_evidence, weights, moments = 0.0, [], []
         for j, table in enumerate(fit.tables):
             noise = self.noise[j]
-            products, log_det = self._of_run(j, table, noise.settings)
+            products, log_det = self._of_run(j, table, noise.learnt.settings)
             whole = np.repeat(usual[None], len(products), axis=0)
             for k in range(len(products)):
                 _put(whole[k], products[k] - typical[j][0], table.place)
@@ -740,11 +714,11 @@ class Comparing:
         fit.sd = np.sqrt(np.maximum(weight @ (variance + z**2) - mean**2, 0.0))
 
     def _evidence(
-        self, fit: Fitted, products: Float64, families: PriorFamilies
+        self, fit: Fitted, products: Float64, families: Families
     ) -> tuple[Float64, Float64, Float64]:
         """Return log evidence (s,), and mean and variance of the effects' unknowns (s, q)."""
         first, q = self.runs.size, len(fit.hypothesis.unknowns)
-        logs, steps, variances = _solve(products, families.mean, families.precision, first, q)
+        logs, steps, variances = solve(products, families.mean, families.precision, first, q)
         logs = logs + families.log_chance
         own = steps[..., first : first + q]
         for i in half(fit.hypothesis, 0):
@@ -758,7 +732,7 @@ class Comparing:
 
     def _pairs(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return pairs of the likeliest names with all others, that the linear score allows."""
-        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        found = ComparedHypotheses(self.effects, tuple(fits))
         top = max(fit.log_weight for fit in fits)
         names = [each for each in found.probability if each not in (NONE, UNKNOWN)][:_PAIRED]
         # as each was found alone, and as it is looked for at first
@@ -783,12 +757,7 @@ class Comparing:
             for gain, amount, hypothesis in zip(gains + base.log_weight, amounts, hypotheses):
                 if gain < top - _PAIR_NATS:
                     continue
-                way = hypothesis.ways[-1]
-                at = self._widened(base, hypothesis)
-                to = self.runs.size + len(base.hypothesis.unknowns)
-                at[to : to + len(way.start)] = way.start
-                at[to] = way.resized(float(amount))
-                tried.append((float(gain), Fitted(hypothesis, at)))
+                tried.append((float(gain), self._begun(base, hypothesis, float(amount))))
         kept: dict[Names, Fitted] = {}
         for _, fit in sorted(tried, key=lambda each: -each[0]):
             kept.setdefault(fit.hypothesis.names, fit)
@@ -799,7 +768,7 @@ class Comparing:
         count = len(self.runs.runs)
         if count < 2 or not math.isfinite(self.log_differs):
             return []
-        best = ComparedHypotheses(self.runs, self.effects, tuple(fits)).best
+        best = ComparedHypotheses(self.effects, tuple(fits)).best
         of_hull = [
             best[e.name,] for e in self.effects if e.scope is Scope.HULL and (e.name,) in best
         ]
@@ -819,10 +788,10 @@ class Comparing:
 
     def _beside(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return likely names with something smooth besides, linear where the names are best."""
-        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        found = ComparedHypotheses(self.effects, tuple(fits))
         tried = []
         for names, probability in found.probability.items():
-            if names in (NONE, UNKNOWN) or probability < _LIKELY:
+            if names in (NONE, UNKNOWN) or probability < LIKELY:
                 continue
             base = found.best[names]
             for where in self.smooth:
@@ -850,7 +819,7 @@ def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
     log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt.settings, log_prior, learnt.typical, learnt.learnt)
+    return _RunNoise(learnt, log_prior, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:

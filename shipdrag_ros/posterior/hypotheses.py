@@ -18,21 +18,21 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
+from shipdrag_ros.inference.linear import Families
 from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.effects import EffectWay, retardation_of
 from shipdrag_ros.posterior.motion import EXTRAS
-from shipdrag_ros.posterior.problem import RunModel
+from shipdrag_ros.posterior.problem import EXACT, RunModel
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 """Where something smooth without a name may be."""
-_FORMS, _SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
-_FROZEN = 1e16  # precision of what is as it is stated
+_FORMS, SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 _PORT, _HEADING = EXTRAS, EXTRAS + 1  # behind the extras: place to port, and first heading
@@ -190,16 +190,6 @@ class _Asked:
         return run.simulate(actions, np.array([speed for _, speed in self.numbers]))
 
 
-class PriorFamilies(NamedTuple):
-    """
-    Families of one hypothesis, (f, p) and (f,).
-    """
-
-    mean: Float64
-    precision: Float64
-    log_chance: Float64
-
-
 class RunTable(NamedTuple):
     """
     Rows of one run, linear about some unknowns.
@@ -304,10 +294,10 @@ class ShipRuns:
         """Return the number of unknowns of a hypothesis."""
         found = self.size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
         if hypothesis.smooth not in ('', IN_SPEED):
-            found += _SMOOTH * len(self.runs)
+            found += SMOOTH * len(self.runs)
         return found
 
-    def priors(self, hypothesis: Explanation, now: Float64) -> PriorFamilies:
+    def priors(self, hypothesis: Explanation, now: Float64) -> Families:
         """
         Return the families of a hypothesis; means count from some unknowns (p,).
         """
@@ -335,7 +325,7 @@ class ShipRuns:
                     k = self.coefficients
                     mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
                     if hypothesis.frozen:
-                        precision[self._stated] = _FROZEN
+                        precision[self._stated] = EXACT**-2.0
                     precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
                     for i, each in enumerate(components):
                         if which >> i & 1:
@@ -343,7 +333,7 @@ class ShipRuns:
                     means.append(mean)
                     precisions.append(precision)
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
-        return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
+        return Families(np.array(means) - now, np.array(precisions), np.log(chances))
 
     @cached_property
     def _stated(self) -> Int64:
@@ -366,8 +356,8 @@ class ShipRuns:
             precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0
             mean[place[k + motion.STOP]] = run.stop_s
             precision[place[k + _PORT]] = 1e-6  # of where she was, nothing is known
-            precision[place[k + _HEADING]] = max(run.heading_sd_rad, 1e-8) ** -2.0
-            precision[place[k + _SCATTER]] = max(run.scatter, 1e-8) ** -2.0
+            precision[place[k + _HEADING]] = max(run.heading_sd_rad, EXACT) ** -2.0
+            precision[place[k + _SCATTER]] = max(run.scatter, EXACT) ** -2.0
             at = place[k + motion.CURRENT]
             if precision[at] < 1e10:
                 precision[at] = priors.CALM_CURRENT.sd**-2.0
@@ -486,7 +476,7 @@ class ShipRuns:
         forms = _FORMS * len(hypothesis.forms)
         if hypothesis.smooth in ('', IN_SPEED):
             return np.arange(forms)
-        return np.concatenate([np.arange(forms), forms + _SMOOTH * j + np.arange(_SMOOTH)])
+        return np.concatenate([np.arange(forms), forms + SMOOTH * j + np.arange(SMOOTH)])
 
     def smooth(self, j: int, where: str, at: Float64) -> Float64:
         """
@@ -501,17 +491,17 @@ class ShipRuns:
             return np.zeros((0, len(rows.time_s)))
         if where == IN_TIME:
             return _force_in_time(run, forces, own)
-        found = np.zeros((_SMOOTH, len(rows.time_s)))
+        found = np.zeros((SMOOTH, len(rows.time_s)))
         if where == IN_LOG:
             by_log = rows.kind == LOG
-            found[:, by_log] = u_0 * bsplines(run.over_run, _SMOOTH)[:, by_log]
+            found[:, by_log] = u_0 * bsplines(run.over_run, SMOOTH)[:, by_log]
             return found
         ground, position = rows.kind == OVER_GROUND, rows.kind == POSITION
-        found[:, ground] = u_0 * bsplines(run.over_run, _SMOOTH)[:, ground]
+        found[:, ground] = u_0 * bsplines(run.over_run, SMOOTH)[:, ground]
         time = np.linspace(rows.time_s[0], rows.time_s[-1], 400)
-        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), _SMOOTH)
+        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), SMOOTH)
         way = np.cumsum(bumps, axis=1) * (time[1] - time[0])
-        for i in range(_SMOOTH):
+        for i in range(SMOOTH):
             found[i, position] = u_0 * np.interp(rows.time_s[position], time, way[i])
         return found
 
@@ -558,16 +548,16 @@ def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64) -> Float6
     known, columns = motion.shapes_at(forces, u[:1])
     r_0 = float(known[0, 0] + own[:k] @ columns[0, :, 0])
     left = np.exp(-damping * step)
-    force = -r_0 * bsplines(time / end, _SMOOTH) / inertia
+    force = -r_0 * bsplines(time / end, SMOOTH) / inertia
     speed = np.zeros_like(force)
     for i in range(1, len(time)):
         speed[:, i] = left[i] * speed[:, i - 1] + 0.5 * step * (
             force[:, i] + left[i] * force[:, i - 1]
         )
     way = np.cumsum(speed, axis=1) * step
-    found = np.zeros((_SMOOTH, len(rows.time_s)))
+    found = np.zeros((SMOOTH, len(rows.time_s)))
     after, position = rows.time_s > 0.0, rows.kind == POSITION
-    for i in range(_SMOOTH):
+    for i in range(SMOOTH):
         moved = np.where(
             position, np.interp(rows.time_s, time, way[i]), np.interp(rows.time_s, time, speed[i])
         )

@@ -16,13 +16,19 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.inference.gaussian import cholesky, products_of, substitute
+from shipdrag_ros.inference.gaussian import substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
-from shipdrag_ros.inference.noise import Noise, whiten
-from shipdrag_ros.inference.rows import POSITION, Rows
+from shipdrag_ros.inference.linear import (
+    Families,
+    of_family,
+    solve,
+    whitened_products,
+)
+from shipdrag_ros.inference.noise import Noise
+from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.inference.sampling import Seen
-from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
+from shipdrag_ros.inference.settings import NoisePosterior, Settings
 from shipdrag_ros.posterior.motion import damping_of, predict
 from shipdrag_ros.posterior.problem import Family, RunModel
 from shipdrag_ros.posterior.start import along_readings
@@ -37,16 +43,6 @@ _LEAST = 1e-3  # weight of a model; less is left out of the spread
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
 _SHORTEST = 1.0 / 32.0  # part of a step to the mean of the mixture
-
-
-class Families(NamedTuple):
-    """
-    Priors of the unknowns, one family a line; `log_chance` (f,) are their logarithms.
-    """
-
-    mean: Float64
-    precision: Float64
-    log_chance: Float64
 
 
 @dataclass(frozen=True)
@@ -80,116 +76,39 @@ class RunPosterior:
 
 
 @compiled
-def of_family(
-    products: Float64, mean: Float64, precision: Float64
-) -> tuple[bool, float, Float64, Float64, Float64]:
-    """
-    Solve one linear model.
-
-    Parameters
-    ----------
-    products : (1 + p, 1 + p)
-        Of whitened residual and columns.
-    mean, precision : (p,)
-        Of the prior, from where the model is linear.
-
-    Returns
-    -------
-    solved, log_evidence, step, lower, scale
-        The logarithm is without -log det / 2 of the rows' covariance.
-    """
-    p = len(mean)
-    matrix, right = products[1:, 1:].copy(), np.empty((p, 1))
-    log_evidence = -0.5 * products[0, 0]
-    for a in range(p):
-        matrix[a, a] += precision[a]
-        right[a, 0] = products[1 + a, 0] + precision[a] * mean[a]
-        log_evidence += 0.5 * np.log(precision[a]) - 0.5 * precision[a] * mean[a] ** 2
-    solved, lower, scale = cholesky(matrix, 0.0)
-    step = np.zeros(p)
-    if solved:
-        step = substitute(lower, scale, right)[:, 0]
-        for a in range(p):
-            log_evidence += 0.5 * step[a] * right[a, 0] - np.log(lower[a, a] / scale[a])
-    return solved, log_evidence, step, lower, scale
-
-
-@compiled
-def each_of_families(
-    products: Float64, mean: Float64, precision: Float64
-) -> tuple[Float64, Float64]:
-    """
-    Solve a linear model under each of some priors (f, p), as `of_family`.
-
-    Returns
-    -------
-    log_evidence, step : (f,), (f, p)
-    """
-    logs, steps = np.full(len(mean), -np.inf), np.zeros(mean.shape)
-    for q in range(len(mean)):
-        solved, log_evidence, step, _, _ = of_family(products, mean[q], precision[q])
-        if solved and np.isfinite(log_evidence):
-            logs[q], steps[q] = log_evidence, step
-    return logs, steps
-
-
-@compiled
 def mix(
-    table: Float64,
-    rows: Rows,
-    white: Noise,
-    steady: int,
-    settings: Settings,
-    families: Families,
-    taught: Families,
+    products: Float64, log_det: Float64, prior: Float64, families: Families, taught: Families
 ) -> tuple[Float64, Float64, Float64]:
     """
     Average linear models over settings of the noise and families of priors.
 
     Parameters
     ----------
-    table : (1 + p, n)
-        Residual and columns, not whitened.
-    rows, white, steady
-        See `noise_of`.
-    settings
-        Weighted by the mean evidence of `taught`, as `learn` does.
+    products, log_det
+        See `whitened_products`.
+    prior : (s,)
+        Weights of the settings by the mean evidence of `taught`, as `learn` has them.
     families, taught
-        Means count from where the model is linear.
 
     Returns
     -------
     step, covariance, weight
         Of the mixture; `weight` (s, f) sums to 1.
     """
-    s, f, p = len(settings.weight), len(families.log_chance), len(table) - 1
+    s, f, p = len(products), len(families.log_chance), families.mean.shape[1]
     t = len(taught.log_chance)
-    logs, of_taught = np.full((s, f), -np.inf), np.full((s, t), -np.inf)
-    every = np.empty((s, p + 1, p + 1))
+    logs, _, _ = solve(products, families.mean, families.precision, 0, 0)
+    of_taught, _, _ = solve(products, taught.mean, taught.precision, 0, 0)
     for k in range(s):
-        noise = noise_of(settings, k, rows, white, steady)
-        copy = table.copy()
-        log_det = whiten(rows, copy, noise)
-        every[k] = products_of(copy)
-        for q in range(f):
-            solved, log_evidence, _, _, _ = of_family(
-                every[k], families.mean[q], families.precision[q]
-            )
-            if solved and np.isfinite(log_evidence):
-                logs[k, q] = log_evidence - 0.5 * log_det
-        for q in range(t):
-            solved, log_evidence, _, _, _ = of_family(
-                every[k], taught.mean[q], taught.precision[q]
-            )
-            if solved and np.isfinite(log_evidence):
-                of_taught[k, q] = log_evidence - 0.5 * log_det
+        logs[k] -= 0.5 * log_det[k]
+        of_taught[k] -= 0.5 * log_det[k]
     weight, top = np.zeros((s, f)), logs.max()
     for k in range(s):
         alike = np.exp(of_taught[k] - top).sum() / t
         for q in range(f):
             if alike > 0.0:
                 of_family_q = np.exp(logs[k, q] - top + families.log_chance[q])
-                weight[k, q] = settings.weight[k] * of_family_q / alike
+                weight[k, q] = prior[k] * of_family_q / alike
     weight /= weight.sum()
     mean, second = np.zeros(p), np.zeros((p, p))
     kept = 0.0
@@ -198,7 +117,7 @@ def mix(
             if weight[k, q] < _LEAST:
                 continue
             kept += weight[k, q]
-            _, _, step, lower, scale = of_family(every[k], families.mean[q], families.precision[q])
+            _, step, lower, scale = of_family(products[k], families.mean[q], families.precision[q])
             covariance = substitute(lower, scale, np.eye(p))
             for a in range(p):
                 mean[a] += weight[k, q] * step[a]
@@ -257,9 +176,8 @@ def _mixed(
     table, white = _linear(problem, now)
     families = _families(problem, problem.families, now)
     of_taught = _families(problem, taught, now)
-    of_free, spread, weight = mix(
-        table, problem.rows, white, problem.steady, settings, families, of_taught
-    )
+    products, log_det = whitened_products(table, problem.rows, white, problem.steady, settings)
+    of_free, spread, weight = mix(products, log_det, settings.weight, families, of_taught)
     step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families[0].precision)
     step[problem.free] = of_free
     covariance[np.ix_(problem.free, problem.free)] = spread
@@ -284,16 +202,13 @@ def _each_family(
     problem: RunModel, now: Float64, linear: tuple[Float64, Noise], settings: Settings
 ) -> _Linear:
     """Solve each; what the noise does not explain yet counts as more noise."""
-    table, white = linear
-    table = table.copy()
-    whiten(problem.rows, table, noise_of(settings, 0, problem.rows, white, problem.steady))
-    products = products_of(table)
+    products, _ = whitened_products(linear[0], problem.rows, linear[1], problem.steady, settings)
     n = len(problem.rows.time_s)
-    misfit = float(products[0, 0])
+    misfit = float(products[0, 0, 0])
     products *= min(1.0, n / misfit)
     priors = _families(problem, problem.families, now)
-    logs, steps = each_of_families(products, priors.mean, priors.precision)
-    return _Linear(misfit, logs + priors.log_chance, steps)
+    logs, steps, _ = solve(products, priors.mean, priors.precision, 0, 0)
+    return _Linear(misfit, logs[0] + priors.log_chance, steps[0])
 
 
 def _objective(problem: RunModel, now: Float64, misfit: float, which: int) -> float:

@@ -20,8 +20,13 @@ from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
 from shipdrag_ros.ship.baseline import TableBaseline
-from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
-from shipdrag_ros.simulation.hydrodynamics import USUAL_FORM_FACTOR, drag_n, friction_n, viscous_n
+from shipdrag_ros.simulation.hydrodynamics import (
+    USUAL_FORM_FACTOR,
+    drag_n,
+    friction_n,
+    surface_m2,
+    viscous_n,
+)
 
 _NODES = 97  # of the grid of speeds
 ABOVE = 1.25  # of the highest speed that a fit may try
@@ -167,11 +172,8 @@ def _stated(ship: Ship, speed: Float64) -> Float64:
 
 
 def _generic(ship: Ship, speed: Float64) -> Float64:
-    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
-        ship.length_m, ship.displaced_volume_m3
-    )
     wave = _usual_wave(ship.froude(speed))
-    return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+    return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface_m2(ship), speed)])
 
 
 def _usual_wave(froude: Float64) -> Float64:
@@ -199,9 +201,6 @@ def usual_baseline(ship: Ship) -> Ship:
     if ship.baseline is not None:
         return ship
     froude = np.linspace(0.0, _HIGHEST_FROUDE, 13)
-    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
-        ship.length_m, ship.displaced_volume_m3
-    )
     base = CoefficientBaseline(
         USUAL_FORM_FACTOR,
         0.0,
@@ -209,7 +208,7 @@ def usual_baseline(ship: Ship) -> Ship:
         tuple(_usual_wave(froude).tolist()),
         CoefficientSd(priors.GENERIC_FRICTION.sd, priors.GENERIC_WAVE.sd),
     )
-    return replace(ship, baseline=base, wetted_surface_m2=surface)
+    return replace(ship, baseline=base, wetted_surface_m2=surface_m2(ship))
 
 
 def _shapes(

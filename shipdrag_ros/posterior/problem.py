@@ -30,7 +30,7 @@ _STEPS = 80  # of the integration, longer as the ship slows down
 _SPREAD = 25.0  # of all over the time from which steps grow
 _STEPS_A_RUN_DOWN = 3.0
 _VAGUE_SPEED, _VAGUE_S = 0.3, 300.0  # of the steady speed, and of where she was
-_EXACT = 1e-8  # sd of what does not act, so that every prior is proper
+EXACT = 1e-8  # sd of what does not act, so that every prior is proper
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class RunModel:
     def free(self) -> Int64:
         """Which unknowns some family leaves open."""
         least = np.min([each.precision for each in self.families], axis=0)
-        return np.flatnonzero(least < _EXACT**-2.0 / 4.0)
+        return np.flatnonzero(least < EXACT**-2.0 / 4.0)
 
     @cached_property
     def taught(self) -> tuple[Family, ...]:
@@ -234,12 +234,12 @@ def _extras(
     ship: Ship, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> tuple[Float64, Float64]:
     """Return mean and sd of the unknowns that are no coefficients; alike in all families."""
-    mean, sd = start[-EXTRAS:].copy(), np.full(EXTRAS, _EXACT)
+    mean, sd = start[-EXTRAS:].copy(), np.full(EXTRAS, EXACT)
     ground = kinds - {LOG}
     sd[motion.SPEED] = _VAGUE_SPEED * mean[motion.SPEED]
     base = ship.baseline
     if base is None or base.relative_sd_of == 'resistance':
-        sd[motion.INERTIA] = max(ship.added_mass.sd, _EXACT)
+        sd[motion.INERTIA] = max(ship.added_mass.sd, EXACT)
     if stop.sd_s > 0.0:
         sd[motion.STOP] = stop.sd_s
         sd[motion.THRUST] = priors.THRUST.sd
@@ -341,9 +341,9 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
         return
     if isinstance(base, CoefficientBaseline):
         alone = base.relative_sd.wave * math.sqrt(1.0 - base.relative_sd.correlation**2)
-        sds = max(base.relative_sd.friction, _EXACT), max(alone, _EXACT)
+        sds = max(base.relative_sd.friction, EXACT), max(alone, EXACT)
     else:
-        sds = max(base.relative_sd, _EXACT), _EXACT
+        sds = max(base.relative_sd, EXACT), EXACT
     with_it = wave_with_friction(ship)  # what is more of friction alone is not of the waves
     tails = (1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)
     for (wide, chance), (size, part) in product(tails, priors.HALF_NORMAL):
@@ -362,7 +362,7 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ
-        wide = math.hypot(size, with_it * size, sds[1]) if sds[1] > _EXACT else _EXACT
+        wide = math.hypot(size, with_it * size, sds[1]) if sds[1] > EXACT else EXACT
         scales = ((0.0, math.hypot(size, sds[0])), (0.0, wide))
         yield _Hull(priors.SMOOTH, chance, scales, size)
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import matplotlib
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.display import Picture
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, distinct to colour-blind readers; line styles and
 # shades of grey differ as well, for print
@@ -42,6 +45,24 @@ STYLE: dict[Any, Any] = {
 _PIXELS_PER_INCH = 200  # of what is drawn as pixels
 
 
+def styled(more: Mapping[Any, Any] | None = None) -> AbstractContextManager[None]:
+    """
+    Draw in the style of all pages; matplotlib is imported with the first picture.
+    """
+    import matplotlib
+
+    return matplotlib.rc_context({**STYLE, **(more or {})})
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """
+    Return an empty figure [inches].
+    """
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout='constrained')
+
+
 def picture(figure: Figure, caption: str) -> Picture:
     """
     Draw a figure for a page.
@@ -54,7 +75,7 @@ def data_uri(figure: Figure) -> str:
     Return a figure as an SVG that a page can carry in itself.
     """
     buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
+    with styled():
         # without a date the same data give the same bytes
         figure.savefig(buffer, format='svg', dpi=_PIXELS_PER_INCH, metadata={'Date': None})
     return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
@@ -64,5 +85,5 @@ def save(figure: Figure, path: Path, *, pixels_per_inch: int = _PIXELS_PER_INCH)
     """
     Write a figure to a file; its ending gives the format.
     """
-    with matplotlib.rc_context(STYLE):
+    with styled():
         figure.savefig(path, dpi=pixels_per_inch)

@@ -105,7 +105,9 @@ UNITS: dict[str, Unit] = {
 }
 MOST_PARAMETERS = 6
 
-NAME = re.compile(r'[a-z][a-z0-9_]{0,59}')
+NAME = re.compile(r'(?!(none|unknown)$)[a-z][a-z0-9_]{0,59}')
+"""Of a term; none and unknown are answers of a diagnosis."""
+EXPECTED_NAME = 'small letters, digits and _, and not none or unknown'
 _ANY = (-math.inf, math.inf)
 _SIDES_SD = 3.0  # of a parameter, inside which a formula must be sound
 _AXES = {
@@ -349,7 +351,7 @@ def _plain_problems(term: LearntTerm) -> list[str]:
     """Return what is wrong beside the formula."""
     found = []
     if not NAME.fullmatch(term.name):
-        found.append(f'name: {term.name[:60]!r}, expected small letters, digits and _')
+        found.append(f'name: {term.name[:60]!r}, expected {EXPECTED_NAME}')
     count = len(term.parameters)
     if not 1 <= count <= MOST_PARAMETERS:
         found.append(f'parameters: {count} of them, expected 1..{MOST_PARAMETERS}')

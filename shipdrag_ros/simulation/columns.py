@@ -33,7 +33,7 @@ from shipdrag_ros.simulation.terms import (
     outside,
 )
 
-_FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
+RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left, which is none
 _STEPS_A_RUN_DOWN = 4
 _STEPS_A_SLOW_DOWN = 40  # of v / r
 _STEP_S = 10.0
@@ -259,7 +259,7 @@ def _also_s(
     if any(any(action.current_change_m_s) for action in actions):
         times.append(scenario.lead_in_s)
     if step_s is None and ship.propulsion:
-        settled = _FINE_RUN_DOWNS * ship.propulsion.run_down_s
+        settled = RUN_DOWNS * ship.propulsion.run_down_s
         times += [scenario.moment_s(order.time_s) + settled for order in scenario.orders]
     return times
 
@@ -280,7 +280,7 @@ def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: floa
         step = longest
         # by its middle: the end of a run-down is an edge, to the last bit or not
         middle = 0.5 * (start + end)
-        if any(0.0 <= middle - order < _FINE_RUN_DOWNS * run_down_s for order in orders):
+        if any(0.0 <= middle - order < RUN_DOWNS * run_down_s for order in orders):
             step = min(step, run_down_s / _STEPS_A_RUN_DOWN)
         # before anything happens the speed is steady, and a step of any length exact
         counts.append(1 if end <= quiet_s else max(1, int(np.ceil((end - start) / step))))

@@ -89,7 +89,13 @@ def disc_area_m2(ship: Ship) -> float:
 
 
 def _force_n(ship: Ship, speed_m_s: Float64) -> Float64:
-    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
+    return drag_n(ship, surface_m2(ship), speed_m_s)
+
+
+def surface_m2(ship: Ship) -> float:
+    """
+    Return the wetted surface, the usual one of her length and volume where none is stated.
+    """
+    return ship.wetted_surface_m2 or usual_wetted_surface_m2(
         ship.length_m, ship.displaced_volume_m3
     )
-    return drag_n(ship, surface, speed_m_s)

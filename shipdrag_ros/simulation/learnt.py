@@ -112,7 +112,7 @@ def _worth(
         'nabla': ship.displaced_volume_m3,
         'u': speed_m_s,
         't': time_s,
-        'psi': scenario.heading_rad,
+        'psi': math.remainder(scenario.heading_rad, math.tau),  # as the check took it
         'd': scenario.day,
         'h': scenario.depth_m,
     }

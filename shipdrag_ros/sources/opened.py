@@ -11,7 +11,7 @@ from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import IO, cast
 
-from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.errors import ImportDataError, reason_of
 from shipdrag_ros.progress import PartDone
 
 GZIP = b'\x1f\x8b'
@@ -48,7 +48,7 @@ def beginning(path: Path) -> bytes:
     except BROKEN as error:
         if raw:
             return raw  # whoever reads it says how far it goes
-        why = getattr(error, 'strerror', None) or str(error)
+        why = reason_of(error)
         raise ImportDataError(
             f'{str(path)!r} cannot be read: {why}; give a log or a table of measurements'
         ) from error

@@ -255,13 +255,15 @@ def test_memory_is_bounded_and_what_finds_no_room_is_counted(tmp_path: Path) -> 
     assert 'File exists' in progress.error
 
 
-def test_a_part_that_cannot_be_compacted_is_whole_and_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_part_that_cannot_be_compacted_is_whole_and_counted_and_it_is_said_why(
+    tmp_path: Path,
 ) -> None:
-    monkeypatch.setattr(module, 'compact', _full)
+    (tmp_path / 'a_000.mcap.compacting').mkdir()  # where it would be written
     it = recording(tmp_path, earlier=map(message, range(10)))
     progress = end(it)
     assert (progress.lost, progress.uncompacted, progress.error) == (0, 1, '')
+    assert 'cannot be compacted: [Errno 21] Is a directory' in progress.why_uncompacted
+    (tmp_path / 'a_000.mcap.compacting').rmdir()
     assert all_numbers(tmp_path) == list(range(10))
 
 

@@ -17,8 +17,7 @@ from mcap.reader import make_reader
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import info, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.declarations import attachment
-from shipdrag_ros.bags.writer import RecordWriter
+from shipdrag_ros.bags.writer import RecordWriter, attachment
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.parameters import Parameters

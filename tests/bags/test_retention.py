@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -125,3 +127,63 @@ def test_without_limits_everything_stays(tmp_path: Path) -> None:
     part(tmp_path, 0)
     assert Retention(tmp_path, Keep(share=0.0)).tidy(now_s=1e12) == []
     assert Retention(tmp_path / 'none', Keep(days=1)).tidy(now_s=1e12) == []
+
+
+def child(code: str, *arguments: str | Path) -> str:
+    """Return what a program of its own prints; it must end by itself."""
+    done = subprocess.run(
+        [sys.executable, '-c', code, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300.0,
+        check=False,
+    )
+    assert done.returncode == 0, (done.returncode, done.stderr)
+    return done.stdout
+
+
+CUT = """
+import os, sys, threading
+from pathlib import Path
+from shipdrag_ros.bags.retention import Keep, Retention
+folder = Path(sys.argv[1])
+def cut():
+    os.truncate(next(folder.glob('*_000.mcap')), 100)
+threading.Timer(0.3, cut).start()
+print([one.path.name for one in Retention(folder, Keep(days=1e-9)).tidy(now_s=2e9)])
+"""
+
+
+def test_a_recording_that_is_cut_while_it_is_read_ends_no_process(tmp_path: Path) -> None:
+    """As one whose disk is pulled out; reading a mapped file would end the process."""
+    long = b'\x89MCAP0\r\n' + (b'\x05\x20' + bytes(7) + b'\xff' * 30) * 250_000
+    (tmp_path / 'coastdown_20260101T000000Z_000.mcap').write_bytes(long)  # some seconds to read
+    second = part(tmp_path, 1, 1)
+    assert second.name in child(CUT, tmp_path)
+
+
+HUGE = """
+import os, resource, sys
+from pathlib import Path
+from shipdrag_ros.bags.retention import Keep, Retention
+folder = Path(sys.argv[1])
+retention = Retention(folder, Keep(days=1e-9))
+retention.tidy(now_s=0.0)  # whatever is needed for that is imported now
+huge = folder / 'coastdown_20260101T000000Z_000.mcap'
+huge.write_bytes(b'')
+os.truncate(huge, 200 * 2**20)
+pages = int(Path('/proc/self/statm').read_text().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * 4096 + 64 * 2**20, resource.RLIM_INFINITY))
+print([one.path.name for one in retention.tidy(now_s=2e9)], retention.problem)
+"""
+
+
+def test_a_recording_that_finds_no_room_in_memory_keeps_no_other(tmp_path: Path) -> None:
+    other = part(tmp_path, 1)
+    said = child(HUGE, tmp_path)
+    huge = 'coastdown_20260101T000000Z_000.mcap'
+    assert said == (
+        f"['{other.name}'] {huge} cannot be read (MemoryError), so that it stays; "
+        'move or remove it\n'
+    )
+    assert [path.name for path in tmp_path.iterdir()] == [huge]

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.writer import IndexType, Writer
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, Compression, open_runs
-from shipdrag_ros.bags.reader import info
+from shipdrag_ros.bags.contents import contents_of
+from shipdrag_ros.bags.records import MAGIC
+from shipdrag_ros.bags.run import info
 from shipdrag_ros.messages import reset_request
 from shipdrag_ros.samples import Block, Channel
 
@@ -66,3 +70,24 @@ def test_an_empty_bag_of_another_tool(tmp_path: Path) -> None:
     assert told.duration_s == 0.0
     assert told.software is None
     assert told.compression == 'none'
+
+
+@pytest.mark.parametrize('packing', [b'zstd', b'lz4'])
+def test_a_chunk_where_the_index_should_be_is_not_unpacked(packing: bytes) -> None:
+    """No writer puts one there; whoever does may say that it is of any size, or packed wrong."""
+
+    def record(opcode: int, content: bytes) -> bytes:
+        return struct.pack('<BQ', opcode, len(content)) + content
+
+    def text(content: bytes) -> bytes:
+        return struct.pack('<I', len(content)) + content
+
+    head = MAGIC + record(Opcode.HEADER, text(b'ros2') + text(b''))
+    head += record(Opcode.DATA_END, bytes(4))
+    packed = struct.pack('<Q', 8) + b'nonsense'
+    chunk = record(Opcode.CHUNK, struct.pack('<QQQI', 1, 1, 1 << 40, 0) + text(packing) + packed)
+    footer = record(Opcode.FOOTER, struct.pack('<QQI', len(head), 0, 0)) + MAGIC
+    contents = contents_of(head + chunk + footer)
+    assert not contents.counts
+    assert contents.warnings == []
+    assert not contents.indexed

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.bags.reader import open_runs
+from shipdrag_ros.bags.run import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.store import read_coastdowns
 from shipdrag_ros.ship import LearntTerm, Ship
@@ -34,6 +34,18 @@ def test_a_wrong_file_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[
     said = capsys.readouterr().err
     assert said.startswith('ERROR:')
     assert '__import__' in said or 'YAML' in said
+
+
+def test_a_name_that_is_taken_is_an_error_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = tmp_path / 'wrong.yaml'
+    for name in ('fouling', 'none', 'unknown'):
+        wrong.write_text(WEED.read_text().replace('name: weed', f'name: {name}'))
+        assert main(['effect', 'check', str(wrong)]) == 1
+        said = capsys.readouterr().err
+        assert 'wrong.yaml' in said
+        assert repr(name) in said
 
 
 def test_the_list_shows_what_is_learnt(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,8 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.cli.forecast import document
 from shipdrag_ros.display import ship_speed
 from shipdrag_ros.forecast import words
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Scenario, simulate
 
 mpl.use('agg')
 
@@ -119,7 +121,7 @@ def test_a_bag_behind_the_times_is_told_where_to_stand(
 
 
 def test_if_she_were_stopped_now(
-    steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+    ship_file: Path, steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(['forecast', str(steady_bag), '--if-stopped-now', '--json']) == 0
     told = capsys.readouterr()
@@ -137,6 +139,13 @@ def test_if_she_were_stopped_now(
     said = capsys.readouterr().out
     assert 'Gliding already at ' in said
     assert ', by the coastdown of ' in said
+
+    assert main(['forecast', f'{coastdown_bag}@0:800', '--if-stopped-now', '--json']) == 0
+    glides = json.loads(capsys.readouterr().out)['if_stopped_now']
+    assert glides['gliding']
+    sailed = Scenario(speed_m_s=8.0, lead_in_s=300.0, duration_s=500.0)
+    truth = simulate(Ship.load(ship_file), sailed).speed_through_water_m_s[-1]
+    assert glides['speed_m_s'] == pytest.approx(truth, abs=0.04)  # a mean would be 0.1 too fast
 
     assert main(['forecast', f'{coastdown_bag}@0:300', '--if-stopped-now', '--json']) == 0
     told = capsys.readouterr()

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+import shipdrag_ros as sd
 from shipdrag_ros.cli import main
+from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fleet.rows import BagResult, bag_row
 from shipdrag_ros.fleet.store import Store
 
@@ -36,6 +38,12 @@ def test_a_name_that_cannot_be_is_refused_before_the_work(
     line = ['learn', str(tmp_path / 'none.mcap'), '-o', str(tmp_path / 'a.yaml'), '--name', name]
     assert main(line) == 1
     assert 'name' in capsys.readouterr().err
+
+
+def test_a_script_is_told_of_a_name_before_the_work() -> None:
+    record = sd.simulate(sd.Ship.example(), duration_s=10.0, lead_in_s=60.0)
+    with pytest.raises(EffectFileError, match='an effect of the library'):
+        sd.learn(record, name='fouling')
 
 
 @pytest.fixture(scope='module')

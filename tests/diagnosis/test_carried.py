@@ -15,14 +15,14 @@ from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, words
 from shipdrag_ros.diagnosis.carried import Carried, carried
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import SeenRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameter import Parameter, Prior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
-from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effect import Scope
@@ -75,10 +75,10 @@ def sizes(found: Carried, name: str) -> list[Prior]:
     return [q.prior for way in found.ways([find(name)]) for q in way.unknowns]
 
 
-def nothing() -> ComparedHypotheses:
+def nothing() -> ComparedHypotheses[Fitted]:
     """Compare nothing with nothing."""
     alone = Fitted(Explanation(), np.zeros(0), log_evidence=0.0)
-    return ComparedHypotheses(ShipRuns(()), (), (alone,))
+    return ComparedHypotheses((), (alone,))
 
 
 def test_an_effect_declares_that_it_lasts_where_it_is_of_hull_or_instruments() -> None:

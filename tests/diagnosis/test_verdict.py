@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.verdict import judge, runs_differ
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
-from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import find
 
@@ -29,8 +29,8 @@ def fitted(*names: str, weight: float, smooth: str = '', way: int = 0) -> Fitted
     return Fitted(hypothesis, np.zeros(q), log_evidence=log, z=np.zeros(q), sd=np.ones(q))
 
 
-def compared(*fits: Fitted) -> ComparedHypotheses:
-    return ComparedHypotheses(ShipRuns(()), (), fits)
+def compared(*fits: Fitted) -> ComparedHypotheses[Fitted]:
+    return ComparedHypotheses((), fits)
 
 
 def test_evidence_and_prior_are_all_that_counts() -> None:
@@ -52,7 +52,7 @@ def test_a_name_with_something_smooth_besides_is_something_without_a_name() -> N
     found = compared(fitted(weight=-50.0), fitted('current', weight=0.0), more)
     assert found.probability[UNKNOWN] == pytest.approx(math.exp(3.0) / (1.0 + math.exp(3.0)))
     assert found.best[UNKNOWN] is more
-    judged = judge(found)
+    judged = judge(found, ())
     assert judged.decision.verdict is Verdict.UNKNOWN
     assert judged.explained is more
     assert not judged.missing
@@ -68,6 +68,6 @@ def test_a_size_for_each_run_is_one_name() -> None:
     first, last = runs_differ(each, ['out', 'back'])
     assert (first.run, last.run) == ('out', 'back')
     assert first.size.value < last.size.value
-    (named,) = judge(compared(fitted(weight=-9.0), each)).effects
+    (named,) = judge(compared(fitted(weight=-9.0), each), ()).effects
     assert named.parameters['friction_factor'] == last.size
     assert runs_differ(alike, ['out', 'back']) == ()

@@ -166,6 +166,31 @@ def test_a_current_carries_her_over_ground_alone(early: Estimate, ship: Ship) ->
     assert more == pytest.approx(0.5 * still.time_s.median, rel=1e-9)
 
 
+def test_a_current_may_set_her_back(early: Estimate, ship: Ship) -> None:
+    found = foretell(replace(early, current_m_s=-1.5), ship, speeds_m_s=(1.0, 0.8))
+    way = np.array([each.distance_m for each in found.milestones])
+    assert way[-1, 0] < way[:, 0].max()
+    assert (way[:, 1] <= way[:, 0]).all()
+    assert (way[:, 0] <= way[:, 2]).all()
+    still = foretell(replace(early, current_m_s=0.0), ship, speeds_m_s=(1.0, 0.8))
+    assert np.abs(way).max() < still.milestones[-1].distance_m.high
+
+
+def test_what_followed_may_be_behind(window: Window, ship: Ship, early: Estimate) -> None:
+    whole = replace(estimate(window, ship, Parameters(estimator='one')), current_m_s=-2.0)
+    position = window.position
+    track = position.value[-1] - position.value[0]
+    since_s = (position.time_ns - window.start_ns) / SECOND_NS
+    value = position.value - 2.0 * since_s[:, None] * track / np.hypot(*track)
+    carried = replace(window, position=replace(position, value=value))
+    followed = Followed.of(carried, whole)
+    assert whole.last_speed_m_s < 2.0
+    assert followed.way_m[-1] < followed.way_m.max() - 50.0
+    checked = followed.beside(foretell(replace(early, current_m_s=-2.0), ship), STOP_NS)
+    assert checked.interval_score is not None
+    assert np.isfinite(checked.interval_score)
+
+
 def test_it_takes_less_than_five_milliseconds(early: Estimate, ship: Ship) -> None:
     foretell(early, ship)
     spent = []

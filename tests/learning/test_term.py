@@ -27,7 +27,7 @@ from shipdrag_ros.simulation import (
     standard_sensors,
 )
 from shipdrag_ros.simulation.effect import Frame
-from shipdrag_ros.simulation.effects import LIBRARY, declared, parse, using
+from shipdrag_ros.simulation.effects import LIBRARY, declared, find, parse, using
 from shipdrag_ros.simulation.learnt import force_n
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -128,6 +128,26 @@ def test_a_force_of_the_earth_turns_with_the_heading() -> None:
         forces.append(float(declared(term).action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
     assert forces[0] == pytest.approx(-forces[1])
     assert forces[0] > 0.0
+
+
+def test_a_heading_acts_as_the_same_heading_a_turn_on() -> None:
+    term = LearntTerm.from_yaml(TURNED.replace('A*cos(psi) + B*sin(psi)', 'A*psi + B'))
+    ship, speed = Ship.example(), np.array([2.0, 5.0])
+    before, after = (
+        force_n(
+            term, Frame(ship, Scenario(speed_m_s=5.0, heading_rad=psi), 0.0), (2e-4, 1e-4), speed
+        )
+        for psi in (0.5, 0.5 + math.tau)
+    )
+    np.testing.assert_allclose(after, before)
+
+
+def test_of_two_terms_of_one_name_the_later_is_known() -> None:
+    weed = LearntTerm.from_yaml(WEED)
+    other = LearntTerm.from_yaml(TURNED.replace('name: turned', 'name: weed'))
+    for term in (weed, other, weed):
+        declared(term)
+        assert [each.name for each in find('weed').parameters] == list(term.parameters)
 
 
 def test_a_log_in_time_reads_as_its_formula_says() -> None:

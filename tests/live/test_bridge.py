@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import time
@@ -11,16 +12,27 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.applications import Starlette
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import acceptance, signal_k
-from shipdrag_ros.live.acceptance import Held
+from shipdrag_ros.live import signal_k
+from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import recorded_runs
-from shipdrag_ros.live.source import BagSource
-from shipdrag_ros.live.timeline import Timeline
+from shipdrag_ros.live.headline import (
+    Check,
+    Held,
+    course_check,
+    depth_check,
+    lead_check,
+    reciprocal_check,
+    rudder_check,
+    wind_check,
+)
+from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
+from shipdrag_ros.messages import EventKind, EventNote, event_message
 from shipdrag_ros.messages.heard import ERROR, Health, NodeMessage, Status, health_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
@@ -246,7 +258,7 @@ def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:
     assert later.parts(0.0)['if_stopped']['hull'].startswith('the coastdown of ')
 
 
-def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
+def test_bytes_that_are_none_of_the_outputs_are_said_once_and_change_nothing_else() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
     for name in (
@@ -258,32 +270,34 @@ def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
         'forecast_path',
     ):
         bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
-    assert bridge.parts(0.0) == before
+    after = bridge.parts(0.0)
+    assert len(after['notes']) == 6
+    assert {**after, 'notes': []} == before
 
 
 @pytest.mark.parametrize(
     ('check', 'held'),
     [
-        (acceptance.lead_check(599.0, 600.0), Held.WAIT),
-        (acceptance.lead_check(600.0, 600.0), Held.YES),
-        (acceptance.lead_check(None, None), Held.UNKNOWN),
-        (acceptance.wind_check((-8.0, 0.0), 8.0), Held.YES),  # calm: own motion is all
-        (acceptance.wind_check((-8.0, 6.0), 8.0), Held.NO),
-        (acceptance.wind_check(None, 8.0), Held.UNKNOWN),
-        (acceptance.depth_check(42.0, 5.0, Ship.load(SHIP)), Held.YES),
-        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), Held.NO),  # 3 sqrt(B T) = 40.9 m
-        (acceptance.depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
-        (acceptance.depth_check(None, 8.0, None), Held.UNKNOWN),
-        (acceptance.rudder_check(math.radians(-4.0)), Held.YES),
-        (acceptance.rudder_check(math.radians(-6.0)), Held.NO),
-        (acceptance.course_check(math.radians(359.0), coasting=True), Held.YES),
-        (acceptance.course_check(math.radians(-30.0), coasting=True), Held.NO),
-        (acceptance.reciprocal_check(270.0, paired=False), Held.WAIT),
-        (acceptance.reciprocal_check(270.0, paired=False, coasting=True), Held.WAIT),
-        (acceptance.reciprocal_check(None, paired=True), Held.YES),
+        (lead_check(599.0, 600.0), Held.WAIT),
+        (lead_check(600.0, 600.0), Held.YES),
+        (lead_check(None, None), Held.UNKNOWN),
+        (wind_check((-8.0, 0.0), 8.0), Held.YES),  # calm: own motion is all
+        (wind_check((-8.0, 6.0), 8.0), Held.NO),
+        (wind_check(None, 8.0), Held.UNKNOWN),
+        (depth_check(42.0, 5.0, Ship.load(SHIP)), Held.YES),
+        (depth_check(40.0, 5.0, Ship.load(SHIP)), Held.NO),  # 3 sqrt(B T) = 40.9 m
+        (depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
+        (depth_check(None, 8.0, None), Held.UNKNOWN),
+        (rudder_check(math.radians(-4.0)), Held.YES),
+        (rudder_check(math.radians(-6.0)), Held.NO),
+        (course_check(math.radians(359.0), coasting=True), Held.YES),
+        (course_check(math.radians(-30.0), coasting=True), Held.NO),
+        (reciprocal_check(270.0, paired=False), Held.WAIT),
+        (reciprocal_check(270.0, paired=False, coasting=True), Held.WAIT),
+        (reciprocal_check(None, paired=True), Held.YES),
     ],
 )
-def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> None:
+def test_the_checklist_says_what_holds(check: Check, held: Held) -> None:
     assert check.held is held
     assert check.text
 
@@ -291,13 +305,13 @@ def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> N
 @pytest.mark.parametrize(
     ('check', 'text'),
     [
-        (acceptance.wind_check((-8.0, 0.0), 8.0), '0 kn true, at most 10 kn'),
-        (acceptance.wind_check((-8.0, 6.0), 8.0), '12 kn true, over 10 kn'),
-        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), '40 m, less than 41 m'),
-        (acceptance.lead_check(599.0, 600.0), '9:59 of 10:00'),
+        (wind_check((-8.0, 0.0), 8.0), '0 kn true, at most 10 kn'),
+        (wind_check((-8.0, 6.0), 8.0), '12 kn true, over 10 kn'),
+        (depth_check(40.0, 5.0, Ship.load(SHIP)), '40 m, less than 41 m'),
+        (lead_check(599.0, 600.0), '9:59 of 10:00'),
     ],
 )
-def test_the_checklist_shows_what_it_compares(check: acceptance.Check, text: str) -> None:
+def test_the_checklist_shows_what_it_compares(check: Check, text: str) -> None:
     assert check.text == text
 
 
@@ -330,3 +344,46 @@ def test_a_verdict_whose_document_is_on_its_way_has_every_part() -> None:
         'probabilities': [],
         'decide': [],
     }
+
+
+def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:
+    """A coastdown without its beginning, and figures that are none."""
+    payload = event_message(EventNote(EventKind.ONSET, 5, 'a coastdown began', {})).payload
+    values = {'lifecycle': 'active', 'monitor': 'coastdown'}
+    values |= dict.fromkeys(('coastdown since [ns]', 'steady lead [s]'), 'inf')
+    bridge = Bridge()
+    for _ in range(3):
+        bridge.hear(NodeMessage('events', payload), 0.0)
+        bridge.hear(Health((Status('node', 'state', 0, '', values),)), 0.0)
+    said = str(bridge.parts(1.0)['notes'])
+    assert said.count('events brings what is not understood (KeyError') == 1
+
+
+def test_a_picture_that_cannot_be_made_is_said_on_the_page_until_it_can() -> None:
+    class Failing(NodeSource):
+        fails = True
+
+        def player(self) -> Any:
+            if self.fails:
+                raise RuntimeError('out of order')
+            return super().player()
+
+    source = Failing(None)
+    page = LivePage(source)
+
+    def headline() -> str:
+        _, data = page.frames.after(None)
+        body = data.decode().partition('data: ')[2]
+        return str(json.loads(body).get('headline'))
+
+    async def watch() -> None:
+        async with page._lifespan(Starlette()):
+            for said, fails in ((True, False), (False, False)):
+                end_s = time.monotonic() + 60.0
+                while ('PAGE HAS FAILED' in headline()) != said:
+                    assert time.monotonic() < end_s
+                    await asyncio.sleep(0.05)
+                assert not said or 'RuntimeError: out of order' in headline()
+                source.fails = fails
+
+    asyncio.run(watch())

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipdrag_ros.display import json_text
-from shipdrag_ros.live.frames import HISTORY, KEPT, Frames
+from shipdrag_ros.live.app import HISTORY, KEPT, Frames
 
 
 def events(data: bytes) -> list[tuple[str, dict[str, Any]]]:

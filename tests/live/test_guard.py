@@ -179,6 +179,23 @@ def test_more_viewers_than_places_are_told(serving: Any, monkeypatch: pytest.Mon
             each.close()
 
 
+def test_many_who_come_at_once_are_all_answered(
+    serving: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their requests are there before the first of them is read."""
+    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
+    with serving(LivePage(NodeSource())) as url:
+        address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
+        viewers = [socket.create_connection(address, timeout=60.0) for _ in range(60)]
+        for each in viewers:
+            each.sendall(b'GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n')
+        answers = [each.recv(12)[9:] for each in viewers]
+        for each in viewers:
+            each.close()
+    assert {*answers} == {b'200', b'503'}
+    assert answers.count(b'200') == 5
+
+
 def test_a_reader_who_reads_nothing_is_let_go(
     serving: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,8 +13,7 @@ from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, G
 from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.result import Advice
 from shipdrag_ros.display import json_text
-from shipdrag_ros.live.bridge import Bridge
-from shipdrag_ros.live.verdicts import verdict_part
+from shipdrag_ros.live.bridge import Bridge, verdict_part
 from shipdrag_ros.messages.heard import OK, WARN, Health, NodeMessage, Status
 from shipdrag_ros.messages.reporting import diagnosis_message
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus

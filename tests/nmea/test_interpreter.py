@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.messages import Source, decode
+from shipdrag_ros.nmea.clock import BEHIND_NS
 from shipdrag_ros.nmea.interpreter import SETTLE_NS, SILENT_NS, Interpreter, raw_message
 from shipdrag_ros.nmea.sentences import Mounting
 from shipdrag_ros.samples import Channel
@@ -180,7 +181,7 @@ def _stamps(times: dict[int, float], lines: Callable[[int], list[str]]) -> list[
         for line in lines(k):
             read_ns = START_NS + round(read_s * 1e9)
             for message in interpreter.messages(line, LINE, read_ns):
-                assert message.log_ns == read_ns
+                assert read_ns - 2 * BEHIND_NS < message.log_ns <= read_ns  # of its own receipt
                 if message.topic == '/speed_through_water':
                     found.append((message.publish_ns - START_NS) / 1e9)
     return found
@@ -195,6 +196,41 @@ def test_a_backlog_after_a_stall_has_its_own_times() -> None:
     assert np.diff(waited).min() > 0.0  # none is rejected as a repetition
     assert waited == pytest.approx(flowing, abs=1.0)
     assert waited[-30:] == flowing[-30:]  # what flows is stamped with its receipt
+
+
+@pytest.mark.parametrize(
+    'stated', ['GPZDA,{},01,01,2023,00,00', 'GPGGA,{},5430.000,N,01030.000,E,1,8,1.0,0,M,0,M,,']
+)
+def test_lines_of_a_backlog_before_the_first_that_states_the_time_have_theirs(stated: str) -> None:
+    """A log at 10 Hz, a time each second behind it; the wire stands still for 20 s."""
+
+    def lines(k: int) -> list[str]:
+        found = [sentence(f'VWVHW,,,,,{10.0 - 0.001 * k:.3f},N,,K')]
+        second = k // 10
+        clock = f'12{second // 60:02d}{second % 60:02d}.00'
+        return found if k % 10 else [*found, sentence(stated.format(clock))]
+
+    times = {k: 0.1 * k for k in range(1000)}
+    stalled = times | dict.fromkeys(range(405, 605), 60.45)
+    flowing, waited = _stamps(times, lines), _stamps(stalled, lines)
+    assert len(waited) == len(flowing) > 950
+    assert np.diff(waited).min() > 0.0
+    assert waited == pytest.approx(flowing, abs=0.25)
+    assert waited[-350:] == flowing[-350:]
+
+
+def test_a_silence_of_the_log_is_no_backlog() -> None:
+    """It speaks every 1.5 s, and from the 45th on no receiver states a time any more."""
+    fix = 'GPRMC,12{:02d}{:02d},A,5430.000,N,01030.000,E,7.0,90.0,010123,,,A'
+
+    def lines(k: int) -> list[str]:
+        found = [sentence(fix.format(k // 40, 3 * k // 2 % 60))] if k < 30 and not k % 2 else []
+        return [*found, sentence(f'VWVHW,,,,,{10.0 - 0.01 * k:.2f},N,,K')]
+
+    times = {k: 1.5 * k for k in range(60)}
+    stamps = _stamps(times, lines)
+    assert stamps == pytest.approx(list(times.values())[-len(stamps) :])
+    assert len(stamps) >= 57
 
 
 def test_a_receiver_whose_clock_stands_still_delays_nothing() -> None:

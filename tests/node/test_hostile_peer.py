@@ -76,3 +76,35 @@ def test_it_harms_neither_the_node_nor_its_recording(
     assert peer.state() == 'active'
     assert node.stop() == 0
     assert sum(bag.stat().st_size for bag in (tmp_path / 'bags').glob('*.mcap')) < 2**20
+
+
+def test_a_health_that_names_no_topic_stops_no_page(peer: Any) -> None:
+    """Whoever publishes /diagnostics under the node's name may write anything there."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+    from shipdrag_ros.node.spectator import Spectator
+
+    def status(part: str, **values: str) -> DiagnosticStatus:
+        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+        return DiagnosticStatus(name=f'coastdown_node: {part}', level=b'\0', values=pairs)
+
+    publisher = peer.advertise('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
+    heard: list[Any] = []
+    with Spectator(heard.append):
+        peer.wait_for_listener(publisher)
+        for topic in ('not a topic!', '/sound'):
+            heard.clear()
+            parts = [
+                status('state', lifecycle='active', monitor='steady'),
+                status('input heading', topic=topic, type='geometry_msgs/msg/QuaternionStamped'),
+            ]
+
+            def again(parts: list[DiagnosticStatus] = parts) -> bool:
+                publisher.publish(DiagnosticArray(status=parts))
+                peer.spin_for(0.2)
+                return bool(heard)
+
+            if topic == '/sound':
+                peer.spin_until(again)
+            else:
+                again()

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from shipdrag_ros.node.losses import Sequences
+from shipdrag_ros.node.inputs import Sequences
 
 
 class Graph:

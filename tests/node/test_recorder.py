@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,8 @@ from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EventKind, EventNote, OutputMessage, event_message
+from shipdrag_ros.messages.heard import WARN
+from shipdrag_ros.node.health import recording_status
 from shipdrag_ros.node.recorder import (
     DEFAULT_LIMITS,
     EVERYTHING,
@@ -338,4 +341,29 @@ def test_a_full_disk_is_told_with_the_file(
     wait_until(lambda: it.status().state is RecordingState.FAILED)
     assert f'{path.name}' in it.status().text
     assert 'No space left on device' in it.status().text
+    it.close()
+
+
+def test_old_recordings_that_cannot_be_removed_are_said_until_they_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('shipdrag_ros.node.recorder.EVERY_S', 0.05)
+    old = tmp_path / 'coastdown_20260101T000000Z_000.mcap'
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))  # nothing can be opened, as on a leak
+    try:
+        it = recorder(tmp_path, keep=Keep(size_bytes=1))
+        wait_until(lambda: 'Too many open files' in it.status().text)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    said = recording_status(it.status())
+    with BagWriter(old):
+        pass
+    wait_until(lambda: not old.exists())
+    wait_until(lambda: it.status().text == 'not recording')
+    assert said.level == WARN
+    assert said.message == (
+        f'not recording; old recordings cannot be removed: {tmp_path} (Too many open files); '
+        'look at it, and at its disk'
+    )
     it.close()

@@ -28,7 +28,7 @@ PAGES = {
     'diagnose, stated baseline': 'diagnose {coast} {back}',
     'diagnose, fitted baseline': 'diagnose {coast} --ship {plain}',
     'diagnose, no coastdown': 'diagnose {steady}',
-    'learn, no form': 'learn {coast} -o {folder}/none.yaml',
+    'learn, no form': 'learn {coast} -o {folder}/no_form.yaml',
     'trend': 'trend {store}',
     'poster': 'poster {store}',
     'cable': 'cable --length 50 --diameter 0.1 --speed 3',

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.inference.gaussian import products_of
+from shipdrag_ros.inference.linear import Families, of_family, whitened_products
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.inference.settings import SENSORS_ALONE
+from shipdrag_ros.inference.settings import Settings
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Families, mix, of_family
+from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.samples import Float64
@@ -81,7 +82,9 @@ def test_a_linear_model_has_its_closed_form() -> None:
     noise = Noise(np.full(n, variance), WHITE, ones, ones)
     families = Families(mean[None], 1.0 / sd[None] ** 2, np.zeros(1))
     table = np.concatenate([value[None], columns])
-    step, covariance, weight = mix(table, rows, noise, 0, SENSORS_ALONE, families, families)
+    alone = Settings(np.array([WHITE]), np.ones((1, 3)), np.ones(1), np.ones(1))
+    products, log_dets = whitened_products(table, rows, noise, 0, alone)
+    step, covariance, weight = mix(products, log_dets, alone.weight, families, families)
     exact = np.linalg.inv(columns @ columns.T / variance + np.diag(sd**-2.0))
     np.testing.assert_allclose(covariance, exact, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
@@ -90,7 +93,7 @@ def test_a_linear_model_has_its_closed_form() -> None:
     assert weight == pytest.approx(1.0)
     # the evidence is the density of the readings under N(mean columns, columns' sd^2 columns + 1)
     log_det = whiten(rows, table, noise)
-    _, log_evidence, *_ = of_family(products_of(table), mean, sd**-2.0)
+    log_evidence, *_ = of_family(products_of(table), mean, sd**-2.0)
     of_rows = columns.T * sd**2 @ columns + variance * np.eye(n)
     away = value - mean @ columns
     wanted = -0.5 * (away @ np.linalg.solve(of_rows, away) + np.linalg.slogdet(of_rows)[1])
@@ -114,7 +117,7 @@ def test_log_evidence_is_that_of_long_sampling(ship: Ship, seed: int) -> None:
     for _ in range(6):
         table, _ = predict(problem.forces, now, problem.grid_s, problem.rows)
         table /= np.sqrt(problem.white.variance)
-        _, log_evidence, step, lower, scale = of_family(
+        log_evidence, step, lower, scale = of_family(
             products_of(table), family.mean - now, family.precision
         )
         now = now + step

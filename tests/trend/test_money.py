@@ -6,7 +6,7 @@ import pytest
 
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.hull_state import Mixture
-from shipdrag_ros.trend.money import cleaning_date, fuel_t_per_day, usd_per_year
+from shipdrag_ros.trend.ship_trend import cleaning_date, fuel_t_per_day, usd_per_year
 
 PRICES = Economics(
     fuel_usd_per_t=600.0,

@@ -58,10 +58,12 @@ OWN = frozenset(LIBRARY)
 _TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
 
 
-@lru_cache(256)
+_effect_of = lru_cache(256)(effect_of)
+
+
 def declared(term: LearntTerm) -> Effect:
     """
-    Return a learnt term as an effect.
+    Return a learnt term as an effect; of two terms of one name, `find` knows the later.
 
     Raises
     ------
@@ -72,7 +74,7 @@ def declared(term: LearntTerm) -> Effect:
         why = f'name: {term.name!r} is an effect of the library; give it another'
         raise EffectFileError(term.name, [why])
     _TERMS[term.name] = term
-    return effect_of(term)
+    return _effect_of(term)
 
 
 @contextmanager

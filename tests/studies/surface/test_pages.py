@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.regression import Prediction, Surface, fit_surface
-from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.face import show
 from shipdrag_ros.studies.residual.face import verb as words
 from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
 from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.face import verb as surface_words
+from shipdrag_ros.studies.surface.fit import Prediction, Surface, fit_surface
 
 REFUSED = Prediction(1.5, float('inf'), ('x 9 is outside <0..1> of the data',))
 

@@ -6,17 +6,14 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
-from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION
+from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, styled
 from shipdrag_ros.studies.cable.drag import (
     LONGEST,
     PUBLISHED_RANGE,
@@ -32,6 +29,10 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_range,
 )
 from shipdrag_ros.studies.face import Presentation, show
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINES: dict[str, dict[str, Any]] = {
     'C V²': {'color': BLUE, 'linestyle': '-'},
@@ -50,8 +51,8 @@ def coefficient_picture(cable: Cable) -> Figure:
     """
     Draw C0 against l/d, with the place of a cable in it.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.4), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 3.4)
         axis = figure.subplots()
         slenderness = np.geomspace(SHORTEST, LONGEST, 200)
         for surface, style in SURFACES.items():
@@ -76,8 +77,8 @@ def tangent_picture(tangent: Tangent, tolerance: float) -> Figure:
     low, high = tangent_range(tolerance)
     u = np.linspace(0.0, _HIGHEST_U, 251)
     speed = u * v0
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 6.0), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 6.0)
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         drag = tangent.drag.force_n(speed)
         per_unit = tangent.drag.force_n(np.ones(1))  # C of C V: its force at 1 m/s

@@ -6,16 +6,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.regression import Prediction
-from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.numbers import read_numbers
@@ -29,11 +27,16 @@ from shipdrag_ros.studies.residual.fit import (
     leave_hulls_out,
 )
 from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
+from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.face.verb import (
     left_out_picture,
     prediction_documents,
     residual_picture,
 )
+from shipdrag_ros.studies.surface.fit import Prediction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _FIT = 'The fit'
 

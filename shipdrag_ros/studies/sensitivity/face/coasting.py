@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.studies.face import Presentation
@@ -14,6 +13,9 @@ from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.face.pictures import mimic_picture, particulars_picture
 from shipdrag_ros.studies.sensitivity.mimics import WORST
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LOSSES = (
     'Change of the record by a wrong value, in standard deviations of log and position; of r(v) '

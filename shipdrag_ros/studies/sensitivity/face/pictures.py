@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import matplotlib
 import numpy as np
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
 
-from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION
+from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, styled
 from shipdrag_ros.studies.manoeuvring.manoeuvre import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PALE = '#c3d3df'
 
@@ -26,8 +27,8 @@ def ranking_picture(found: SteeringStudy) -> Figure:
     losses, order = found.losses, found.losses.ranking
     places = np.arange(len(order))[::-1]
     chosen = [losses.names.index(name) for name in order]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.8 + 0.2 * len(order)), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 0.8 + 0.2 * len(order))
         axis = figure.subplots()
         count = len(found.selection.kept)
         for part, color, label in (
@@ -65,8 +66,8 @@ def check_picture(found: SteeringStudy) -> Figure:
         (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
         (by_group, f'{found.independent} measurements kept', BLUE, ':'),
     )
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 5.2), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 5.2)
         axes = figure.subplots(2, 2, sharex=True)
         for motion, label, color, style in lines:
             for axis, name, values in (
@@ -88,9 +89,11 @@ def design_picture(shown: Experiment) -> Figure:
     """
     Draw the losses of all derivatives in all manoeuvres as a map.
     """
+    from matplotlib.colors import LogNorm
+
     manoeuvres = [manoeuvre.name for manoeuvre in shown.manoeuvres]
-    with matplotlib.rc_context({**STYLE, 'axes.grid': False}):
-        figure = Figure(figsize=(9.0, 3.0), layout='constrained')
+    with styled({'axes.grid': False}):
+        figure = new_figure(9.0, 3.0)
         axis = figure.subplots()
         largest = float(np.max(shown.loss))
         image = axis.imshow(
@@ -118,8 +121,8 @@ def particulars_picture(found: CoastStudy) -> Figure:
     order = (*found.selection.kept, *found.selection.dropped)
     table = found.losses.table[[found.losses.names.index(name) for name in order]]
     places = np.arange(len(order))[::-1]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.8 + 0.28 * len(order)), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 0.8 + 0.28 * len(order))
         axis = figure.subplots()
         axis.barh(
             places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
@@ -145,8 +148,8 @@ def mimic_picture(found: CoastStudy) -> Figure:
     Draw how much of each effect is left when a value is blamed for it.
     """
     places = np.arange(len(found.mimics))[::-1]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.8 + 0.28 * len(places)), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 0.8 + 0.28 * len(places))
         axis = figure.subplots()
         left = [mimic.left for mimic in found.mimics]
         axis.barh(places, left, color=BLUE, height=0.65)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.studies.face import Presentation
@@ -24,6 +24,9 @@ from shipdrag_ros.studies.sensitivity.steering import (
     ReducedModelCheck,
     SteeringStudy,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LOSSES = (
     'Loss by a derivative that is 10 or 50 per cent wrong: root mean square of the differences in '

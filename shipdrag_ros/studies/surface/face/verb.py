@@ -7,32 +7,33 @@ import argparse
 import keyword
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter, ScalarFormatter
 
 from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.regression import Prediction, Surface, fit_surface
-from shipdrag_ros.regression import words as fit_words
-from shipdrag_ros.regression.surface import LOWEST, MAX_DEGREE
-from shipdrag_ros.report.drawing import BLUE, STYLE, VERMILION
+from shipdrag_ros.report.drawing import BLUE, VERMILION, new_figure, styled
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.numbers import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.surface import words as fit_words
+from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def degree_picture(surface: Surface) -> Figure:
     """
     Draw the residual standard deviation against the degree.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 2.8), layout='constrained')
+    from matplotlib.ticker import MaxNLocator
+
+    with styled():
+        figure = new_figure(9.0, 2.8)
         axis = figure.subplots()
         axis.plot(surface.degrees, np.sqrt(surface.table.variance), color=BLUE, marker='o')
         if np.all(surface.table.variance > 0.0):
@@ -51,8 +52,8 @@ def residual_picture(fitted: Float64, measured: Float64, target: str) -> Figure:
     """
     Draw what a fit leaves, against what it says.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 2.8), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 2.8)
         axis = figure.subplots()
         axis.plot(fitted, measured - fitted, '.', color='#888888', markersize=4, rasterized=True)
         axis.axhline(0.0, color=BLUE, linewidth=1.0)
@@ -68,8 +69,8 @@ def contour_picture(surface: Surface, points: Float64, target: str) -> Figure:
     low, high = surface.domain.lower, surface.domain.upper
     x, y = np.meshgrid(np.linspace(low[0], high[0], 61), np.linspace(low[1], high[1], 61))
     value = surface.polynomial(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(6.5, 4.6), layout='constrained')
+    with styled():
+        figure = new_figure(6.5, 4.6)
         axis = figure.subplots()
         drawn = axis.contourf(x, y, value, levels=16, cmap='cividis')
         figure.colorbar(drawn, label=target)
@@ -90,9 +91,11 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
     target
         What is predicted.
     """
+    from matplotlib.ticker import NullFormatter, ScalarFormatter
+
     inside = leverage <= 1.0
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.0), layout='constrained')
+    with styled():
+        figure = new_figure(9.0, 3.0)
         axis = figure.subplots()
         axis.semilogx(leverage[inside], error[inside], '.', color=BLUE, label='within')
         axis.semilogx(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shipdrag_ros.display import Table
-from shipdrag_ros.regression import Prediction, Surface
+from shipdrag_ros.studies.surface.fit import Prediction, Surface
 
 
 def degrees(surface: Surface) -> Table:

@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.regression import fit_surface
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.surface.fit import fit_surface
 
 ANGLES = ('alpha', 'beta')
 

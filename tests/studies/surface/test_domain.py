@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from shipdrag_ros.regression import Domain
+from shipdrag_ros.studies.surface.fit import Domain
 
 
 @pytest.mark.parametrize('variables', [2, 3, 4])

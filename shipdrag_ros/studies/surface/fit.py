@@ -20,8 +20,8 @@ import numpy as np
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression.least_squares import LinearFit, least_squares
 from shipdrag_ros.regression.order import OrderTable, rounding
-from shipdrag_ros.regression.polynomial import Polynomial, Powers, monomials, terms_up_to
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.surface.polynomial import Polynomial, Powers, monomials, terms_up_to
 
 _ROUNDING = 1e-6  # of the range of the data: as near to the hull as this is inside
 _SUM_TO_ONE = 1e3  # how strongly weights are held to sum to 1
@@ -319,7 +319,7 @@ def fit_surface(
     Examples
     --------
     >>> import numpy as np
-    >>> from shipdrag_ros.regression import fit_surface
+    >>> from shipdrag_ros.studies.surface.fit import fit_surface
     >>> points = np.random.default_rng(1).uniform(size=(30, 2))
     >>> surface = fit_surface(points, 1.0 + points.prod(axis=1), inputs=['a', 'b'])
     >>> f'{surface.predict(np.array([[0.5, 0.5]]))[0].value:.3f}'
