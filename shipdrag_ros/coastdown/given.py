@@ -79,7 +79,8 @@ def judge(accepted: Block, start_ns: int, end_ns: int, ship: Ship, slope_s: floa
         glides=0.0 if known else float(numbers.GLIDES_FIRST),
     )
     if known:
-        regimes.tell(start_ns / SECOND_NS)
+        # the claim: that she glides by then
+        regimes.tell(start_ns / SECOND_NS - 2.0 * float(numbers.TOLD[1]))
     bins = Bins.fresh(LEAD_S + 2 * _PART_S)
     number = np.maximum.accumulate(accepted.stamp_ns // SECOND_NS)
     for at in range(first, end + 1, _PART_S):
@@ -109,7 +110,9 @@ def estimate_given(
     what = regimes.regimes()
     given = EndedCoastdown(start_ns, end_ns, None, EndedBy.GIVEN, None, regimes=what)
     kept = _longest(regimes, start_ns, end_ns)
-    if what is None or kept is None:
+    if what is None:  # nothing to judge it by
+        kept = start_ns, end_ns
+    if kept is None:
         cut = _refused(regimes, start_ns, end_ns)
         return replace(given, failure=f'no coastdown: {cut.text}', withdrawn=True, cuts=(cut,))
     given = replace(
@@ -147,8 +150,10 @@ def _refused(regimes: RegimeFilter, start_ns: int, end_ns: int) -> NotCoastdown:
     return replace(was, start_ns=start_ns, end_ns=end_ns)
 
 
-def _cuts(what: Regimes, start_ns: int, end_ns: int) -> Iterator[NotCoastdown]:
+def _cuts(what: Regimes | None, start_ns: int, end_ns: int) -> Iterator[NotCoastdown]:
     """Yield the parts of a stretch by the likeliest regime of each."""
+    if what is None:
+        return
     names = list(what.probability)
     table = np.array([what.probability[name] for name in names])
     inside = np.flatnonzero((what.time_ns > start_ns) & (what.time_ns < end_ns))

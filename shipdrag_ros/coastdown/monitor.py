@@ -317,7 +317,7 @@ class Monitor:
         if self._running is not None:
             if not slow and regimes.gliding > again:
                 return []
-            events = self._end_glide(regimes, EndedBy.SPEED if slow else None)
+            events = self._end_glide(regimes, number, EndedBy.SPEED if slow else None)
             return events + (self._rest(regimes, number) if slow else [])
         if slow or regimes.asleep:
             return self._rest(regimes, number)
@@ -355,14 +355,21 @@ class Monitor:
         return onset
 
     def _end_glide(
-        self, regimes: RegimeFilter, ended_by: EndedBy | None, last_ns: int | None = None
+        self,
+        regimes: RegimeFilter,
+        number: int,
+        ended_by: EndedBy | None,
+        last_ns: int | None = None,
     ) -> list[Event]:
-        """End the coastdown that runs, as the histories have it now."""
+        """End the coastdown that runs, as the histories have it now, and tell any after it."""
         assert self._running is not None
         start_ns = self._running.onset.start_ns
         dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
         if dated:
-            return self._end(dated[-1], regimes, ended_by, last_ns)
+            events = self._end(dated[0], regimes, ended_by, last_ns)
+            for one in dated[1:]:
+                events += self._all_of(one, regimes, number, ended_by or EndedBy.ENGINE, last_ns)
+            return events
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
@@ -465,7 +472,7 @@ class Monitor:
         if self._regimes is None:
             return events
         if self._running is not None:
-            events += self._end_glide(regimes, ended_by, end_ns)
+            events += self._end_glide(regimes, number, ended_by, end_ns)
         return events + self._rest(regimes, number, ended_by, end_ns)
 
     def _stand_down(self) -> None:
