@@ -314,19 +314,20 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     else:
         sds = max(base.relative_sd, _EXACT), _EXACT
     with_it = wave_with_friction(ship)  # what is more of friction alone is not of the waves
-    for (wide, chance), (size, part) in product(
-        ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
-    ):
+    tails = (1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)
+    for (wide, chance), (size, part) in product(tails, priors.HALF_NORMAL):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
         yield _Hull(
             priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
         )
-    chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
-    for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
-        of_wave = 0.0 - with_it * more, math.hypot(with_it * more, sds[1])
+    share = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
+    for (wide, chance), more, (size, part) in product(
+        tails, priors.LOG_UNIFORM, priors.HALF_NORMAL
+    ):
+        of_wave = 0.0 - with_it * more, math.hypot(with_it * more, wide * sds[1])
         scales = ((more, math.hypot(more, sds[0])), of_wave)
         shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
-        yield _Hull(priors.FRICTION_ALONE, chance * part, scales, shape)
+        yield _Hull(priors.FRICTION_ALONE, share * chance * part, scales, shape)
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ

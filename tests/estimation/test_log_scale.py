@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.priors import LOG_SCALE
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
 
 SHIP = replace(Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml'), baseline=None)
 DRAG_1_M, NOISE_M_S = 3e-4, 0.02  # v' = -DRAG v^2
@@ -46,6 +48,34 @@ def test_the_band_of_a_log_alone_holds_its_scale(estimator, scale: float) -> Non
     assert abs(r - true) < 2.0 * sigma
     # r at a speed goes with the scale where it is quadratic
     assert sigma == pytest.approx(LOG_SCALE.sd * r, rel=0.4)
+
+
+@pytest.mark.parametrize('scale', [-0.03, 0.02])
+@pytest.mark.parametrize('estimator', [estimate, estimate_final])
+def test_a_baseline_does_not_make_a_log_exact(estimator, scale: float) -> None:  # type: ignore[no-untyped-def]
+    """Of the hull of the file, and of one with 16 % more friction and half of its waves."""
+    stated = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
+    for window, of in ((_window(scale, position=False), None), (_of_file(scale), stated)):
+        curve = estimator(window, stated, Parameters()).valid_curve
+        r, sigma = (
+            float(np.interp(AT_M_S, curve.speed_m_s, each))
+            for each in (curve.resistance_m_s2, curve.sigma_repeatable_m_s2)
+        )
+        true = (1.0 + float(SHIP.n_r(AT_M_S))) * DRAG_1_M * AT_M_S**2
+        if of is not None:
+            true = float(of.resistance_n(AT_M_S)) / of.mass_kg
+        assert abs(r - true) < 2.0 * sigma
+        assert 0.5 * LOG_SCALE.sd * r < sigma < 1.5 * LOG_SCALE.sd * r
+
+
+def _of_file(scale: float) -> Window:
+    ship = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
+    effects = [StatedEffect('log_scale', {'factor': Parameter(scale)})]
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=0.0, duration_s=900.0)
+    truth = simulate(replace(ship, propulsion=None), scenario, effects=effects)
+    sensors = [Sensor(channel=Channel.SPEED_THROUGH_WATER, rate_hz=1.0, sd=NOISE_M_S)]
+    block = sense(truth, sensors, seed=1)
+    return Window.from_block(block, START_NS, START_NS + 900 * 10**9)
 
 
 def test_positions_show_the_scale_and_it_is_said() -> None:
