@@ -325,7 +325,8 @@ def test_the_bits_of_an_estimate_do_not_depend_on_what_was_kept(
     for path in callers + random.Random(0).sample(callees, len(callees) // 2):
         path.unlink()
     assert run(ROOT, ESTIMATES, timeout=800.0, SHIPDRAG_CACHE_DIR=str(cache))[0] == result
-    assert [path.name for path in callers if not path.exists()] == []
+    # what is kept may hold compiled variants that these estimates do not call
+    assert {of[path] for path in callers if path.exists()} == {*CALLERS}
 
 
 @pytest.fixture(scope='module')
