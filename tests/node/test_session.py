@@ -148,7 +148,7 @@ def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk:
     assert 'weighed with the readings' in said
     (bag,) = desk.bags()
     kinds = [read_event(row.payload).kind for row in bag if row.topic == f'{NODE}/events']
-    assert kinds == [EventKind.ENGINE_STOPPED]
+    assert kinds == [EventKind.ENGINE_STOPPED] * 2
 
 
 def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
