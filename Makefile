@@ -18,7 +18,7 @@ help:
 	@echo 'make env    only the environment, in $(VENV)'
 	@echo 'make warm   compile now what a first start would compile (a minute)'
 	@echo 'make peers  what benchmarks compare with, into the same environment'
-	@echo 'make lock   resolve the dependencies anew into requirements.lock (needs uv)'
+	@echo 'make lock   resolve the dependencies again into requirements.lock (needs uv)'
 
 env: $(STAMP)
 
@@ -36,7 +36,9 @@ demo: env
 warm: env
 	$(BIN)/python deploy/warm.py
 
-test: lint types tests
+test: env
+	@$(MAKE) --jobs=3 lint types warm  # else each worker of the tests compiles for itself
+	@$(MAKE) tests
 
 lint: env
 	$(BIN)/ruff check .

@@ -2,8 +2,8 @@
 """
 Write docs/figures.md from the result files in docs/results.
 
-    python benchmarks/figures.py                    # the page, from the files as they are
-    python benchmarks/figures.py final_accuracy     # run what made a file first; WORD... or `all`
+    python -m benchmarks.figures                    # the page, from the files as they are
+    python -m benchmarks.figures final_accuracy     # run what made a file first; WORD... or `all`
 
 A result file begins with the command that printed it, `$ python benchmarks/...`, and
 holds what it printed. All of them take hours.
@@ -19,7 +19,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from _tables import table
+from benchmarks._tables import table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, RESULTS = ROOT / 'docs' / 'figures.md', ROOT / 'docs' / 'results'
@@ -72,12 +72,6 @@ FIGURES = tuple(
             _ACCURACY,
         ),
         (
-            'And by S1 as published, cargo ship',
-            's1_accuracy',
-            r'base +│ s1_joint +│ +([\d.]+) │ +[\d.]+ │ +(\d+) │',
-            _ACCURACY,
-        ),
-        (
             'How long does an estimate take?',
             'estimator_speed',
             rf'live{_THIRD}[\s\S]*?final{_THIRD}',
@@ -114,22 +108,10 @@ FIGURES = tuple(
             '{1} of {0} whole messages',
         ),
         (
-            'How fast is NMEA 0183 imported?',
-            'nmea_log',
-            r'import of 443724 lines: .*, (\d+)/s',
-            '{0} lines a second',
-        ),
-        (
             'How late is an estimate on board, at 1 Hz?',
-            'release_0_1',
+            'node_latency',
             r'\| 1 Hz \| ([\d.]+) / (\d+) \| ([\d.]+) % \|',
             'median {0} ms, 99 % within {1} ms; {2} % of a core',
-        ),
-        (
-            'What does a recorder killed with -9 lose?',
-            'release_0_1',
-            r'recorder killed with -9.*?\| ([\d.]+) / ([\d.]+) \|',
-            'median {0} s of input, at most {1} s',
         ),
         (
             'Is a name of `diagnose` right? World B, by another author, one effect hidden',
@@ -147,14 +129,9 @@ FIGURES = tuple(
 )
 MORE = {
     'accuracy_beside_peers': 'the final curve beside twelve other estimators',
-    'accuracy_0_1': 'the error of r(v), release 0.1: thrust after the stop, unseen hulls, more '
-    'information, the band on two simulated worlds',
-    'effects_speed': 'simulating each effect: time and error of a step',
     'house': 'lines and modules of the package',
     'real_records': 'measured records, by themselves and beside what is known of them',
-    'bad_input': 'each kind of bad input, and what the user sees',
     'import': 'files of others, and damaged files of each format',
-    'node_faults': 'faults on the topics, floods, a day of sailing, the first start',
 }
 
 
@@ -186,7 +163,7 @@ def page() -> str:
         '',
         'Each figure is taken from a result file, which begins with the command that printed it; '
         'N and seeds are there.',
-        '`python benchmarks/figures.py` writes this page from the files, with a word of their '
+        '`python -m benchmarks.figures` writes this page from the files, with a word of their '
         'names it makes them again first.',
         'Misses stand there as measured. Unless said otherwise: a 150 m cargo ship from 8.2 m/s, '
         '1500 s, log 0.05 m/s,',
@@ -196,7 +173,7 @@ def page() -> str:
         '',
         'What is expected of r(v) was chosen in view of the cargo ship, the tanker and the yacht; '
         'on hulls that it was not chosen on',
-        'the error is larger and the band a little narrow (`unseen_hulls.py`). Worlds A and B '
+        'the error is larger and the band a little narrow. Worlds A and B '
         'share no code with the package; A was',
         'used while the method was made, B by another author was not, but for its even half.',
         '',

@@ -2,8 +2,8 @@
 """
 Count the house: how much code there is, and through how many rooms a job goes.
 
-    python benchmarks/house.py                     # this tree
-    python benchmarks/house.py --tree OLD --tree . # two trees beside each other
+    python -m benchmarks.house                     # this tree
+    python -m benchmarks.house --tree OLD --tree . # two trees beside each other
 
 Core code is what a coastdown may need: lines of `shipdrag_ros` without
 docstrings, blanks and comments, and without the studies S2 to S5; an `__init__` is no

@@ -19,7 +19,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from nbclient import NotebookClient
 
-from shipdrag_ros.cli import VERBS, parser
+from shipdrag_ros.cli import parser, verbs
 
 NOTEBOOKS = Path(__file__).parent / 'notebooks'
 LIMIT_S = 600  # of a cell, on a machine where nothing is compiled yet
@@ -53,10 +53,10 @@ def commands() -> str:
         '# Commands',
         'What `shipdrag VERB --help` prints. Exit status: 0 done, 1 user error, 2 usage.',
     ]
-    whole = parser(*(verb.name for verb in VERBS))
+    whole = parser(*(verb.name for verb in verbs()))
     (below,) = (it.choices for it in whole._actions if it.dest == 'verb')
     assert isinstance(below, dict)
-    for verb in VERBS:
+    for verb in verbs():
         parts += [f'## {verb.name}', f'```text\n{below[verb.name].format_help().strip()}\n```']
     return '\n\n'.join(parts)
 

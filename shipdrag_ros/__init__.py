@@ -14,6 +14,7 @@ node pay for none of them. docs/python.md shows how they go together.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,11 @@ if TYPE_CHECKING:
     from shipdrag_ros.parameters import Parameters
     from shipdrag_ros.ship import Ship
 
-__version__ = '0.3.0'
+# before anything imports numba: the same machine code, and so the same bits, in every process and
+# on every computer of a kind
+os.environ.setdefault('NUMBA_CPU_NAME', 'generic')
+
+__version__ = '0.4.0'
 
 __all__ = [
     'Coastdown',

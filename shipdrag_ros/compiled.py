@@ -20,33 +20,18 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, update_wrapper
 from pathlib import Path
-from typing import Any, ParamSpec, Protocol, TypeVar, overload
-
-import llvmlite
-import numba
-import numpy as np
-from numba.core import caching, compiler, config, serialize, sigutils
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import CPUDispatcher
+from typing import Any, ParamSpec, TypeVar, overload
 
 Arguments = ParamSpec('Arguments')
 Result = TypeVar('Result')
 
-
-class Signature(Protocol):
-    """
-    A signature as numba makes one of types; text serves too.
-    """
-
-    args: tuple[Any, ...]
-    return_type: Any
-
-
 CACHE_DIR = 'SHIPDRAG_CACHE_DIR'  # environment
+PROCESSOR = 'generic'  # of its kind: the same machine code on every ship's computer
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
 # any mention of a module, which is fast to find, and what is imported from it
@@ -58,6 +43,8 @@ _FORGOTTEN_S = 90 * 86400.0  # not used for so long: its module may be gone
 _log = logging.getLogger(__name__)
 _not_kept: list[str] = []
 _waiting: set[_LazyFunction] = set()
+_listeners: list[Callable[[], object]] = []
+_importing = threading.Lock()  # numba's modules import each other in a circle
 
 
 @overload
@@ -66,9 +53,10 @@ def compiled(function: Callable[Arguments, Result], /) -> Callable[Arguments, Re
 
 @overload
 def compiled(
-    signature: str | Signature | None = None,
+    signature: str | None = None,
     /,
     *,
+    like: Mapping[str, object] | None = None,
     fastmath: set[str] | bool = False,
     inline: bool = False,
     uncounted: bool = False,
@@ -79,6 +67,7 @@ def compiled(
     signature: Any = None,
     /,
     *,
+    like: Mapping[str, object] | None = None,
     fastmath: set[str] | bool = False,
     inline: bool = False,
     uncounted: bool = False,
@@ -86,11 +75,16 @@ def compiled(
     """
     Compile a function of this package to machine code; it keeps its type.
 
+    The compiler is imported with the first call of any such function: that takes a third of a
+    second, which a verb that calls none does not pay.
+
     Parameters
     ----------
     signature
-        Of numba, as text or type: the function is compiled for this one only, by `compile_all`
+        Of numba, as text: the function is compiled for this one only, by `compile_all`
         or on its first call. Without it, on the first call with arguments of a type.
+    like
+        Names in the signature, each with a value whose type it stands for.
     fastmath
         What LLVM may do to floating-point arithmetic.
     inline
@@ -105,7 +99,7 @@ def compiled(
         If the function uses variables of a function around it: its source is then not all
         that it depends on.
     """
-    if callable(signature) and not isinstance(signature, numba.types.Type | str):
+    if callable(signature):
         return compiled()(signature)
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -116,14 +110,9 @@ def compiled(
             options['_nrt'] = False
         if inline:
             options['forceinline'] = True
-        dispatcher = numba.njit(**options)(function)
-        if not config.DISABLE_JIT:
-            folder = _folder(function.__module__)
-            if folder is not None:
-                dispatcher._cache = _Cache(function, folder)
-            if signature is not None:
-                _LazyFunction.take(dispatcher, signature)
-        result: Callable[Arguments, Result] = dispatcher
+        result: Callable[Arguments, Result] = _LazyFunction(
+            function, options, signature, dict(like or {})
+        )
         return result
 
     return decorate
@@ -137,39 +126,113 @@ def compile_all() -> None:
         next(iter(_waiting)).compile_now()
 
 
-class _LazyFunction(CPUDispatcher):  # type: ignore[misc]
+@contextlib.contextmanager
+def when_compiling(say: Callable[[], object]) -> Iterator[None]:
     """
-    A function with a signature, before it is needed; then it is as numba makes it.
+    Call something each time that a function is compiled, and not taken from what is kept.
     """
+    _listeners.append(say)
+    try:
+        yield
+    finally:
+        _listeners.remove(say)
 
-    @classmethod
-    def take(cls, dispatcher: Any, signature: Any) -> None:
-        """Let a function wait."""
-        dispatcher._signature_to_come = signature
-        dispatcher.__class__ = cls
-        _waiting.add(dispatcher)
 
-    def compile_now(self) -> None:
-        """Compile it, or take what is kept; another thread may have done so."""
-        with global_compiler_lock:
-            if self in _waiting:
-                CPUDispatcher.compile(self, self._signature_to_come)
-                self.disable_compile()
-                self.__class__ = CPUDispatcher
-                _waiting.remove(self)
+class _LazyFunction:
+    """A function before it is needed; it passes every call on to what numba makes of it."""
 
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return what it is to compiled code that calls it."""
-        self.compile_now()
-        return self.get_call_template(args, kws)
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        options: dict[str, Any],
+        signature: str | None,
+        like: dict[str, object],
+    ) -> None:
+        update_wrapper(self, function)
+        self._function = function
+        self._options = options
+        self._signature = signature
+        self._like = like
+        self._made: Any = None
+        self._call: Callable[..., Any] = self._first
+        if signature is not None:
+            _waiting.add(self)
 
     def __call__(self, *args: Any, **kws: Any) -> Any:
-        """Call it, for the first time."""
-        self.compile_now()
-        return self(*args, **kws)
+        """Call it."""
+        return self._call(*args, **kws)
+
+    def _first(self, *args: Any, **kws: Any) -> Any:
+        self._call = self.compile_now()
+        return self._call(*args, **kws)
+
+    def compile_now(self) -> Any:
+        """Return what numba makes of it, compiled where a signature says for what."""
+        with _importing:  # another thread may do the same
+            lock = _numba_lock()
+        with lock:
+            if self._made is None:
+                self._made = _dispatcher(self._function, self._options)
+            if self in _waiting:
+                _waiting.remove(self)
+                if hasattr(self._made, 'compile'):  # else compiling is disabled
+                    self._made.compile(_signature_of(self._signature or '', self._like))
+                    self._made.disable_compile()
+            return self._made
+
+    @property
+    def signatures(self) -> list[Any]:
+        """What it is compiled for."""
+        return [] if self._made is None else list(self._made.signatures)
 
 
-class _Cache(caching.NullCache):  # type: ignore[misc]
+@cache
+def _numba_lock() -> Any:
+    """Import numba for one kind of processor, and teach it what a lazy function is."""
+    from numba.core import config, event
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.extending import typeof_impl
+
+    # also where something else has imported numba before
+    config.CPU_NAME = os.environ.setdefault('NUMBA_CPU_NAME', PROCESSOR)
+
+    class Notice(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: object) -> None:
+            for say in list(_listeners):
+                say()
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    event.register('numba:compile', Notice())
+
+    @typeof_impl.register(_LazyFunction)
+    def _(value: _LazyFunction, context: Any) -> Any:
+        return typeof_impl(value.compile_now(), context)
+
+    return global_compiler_lock
+
+
+def _dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    import numba
+
+    made = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:
+        folder = _folder(function.__module__)
+        if folder is not None:
+            made._cache = _Cache(function, folder)
+    return made
+
+
+def _signature_of(text: str, like: Mapping[str, object]) -> Any:
+    """Return a signature as numba reads one, with names of its own."""
+    import numba
+
+    names = {name: numba.typeof(value) for name, value in like.items()}
+    return eval(text, {'__builtins__': {}}, {**vars(numba.types), **names})
+
+
+class _Cache:
     """
     What numba compiled of one function, a file for each type of arguments.
 
@@ -191,6 +254,8 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a type of arguments, None if nothing."""
+        from numba.core import compiler
+
         target_context.refresh()
         path = self._path(sig, target_context.codegen())
         try:
@@ -207,6 +272,8 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a type of arguments."""
+        from numba.core import serialize
+
         if data.library.has_dynamic_globals:  # addresses, of this process only
             return
         path = self._path(sig, data.codegen)
@@ -229,6 +296,8 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
 
 def _arguments(signature: Any) -> tuple[Any, ...]:
     """Return the types of the arguments, however the signature is given."""
+    from numba.core import sigutils
+
     return tuple(sigutils.normalize_signature(signature)[0])
 
 
@@ -296,13 +365,18 @@ def _file(module: str) -> str:
 @cache
 def _compiler() -> tuple[object, ...]:
     """Return all else that the machine code depends on, after source and processor."""
+    import llvmlite
+    import numba
+    import numpy as np
+
+    _numba_lock()  # which settles for what processor
     settings = sorted(
         f'{name}={value}'
         for name, value in os.environ.items()
         if name.startswith('NUMBA_') and 'CACHE' not in name and 'THREAD' not in name
     )
     versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
-    return (*versions, config.USING_SVML, settings)
+    return (*versions, numba.config.USING_SVML, settings)
 
 
 @cache

@@ -111,6 +111,25 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope='session')
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Make a folder once, for all processes of a test run."""
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if 'PYTEST_XDIST_WORKER' in os.environ else base
+
+    def folder_of(name: str, make: Callable[[Path], object]) -> Path:
+        folder, done = base / name, base / f'{name}.done'
+        with (base / f'{name}.lock').open('w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not done.exists():
+                folder.mkdir()
+                make(folder)
+                done.touch()
+        return folder
+
+    return folder_of
+
+
+@pytest.fixture(scope='session')
 def browser() -> Iterator[Any]:
     """Chromium, driven by Playwright; one a process, which cannot drive two."""
     program = next(filter(None, map(shutil.which, _BROWSERS)), None)
@@ -198,7 +217,8 @@ def estimate(ship: Ship) -> Estimate:
         ),
         samples={'speed_through_water': 1500, 'position': 1500},
         noise_sd={'speed_through_water': 0.05, 'position': 10.0},
-        curve=curve,
+        calm=curve,
+        conditions=curve,
         froude_valid=(0.05, 0.18),
         froude_max_by=FroudeMax.INFLECTION,
         froude_max_argmax=0.2,

@@ -223,9 +223,38 @@ def test_a_given_folder_that_cannot_be_used_is_said(toy: Path, tmp_path: Path) -
 
 
 def test_a_folder_that_vanishes_while_it_runs_is_made_again(toy: Path, tmp_path: Path) -> None:
-    code = f'import shutil, shipdrag_ros.callee; shutil.rmtree({str(tmp_path / "c")!r}); {CALL}'
+    made = 'import shutil; from shipdrag_ros.compiled import cache_root; cache_root()'
+    code = f'{made}; shutil.rmtree({str(tmp_path / "c")!r}); {CALL}'
     assert run(toy, code, SHIPDRAG_CACHE_DIR=str(tmp_path / 'c')) == ('4.0', '')
     assert len(kept(tmp_path / 'c')) == 2
+
+
+def test_the_machine_code_is_for_any_processor_of_its_kind(toy: Path, tmp_path: Path) -> None:
+    """Also where something else has imported numba before: no bit depends on the processor."""
+    for before in ('', 'import numba; '):
+        settings = {'SHIPDRAG_CACHE_DIR': str(tmp_path / f'c{len(before)}')}
+        show = 'from numba.core.registry import cpu_target as t; '
+        show += 'print(t.target_context.codegen().magic_tuple()[1])'
+        found, _ = run(toy, f'{before}{CALL}; {show}', **settings)
+        assert found.split('\n') == ['4.0', 'generic']
+
+
+def test_two_threads_at_once_may_need_the_compiler_first(toy: Path) -> None:
+    """The second comes in the middle of the import, whose modules import each other."""
+    code = """if True:
+        import sys, threading, time
+        from shipdrag_ros.caller import twice
+        def work(): sys.stdout.write(f'{twice(1.0)}\\n')
+        other = threading.Thread(target=work)
+        def watch(event, values):
+            if event == 'import' and values[0] == 'numba.misc.special' and not other.ident:
+                other.start()
+                time.sleep(0.5)
+        sys.addaudithook(watch)
+        work()
+        other.join()
+    """
+    assert run(toy, code) == ('4.0\n4.0', '')
 
 
 def test_a_closure_is_refused() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import glob
 import gzip
-import importlib.util
 import os
 import re
 import shlex
@@ -14,15 +13,16 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.cli import main, parser, verbs
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
+from tests.sources import log_samples
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
@@ -69,9 +69,13 @@ def help_text(verb: str, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.fixture(scope='module')
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make small files of the names that examples take for granted."""
-    folder = tmp_path_factory.mktemp('made')
+def made(once: Callable[..., Path]) -> Path:
+    """Small files of the names that examples take for granted."""
+    return once('made', make_files)
+
+
+def make_files(folder: Path) -> None:
+    """Make them."""
     ship = ROOT / 'config' / 'vitus_bering.yaml'
     shutil.copy(ship, folder / 'ship.yaml')
     shutil.copy(ROOT / 'config' / 'parameters.yaml', folder / 'parameters.yaml')
@@ -92,22 +96,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'log.csv').write_text('\n'.join(table))
     with gzip.open(folder / 'LOG.nmea.gz', 'wt') as log:
         log.writelines(nmea(second) for second in range(60))
-    return folder
 
 
 def make_logs(folder: Path) -> None:
     """Make a file of each format that docs/import.md names."""
-    place = ROOT / 'benchmarks' / '_log_samples.py'
-    spec = importlib.util.spec_from_file_location('_log_samples', place)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
     names = {'csv': 'bridge.csv', 'candump': 'candump.log', 'yacht_devices': 'ydwg.raw'}
     names |= {'nmea': 'log.nmea', 'ros1': 'ros1.bag'}
-    for kind, (name, content) in made.samples(folder).items():
+    for kind, (name, content) in log_samples.samples(folder).items():
         (folder / names.get(kind, name)).write_bytes(content)
-    head, *rows = [line.split(',') for line in made.csv().decode().split('\n')]
+    head, *rows = [line.split(',') for line in log_samples.csv().decode().split('\n')]
     for name, columns in (('receiver', (0, 2, 3, 4)), ('speed_log', (0, 1))):
         lines = (','.join(row[column] for column in columns) for row in [head, *rows])
         (folder / f'{name}.csv').write_text('\n'.join(lines))
@@ -173,7 +170,7 @@ def make_room(name: str) -> None:
         Path(name).unlink(missing_ok=True)
 
 
-STARTED: set[str] = set()  # processes that need nothing of the lines before them
+STARTED: set[str] = set()  # programs that were started; of more lines the words are read
 
 
 def run(command: str) -> None:
@@ -187,10 +184,13 @@ def run(command: str) -> None:
     if words[0] == 'shipdrag' and words[1] not in ('node', 'watch'):
         assert main(words[1:]) == 0, command
         return
-    if command in STARTED:
+    program = words[1] if words[0] == 'shipdrag' else words[0]
+    if words[0] == 'shipdrag':
+        parser(program).parse_args(words[1:])
+    if program in STARTED:
         return
-    STARTED.add(command)
-    if words[1] == 'watch':
+    STARTED.add(program)
+    if program == 'watch':
         run_watch(words)
         return
     pytest.importorskip('rclpy')
@@ -213,7 +213,7 @@ def run(command: str) -> None:
         recorded.unlink()  # it has heard no ship, and a replay of nothing is an error
 
 
-@pytest.mark.parametrize('verb', [verb.name for verb in VERBS])
+@pytest.mark.parametrize('verb', [verb.name for verb in verbs()])
 def test_the_examples_of_the_help_run(
     folder: Path, verb: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,7 +16,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.messages import DEFAULT_NODE, OUTPUT_TOPICS, input_type
-from shipdrag_ros.messages.reporting import CURVE_FIELDS
+from shipdrag_ros.messages.publishing import CURVE_FIELDS
 from shipdrag_ros.node.health import Standing, state_status
 from shipdrag_ros.samples import Channel
 

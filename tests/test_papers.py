@@ -4,23 +4,19 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import re
-import sys
 from pathlib import Path
 
 import pytest
+
+from benchmarks import figures
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.mark.parametrize('name', ['s2_cable'])
 def test_the_page_is_as_its_script_makes_it(name: str) -> None:
-    spec = importlib.util.spec_from_file_location(name, ROOT / 'benchmarks' / f'{name}.py')
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
+    script = importlib.import_module(f'benchmarks.accuracy.{name}')
     shown = (ROOT / 'docs' / f'{name}.md').read_text(encoding='utf-8')
     assert shown == script.page(), f'run: python benchmarks/{name}.py --write'
     for picture in script.PICTURES:
@@ -28,13 +24,8 @@ def test_the_page_is_as_its_script_makes_it(name: str) -> None:
 
 
 def test_the_page_of_figures_is_as_its_result_files_make_it() -> None:
-    sys.path.insert(0, str(ROOT / 'benchmarks'))
-    try:
-        figures = importlib.import_module('figures')
-    finally:
-        sys.path.remove(str(ROOT / 'benchmarks'))
     shown = (ROOT / 'docs' / 'figures.md').read_text(encoding='utf-8')
-    assert shown == figures.page(), 'run: python benchmarks/figures.py'
+    assert shown == figures.page(), 'run: python -m benchmarks.figures'
     missing = figures.FIGURES[0]._replace(pattern='no such row (.)')
     with pytest.raises(SystemExit, match='does not answer'):
         figures.found(missing)
@@ -49,7 +40,7 @@ def test_the_page_of_figures_is_as_its_result_files_make_it() -> None:
 
 def test_what_the_readme_says_of_trends_is_what_was_counted() -> None:
     counted = (ROOT / 'docs' / 'results' / 'trend.txt').read_text(encoding='utf-8')
-    [ships] = re.findall(r'trend_score\.py --ships (\d+)', counted)
+    [ships] = re.findall(r'trend_score --ships (\d+)', counted)
     [share] = re.findall(r'found and dated within a month \| (\d+) %', counted)
     [false] = re.findall(r'\| false steps \| (\d+) \|', counted)
     found = round(int(share) / 100 * int(ships))

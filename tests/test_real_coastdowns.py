@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+
+from benchmarks.accuracy import real_coastdowns
 
 ROOT = Path(__file__).resolve().parents[1]
 START_NS = 10**18
@@ -18,11 +18,7 @@ START_NS = 10**18
 
 @pytest.fixture(scope='module')
 def script() -> ModuleType:
-    sys.path.insert(0, str(ROOT / 'benchmarks'))
-    try:
-        return importlib.import_module('real_coastdowns')
-    finally:
-        sys.path.pop(0)
+    return real_coastdowns
 
 
 def said(
@@ -113,4 +109,4 @@ def test_the_page_says_what_the_program_says(
     data = Path(os.environ['SHIPDRAG_DATA'])
     script.run_command(coast.record.import_command(), data=data, out=tmp_path)
     page = script.PAGE.read_text(encoding='utf-8').splitlines()
-    assert script.row(coast, tmp_path) in page, 'run: python benchmarks/real_coastdowns.py --write'
+    assert script.row(coast, tmp_path) in page, 'run real_coastdowns --write'

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
@@ -14,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from benchmarks.accuracy import real_diagnosis, real_records
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / 'docs' / 'real_records.md').read_text(encoding='utf-8')
@@ -34,23 +35,7 @@ needs_data = pytest.mark.skipif(
 @pytest.fixture(scope='module')
 def script() -> ModuleType:
     """The script that prints the page's figures."""
-    return loaded('real_records')
-
-
-def loaded(name: str) -> ModuleType:
-    """Load a script."""
-    folder = ROOT / 'benchmarks'
-    spec = importlib.util.spec_from_file_location(name, folder / f'{name}.py')
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.path.insert(0, str(folder))
-    sys.modules[name] = module  # where dataclasses look for it
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(str(folder))
-    return module
+    return real_records
 
 
 @pytest.fixture(scope='module')
@@ -74,7 +59,7 @@ def test_the_page_shows_the_commands_of_the_script(script: ModuleType) -> None:
     assert len(COMMANDS) == 10
     assert set(COMMANDS) <= known
     assert list(ROWS) == [record.name for record in script.RECORDS]
-    known |= {line for both in loaded('real_diagnosis').RECORDS.values() for line in both}
+    known |= {line for both in real_diagnosis.RECORDS.values() for line in both}
     assert len(SPANS) == 2
     assert {line.replace('log.mcap', 'yacht.mcap') for line in SPANS} <= known
 
@@ -162,17 +147,17 @@ def test_the_ferry_path_and_the_ship_at_rest(
 @pytest.fixture(scope='module')
 def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `diagnose --json` says of the logs of two yachts."""
-    script = loaded('real_diagnosis')
+    script = real_diagnosis
     out, data = tmp_path_factory.mktemp('diagnoses'), Path(os.environ['SHIPDRAG_DATA'])
     return {name: script.diagnosed(name, data=data, out=out) for name in script.RECORDS}
 
 
 @needs_data
 def test_the_page_says_what_the_command_says(diagnoses: dict[str, Any]) -> None:
-    script = loaded('real_diagnosis')
+    script = real_diagnosis
     for name, found in diagnoses.items():
         made = f'<!-- {name} -->\n{script.block(found)}\n<!-- end {name} -->'
-        assert made in TABLES, 'run: python benchmarks/real_diagnosis.py --write'
+        assert made in TABLES, 'run: python -m benchmarks.accuracy.real_diagnosis --write'
 
 
 @needs_data

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,12 @@ LOADED = re.compile(r'<(?:script|link|img|iframe)\b[^>]*?(?:src|href)="(?:https?
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(once: Callable[..., Path]) -> Path:
     pytest.importorskip('mkdocs')
-    folder = tmp_path_factory.mktemp('site')
+    return once('site', build)
+
+
+def build(folder: Path) -> None:
     line = [sys.executable, '-m', 'mkdocs', 'build', '--quiet', '--strict', '--site-dir', folder]
     done = subprocess.run(
         line,
@@ -31,7 +35,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    return folder
 
 
 def test_every_page_is_there(site: Path) -> None:

@@ -12,10 +12,9 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types as nb
 from numpy.typing import NDArray
 
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Int64, UInt8
 
 CHANNELS = 1 << 16
@@ -202,27 +201,15 @@ def _uint64(data: Any, place: Any) -> Any:
     )
 
 
-_BYTES_READ = nb.Array(nb.uint8, 1, 'C', readonly=True)
-_PLACES_READ = nb.Array(nb.int64, 1, 'C', readonly=True)
+_GIVEN = 'Array({}, 1, "C", readonly=True)'
+_OCTETS, _PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
 
 
-_SIGNATURE: Signature = nb.UniTuple(nb.int64, 2)(
-    _BYTES_READ,
-    _PLACES_READ,
-    _PLACES_READ,
-    _BYTES_READ,
-    nb.int64[::1],
-    nb.int64[::1],
-    nb.uint16[::1],
-    nb.int64[::1],
-    nb.int64[::1],
-    nb.int64[::1],
-    nb.int64[:, ::1],
+@compiled(
+    f'UniTuple(i8, 2)({_OCTETS}, {_PLACES}, {_PLACES}, {_OCTETS}, '
+    'i8[::1], i8[::1], u2[::1], i8[::1], i8[::1], i8[::1], i8[:, ::1])',
+    uncounted=True,
 )
-_PACK: Signature = nb.void(_BYTES_READ, _PLACES_READ, _PLACES_READ, nb.uint8[::1])
-
-
-@compiled(_SIGNATURE, uncounted=True)
 def _index(
     data: UInt8,
     bounds: Int64,
@@ -279,7 +266,7 @@ def _index(
     return n, m
 
 
-@compiled(_PACK, uncounted=True)
+@compiled(f'void({_OCTETS}, {_PLACES}, {_PLACES}, u1[::1])', uncounted=True)
 def _pack(data: UInt8, start: Int64, end: Int64, packed: UInt8) -> None:
     at = 0
     for i in range(len(start)):

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
-from shipdrag_ros.cli.arguments import Help
+from shipdrag_ros.cli.arguments import Help, add_effects
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
@@ -67,13 +67,7 @@ _OWN = (
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),
 )
-VERBS = (
-    *_OWN,
-    *(
-        Verb(study.verb, f'{package}.face.verb', study.summary)
-        for package, study in found(frozenset(verb.name for verb in _OWN))
-    ),
-)
+_WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -140,7 +134,8 @@ def _run(line: list[str]) -> int:
 def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
     if not folders:
         return nullcontext()
-    from shipdrag_ros.learning.folder import read_folders, using
+    from shipdrag_ros.learning.folder import read_folders
+    from shipdrag_ros.simulation.effects import using
 
     return using(read_folders(folders))
 
@@ -156,6 +151,15 @@ def _error_text(error: OSError) -> str:
     )
 
 
+def verbs() -> tuple[Verb, ...]:
+    """
+    Return all verbs; those of studies are looked for, also in other packages, which takes a while.
+    """
+    studies = found(frozenset(verb.name for verb in _OWN))
+    of_studies = (Verb(each.verb, f'{where}.face.verb', each.summary) for where, each in studies)
+    return (*_OWN, *of_studies)
+
+
 def parser(*of: str) -> argparse.ArgumentParser:
     """
     Return the parser of the command line, with the arguments of the verbs `of`.
@@ -166,9 +170,10 @@ def parser(*of: str) -> argparse.ArgumentParser:
         'Exit status: 0 done, 1 user error, 2 usage.',
     )
     top.add_argument('--version', action='version', version=f'shipdrag_ros {__version__}')
-    verbs = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
-    for known in VERBS:
-        added = verbs.add_parser(
+    added_to = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
+    own = {verb.name for verb in _OWN}
+    for known in _OWN if of and own.issuperset(of) else verbs():
+        added = added_to.add_parser(
             known.name, help=known.summary, description=known.summary, formatter_class=Help
         )
         if known.name in of:
@@ -176,5 +181,7 @@ def parser(*of: str) -> argparse.ArgumentParser:
             with uncollected():
                 module = import_module(known.module, __name__)
             module.add_arguments(added)
+            if known.name not in _WITHOUT_EFFECTS:
+                add_effects(added)
             added.set_defaults(run=module.run)
     return top

@@ -47,7 +47,7 @@ def script(shell: str) -> str:
     """
     Return the script for a shell, one of `SHELLS`.
     """
-    whole = cli.parser(*(verb.name for verb in cli.VERBS))
+    whole = cli.parser(*(verb.name for verb in cli.verbs()))
     for parser in (whole, *_below(whole)):
         for action in parser._actions:
             metavar = str(action.metavar or '').partition('.')[0]

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import (
-    add_effects,
     add_json,
     add_remap,
     add_report,
@@ -90,7 +89,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'what was found of hull and instruments counts, less the longer ago it was; water and '
         'weather do not',
     )
-    add_effects(parser)
     add_remap(parser)
     add_json(parser)
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_effects, add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.learning.term import OWN, LearntTerm
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.ship.expression import unit_text
+from shipdrag_ros.ship.term import RESULT, LearntTerm
+from shipdrag_ros.simulation.effects import LIBRARY, OWN, declared
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,8 +46,10 @@ def _check(files: list[Path], output: Output) -> int:
     document = []
     for path in files:
         term = LearntTerm.load(path)  # the first that cannot be used is the error
-        output.say(f'{path}: {term.name} can be used: {term.form.expression} [N]')
-        document.append({'file': str(path), 'name': term.name, 'channel': term.form.channel})
+        declared(term)
+        unit = unit_text(RESULT[term.term.channel])
+        output.say(f'{path}: {term.name} can be used: {term.term.expression} [{unit}]')
+        document.append({'file': str(path), 'name': term.name, 'channel': term.term.channel})
     output.json({'effects': document})
     return 0
 

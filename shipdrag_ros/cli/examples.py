@@ -81,14 +81,17 @@ EXAMPLES = {
         'shipdrag recover damaged.mcap -o again.mcap --json recover.json',
     ),
 }
-EXAMPLES |= {study.verb: study.examples for _, study in found(frozenset(EXAMPLES))}
 
 
 def epilog(verb: str) -> str:
     """
     Return the examples of a verb, as they stand below its help.
     """
-    lines = EXAMPLES[verb]
+    lines = EXAMPLES.get(verb) or _of_studies()[verb]
     return '\n'.join(
         [f'example{"s" if len(lines) > 1 else ""}:', *(f'  {line}' for line in lines)]
     )
+
+
+def _of_studies() -> dict[str, tuple[str, ...]]:
+    return {study.verb: study.examples for _, study in found(frozenset(EXAMPLES))}

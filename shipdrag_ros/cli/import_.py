@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> int:
     for line in found.notes:
         output.say(line)
     documents = [
-        {'source': str(source), 'format': each.name, **asdict(result)}  # type: ignore[call-overload]
+        {'source': str(source), 'format': each.name, **asdict(result)}
         for source, each, result in zip(options.sources, chosen, found.results, strict=True)
     ]
     whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': found.notes}

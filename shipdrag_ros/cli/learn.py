@@ -7,13 +7,13 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_effects, add_json, add_remap, add_report, unused_file
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, unused_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.learning import words
-from shipdrag_ros.learning.term import check_name
+from shipdrag_ros.learning.folder import check_name
 from shipdrag_ros.library.learning import learn_from
 from shipdrag_ros.ship import Ship
 
@@ -56,7 +56,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='what the effect is called, small letters, digits and _ (default: that of the file)',
     )
     add_report(parser, of='result')
-    add_effects(parser)
     add_remap(parser)
     add_json(parser)
 

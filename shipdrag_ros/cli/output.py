@@ -17,6 +17,7 @@ from rich.progress import Progress as RichProgress
 from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
+from shipdrag_ros.compiled import when_compiling
 from shipdrag_ros.display import Table, duration, json_text
 from shipdrag_ros.progress import PartDone, Progress
 
@@ -53,20 +54,14 @@ def compiling_said(log: Callable[[str], None]) -> Iterator[None]:
     log
         Where it is said; not of what is kept from an earlier start.
     """
-    from numba.core import event  # long to import, and help must come at once
+    said: list[str] = []
 
-    class Notice(event.Listener):  # type: ignore[misc]
-        said = False
+    def say() -> None:
+        if not said:
+            log(_COMPILES)
+        said.append(_COMPILES)
 
-        def on_start(self, event: object) -> None:
-            if not self.said:
-                log(_COMPILES)
-            self.said = True
-
-        def on_end(self, event: object) -> None:
-            pass
-
-    with event.install_listener('numba:compile', Notice()):
+    with when_compiling(say):
         yield
 
 

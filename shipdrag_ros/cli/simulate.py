@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_effects, add_json, number, whole
+from shipdrag_ros.cli.arguments import add_json, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library import simulated
@@ -26,7 +26,7 @@ from shipdrag_ros.simulation import (
     STANDARD_SD,
     START_NS,
 )
-from shipdrag_ros.simulation.effects import LIBRARY, parse, values_of
+from shipdrag_ros.simulation.effects import LIBRARY, find, parse, values_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,7 +91,6 @@ def _add_day(parser: argparse.ArgumentParser) -> None:
         + '; '.join(_form(name) for name in LIBRARY)
         + '. docs/effects.md says what each does',
     )
-    add_effects(parser)
     parser.add_argument(
         '--first-heading',
         type=number(-2 * math.pi, 2 * math.pi, unit='rad'),
@@ -190,7 +189,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _form(name: str) -> str:
     """Return how an effect is given."""
-    first, *others = LIBRARY[name].parameters
+    first, *others = find(name).parameters
     unit = f' [{first.unit}]' if first.unit else ''
     return f'{name}={first.name}{unit}' + ''.join(f',{other.name}=' for other in others)
 

@@ -7,13 +7,15 @@ import argparse
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.library.replaying import WindowedRun, WindowSpan
+
+if TYPE_CHECKING:
+    from shipdrag_ros.library.replaying import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
 
@@ -111,6 +113,8 @@ def open_windowed(
     ImportDataError
         If nothing in a log can be used.
     """
+    from shipdrag_ros.library.replaying import WindowedRun  # who only reads bags needs no replay
+
     output = output or Output()
     whole = [each.path for each in bags if each.window is None]
     left = open_sources(whole, output, remap=remap) if whole else []

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numba import typeof, types
 
 from shipdrag_ros.coastdown.bins import Bins
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Regimes
@@ -16,7 +15,7 @@ from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LEAD_S, RegimeFilter
 from shipdrag_ros.coastdown.validate import CHANNEL_CODES, STAMPS, VALUES
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimator import WindowEstimator
@@ -34,12 +33,13 @@ _OTHERWISE = {
     'turning': (Dismissal.TURN, 'she turns'),
     're_engaged': (Dismissal.THRUST, 'the engine drives her again'),
 }
-_SIGNATURE: Signature = types.void(
-    typeof(Bins.fresh(1)), CHANNEL_CODES, STAMPS, VALUES, types.int64
+
+
+@compiled(
+    f'void(Bins, {CHANNEL_CODES}, {STAMPS}, {VALUES}, i8)',
+    like={'Bins': Bins.fresh(1)},
+    uncounted=True,
 )
-
-
-@compiled(_SIGNATURE, uncounted=True)
 def _fill(bins: Bins, channel: UInt8, stamp_ns: Int64, value: Float64, width: int) -> None:
     for i in range(len(channel)):
         c, stamp = int(channel[i]), stamp_ns[i]

@@ -13,7 +13,6 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numba import typeof, types
 
 from shipdrag_ros.coastdown.bins import (
     PITCH_LEAST,
@@ -41,7 +40,7 @@ from shipdrag_ros.coastdown.validate import (
     reject,
     remember,
 )
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
 _SHAFT = int(Channel.SHAFT)
@@ -166,19 +165,17 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
 
 
 _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
-_SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
-    typeof(Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh())),
-    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0)),
-    CHANNEL_CODES,
-    STAMPS,
-    STAMPS,
-    VALUES,
-    VALUES,
-    types.int64,
+
+
+@compiled(
+    f'UniTuple(i8, 2)'
+    f'(Memory, Tuning, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, i8)',
+    like={
+        'Memory': Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh()),
+        'Tuning': Tuning(Limits(0, 0), _SLOPES, 0, 0.0),
+    },
+    uncounted=True,
 )
-
-
-@compiled(_SIGNATURE, uncounted=True)
 def walk(
     memory: Memory,
     tuning: Tuning,

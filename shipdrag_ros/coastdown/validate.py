@@ -30,7 +30,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import typeof, types
 
 from shipdrag_ros.coastdown.outliers import (
     fits,
@@ -41,7 +40,7 @@ from shipdrag_ros.coastdown.outliers import (
     take,
 )
 from shipdrag_ros.coastdown.past import Past
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     ABSURD_POSITION_M,
@@ -91,9 +90,10 @@ _TWO_COLUMNS = np.array(
 
 # Declared, so that a read-only array does not compile the kernels a second time; those that
 # own their memory pass as well.
-STAMPS = types.Array(types.int64, 1, 'C', readonly=True)
-CHANNEL_CODES = types.Array(types.uint8, 1, 'C', readonly=True)
-VALUES = types.Array(types.float64, 2, 'A', readonly=True)  # columns of a table, for instance
+# an argument that is only read
+STAMPS = 'Array(i8, 1, "C", readonly=True)'
+CHANNEL_CODES = 'Array(u1, 1, "C", readonly=True)'
+VALUES = 'Array(f8, 2, "A", readonly=True)'  # columns of a table, for instance
 
 
 class CheckMemory(NamedTuple):
@@ -330,19 +330,11 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     return reasons
 
 
-_SIGNATURE: Signature = types.void(
-    typeof(CheckMemory.fresh()),
-    typeof(Limits(0, 0)),
-    CHANNEL_CODES,
-    STAMPS,
-    STAMPS,
-    VALUES,
-    VALUES,
-    types.Array(types.uint8, 1, 'C'),
+@compiled(
+    f'void(Memory, Limits, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, u1[::1])',
+    like={'Memory': CheckMemory.fresh(), 'Limits': Limits(0, 0)},
+    uncounted=True,
 )
-
-
-@compiled(_SIGNATURE, uncounted=True)
 def _walk(
     guard: CheckMemory,
     limits: Limits,

@@ -27,7 +27,7 @@ from shipdrag_ros.posterior.effects import EffectWay, kept_way
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Scope
-from shipdrag_ros.simulation.effects import LIBRARY, find
+from shipdrag_ros.simulation.effects import effects_of, find
 
 ERRS = 0.02  # of earlier diagnoses, how many are wrong of an effect whatever they say
 _HALF = 0.5  # power of an earlier likelihood
@@ -285,7 +285,7 @@ def carried(
     stated = {one.name for one in ship.effects}
     for each in latest_first:
         stays, unused = {}, []
-        for name, effect in LIBRARY.items():
+        for name, effect in effects_of(ship).items():
             why = _unused(effect, each, stated, of_hull)
             if not why:
                 stays[name] = _stays(effect, each, now_ns, facts)

@@ -82,6 +82,8 @@ class Context:
         None where there is no row of depth.
     run_down_s
         Of the thrust as the ship file states it; None where there is no row of the fall.
+    depth_m
+        Of the water, the median; None where it is not measured.
     turns
         Whether the water is seen to turn the shaft.
     """
@@ -95,6 +97,7 @@ class Context:
     draught_m: float | None
     turns: bool
     run_down_s: float | None = None
+    depth_m: float | None = None
 
     @classmethod
     def of(cls, window: Window, ship: Ship, times: Float64, stop: Stop) -> Context:
@@ -150,6 +153,7 @@ class Context:
             draught_m,
             turns,
             run_down_s,
+            float(np.median(depth)) if len(depth) else None,
         )
 
     def __len__(self) -> int:

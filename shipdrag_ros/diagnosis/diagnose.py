@@ -34,7 +34,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import carrying, effects_of, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
@@ -239,7 +239,8 @@ def compare(
         before = 0.0 if earlier is None else earlier.log_weight(hypothesis)
         return facts.log_likelihood(hypothesis) + before
 
-    effects = [effect for effect in LIBRARY.values() if not effect.missing(seen[0].ship)]
+    own = effects_of(seen[0].ship).values()
+    effects = [effect for effect in own if not effect.missing(seen[0].ship)]
     since_ns = [run.context.stop.since_ns for run in seen]
     chance = _OTHER_DAYS if max(since_ns) - min(since_ns) > _DAY_NS else _ONE_DAY
     return Comparing(
@@ -341,7 +342,8 @@ def with_effects(ship: Ship, effects: Sequence[EffectEstimate]) -> Ship:
     Returns
     -------
     Ship
-        The same with the effects in `effects`.
+        The same with the effects in `effects`, and with each learnt term among them.
     """
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
+    ship = carrying(ship, terms([effect.name for effect in effects]))
     return replace(ship, effects=(*ship.effects, *added))

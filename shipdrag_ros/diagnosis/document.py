@@ -11,7 +11,7 @@ from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, words
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 
 def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
@@ -121,7 +121,7 @@ def sized(effects: Sequence[EffectEstimate]) -> list[dict[str, Any]]:
 
 def _sizes(effect: EffectEstimate) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the sizes of an effect by name, as figures and in words."""
-    declared = {quantity.name: quantity for quantity in LIBRARY[effect.name].parameters}
+    declared = {quantity.name: quantity for quantity in find(effect.name).parameters}
     for name, size in effect.parameters.items():
         text = f'{words.quantity_text(declared[name])}: {words.size(declared[name], size)}'
         yield name, {'value': size.value, 'sd': size.sd, 'text': text}

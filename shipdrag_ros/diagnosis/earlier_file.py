@@ -10,10 +10,10 @@ from typing import Any, NoReturn
 
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.plain_file import read_small_text
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 _LARGEST = 1_000_000  # bytes of a file
 _MOST = 1000  # runs or candidates
@@ -131,7 +131,7 @@ def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
         name = _known(effect.get('name'), f'{path}[{i}].name')
         given = _mapping(effect.get('parameters'), f'{path}[{i}].parameters')
         sizes = {}
-        for quantity in LIBRARY[name].parameters:
+        for quantity in find(name).parameters:
             place = f'{path}[{i}].parameters.{quantity.name}'
             size = _mapping(given.get(quantity.name), place)
             number = _number(size.get('value'), f'{place}.value', -1e12, 1e12)
@@ -144,9 +144,10 @@ def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
 
 
 def _known(value: Any, path: str) -> str:
-    if not isinstance(value, str) or value not in LIBRARY:
-        raise _Wrong(f'{path}: {_shown(value)} is no effect that this version knows')
-    return value
+    try:
+        return find(str(value)).name
+    except SimulationError as error:
+        raise _Wrong(f'{path}: {_shown(value)} is no effect that this version knows') from error
 
 
 def _mapping(value: Any, path: str) -> dict[str, Any]:

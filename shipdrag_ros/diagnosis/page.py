@@ -16,7 +16,7 @@ from shipdrag_ros.estimation.words import in_service
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 
 def write_diagnosis(
@@ -123,7 +123,7 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
     shown = found.effects or tuple(each for one in found.candidates for each in one.effects)
     if not shown:
         return
-    declared = [LIBRARY[name] for name in dict.fromkeys(each.name for each in shown)]
+    declared = [find(name) for name in dict.fromkeys(each.name for each in shown)]
     sizes = tables.parameters(shown) if found.effects else tables.sizes(found)
     yield Section(
         'How large it is',

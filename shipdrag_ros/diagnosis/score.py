@@ -2,7 +2,7 @@
 """
 How often the diagnosis was right on data in which the effect was hidden.
 
-The figures are the summary that `benchmarks/diagnosis_score.py` writes, kept
+The figures are the summary that `benchmarks/accuracy/diagnosis_score.py` writes, kept
 beside this module as `score.json`.
 """
 

@@ -21,7 +21,7 @@ from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns, Scenario, simulate_columns
-from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effect import DAY_S, Frame
 
 
 def ship_runs(seen: Sequence[Observation], ship: Ship) -> ShipRuns:
@@ -36,6 +36,13 @@ def ship_runs(seen: Sequence[Observation], ship: Ship) -> ShipRuns:
         Her effects do not count: those of her file are hypotheses' own.
     """
     return ShipRuns(tuple(sight(run, seen, ship) for run in seen))
+
+
+def day_of(run: Observation) -> float:
+    """
+    Return the day of the stop, counted from 1970-01-01 UTC.
+    """
+    return (run.context.stop.since_ns * 1e-9 + run.lead_in_s) / DAY_S
 
 
 def _lowest(run: Observation) -> float:
@@ -69,7 +76,10 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         # beyond the last row, whatever the difference is rounded to
         duration_s=run.duration_s + 1e-6,
         heading_rad=run.heading_rad,
+        day=day_of(run),
     )
+    if run.context.depth_m is not None:
+        scenario = replace(scenario, depth_m=run.context.depth_m)
     frame = Frame(run.ship, scenario, seen[0].heading_rad)
     along = run.along
     rows = Rows(along.rows.time_s - run.lead_in_s, along.rows.kind, along.rows.value)

@@ -12,7 +12,7 @@ from shipdrag_ros.diagnosis import Compared, DiagnosisResult, EffectEstimate, Ru
 from shipdrag_ros.diagnosis import words as words
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 
 def probabilities(found: DiagnosisResult) -> Table:
@@ -32,7 +32,7 @@ def parameters(effects: Sequence[EffectEstimate]) -> Table:
     rows = [
         (effect.name, *_parameter(quantity, effect))
         for effect in effects
-        for quantity in LIBRARY[effect.name].parameters
+        for quantity in find(effect.name).parameters
     ]
     return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
 
@@ -49,7 +49,7 @@ def sizes(found: DiagnosisResult) -> Table:
         )
         for each in found.candidates
         for effect in each.effects
-        for quantity in LIBRARY[effect.name].parameters
+        for quantity in find(effect.name).parameters
     ]
     heads = ('candidate', 'probability', 'parameter', 'value', 'sd', 'meaning')
     return Table(heads, tuple(rows))
@@ -68,7 +68,7 @@ def limits(found: DiagnosisResult) -> Table:
             '-' if math.isnan(each.percent_of_r) else f'{each.percent_of_r:.1f} %',
         )
         for name, each in found.limits.items()
-        for quantity in LIBRARY[name].parameters[:1]
+        for quantity in find(name).parameters[:1]
     ]
     heads = ('effect', 'parameter', 'if it is there, 95 %', 'would be named from', 'of r')
     return Table(heads, tuple(rows))

@@ -21,7 +21,7 @@ from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 _CHANNELS = {
     'log': 'in the speed log',
@@ -144,7 +144,7 @@ def would_be_named(found: DiagnosisResult) -> str:
 
 
 def _quantity(name: str) -> Parameter:
-    return LIBRARY[name].parameters[0]
+    return find(name).parameters[0]
 
 
 def _from(limit: Limit) -> str:
@@ -405,7 +405,7 @@ def _sized(effect: EffectEstimate) -> str:
     """Return an effect with its sizes."""
     sizes = ', '.join(
         f'{quantity_text(quantity)} {_on_board(quantity, effect.parameters[quantity.name])}'
-        for quantity in LIBRARY[effect.name].parameters
+        for quantity in find(effect.name).parameters
     )
     return f'{names_text([effect.name])} ({sizes})'
 

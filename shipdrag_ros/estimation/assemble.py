@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from shipdrag_ros.estimation.curve import ValidRange, specific_resistance
 from shipdrag_ros.estimation.motion import Motion, sigma
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.ship import Ship
 
 
@@ -32,9 +32,7 @@ class AtEnd(NamedTuple):
         return cls(float(end.speed[0]), float(speed_sigma[0]), float(r[0]), float(r_sigma[0]))
 
 
-def assembled(
-    estimator: str, curve: ResistanceCurve, valid: ValidRange, end: AtEnd, **others: Any
-) -> Estimate:
+def assembled(estimator: str, valid: ValidRange, end: AtEnd, **others: Any) -> Estimate:
     """
     Put a result together.
 
@@ -42,8 +40,6 @@ def assembled(
     ----------
     estimator
         Its name.
-    curve
-        r(v) on the whole branch.
     valid
         Where it may be used.
     end
@@ -53,7 +49,6 @@ def assembled(
     """
     return Estimate(
         estimator=estimator,
-        curve=curve,
         froude_valid=valid.froude,
         froude_max_by=valid.by,
         froude_max_argmax=valid.argmax,

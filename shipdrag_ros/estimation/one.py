@@ -15,7 +15,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.assemble import AtEnd, assembled, log_scale_note
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.guess import InitialGuess
-from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
@@ -26,11 +26,13 @@ from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.rows import condense
+from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 NAME = 'one'
 _CURVE_POINTS = 129
+_WIND_POINTS = 25
 
 
 def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -80,8 +82,9 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters, *, quick: bool
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
     white = record.variance(record.coast, record.coast_weight)
-    coast, variance = condense(record.coast, white, guess.speed_m_s, halved_s)
+    coast, variance = condense(record.coast, white, guess.speed_m_s, halved_s, quick=quick)
     steady = record.steady
+    weather = _weather(window, run_down, guess.seen)
     problem = RunModel.of(
         Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
         np.concatenate([record.steady_variance(), variance]),
@@ -90,10 +93,32 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters, *, quick: bool
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
+        weather=weather,
     )
     found = infer(problem, guess.seen, quick=quick)
+    reference = weather.reference(ship)
     notes = (*record.notes, *run_down.notes, *_notes(found, record))
-    return _result(found, record, window, ship, parameters, notes)
+    return _result(found, record, window, ship, parameters, reference, notes)
+
+
+def _weather(window: Window, run_down: RunDown, seen: Float64) -> Weather:
+    """Return wind and depth as they are measured in a window."""
+    depth = window.depth.value
+    depth_m = float(np.median(depth)) if len(depth) >= LEAST_STAMPS else None
+    air = window.wind_apparent
+    if len(air) < LEAST_STAMPS:
+        return Weather(None, depth_m)
+    time_s = (air.time_ns - run_down.stop_ns) * 1e-9
+    against = np.stack([-air.value[:, 0] - np.interp(time_s, *seen), air.value[:, 1]])
+    # a wind that changes evenly in time, at the speeds that she has meanwhile
+    about = float(time_s.mean())
+    even = np.stack([np.ones(len(time_s)), (time_s - about) / max(float(np.ptp(time_s)), 1e-9)])
+    fitted = np.linalg.solve(even @ even.T, even @ against.T)
+    when = np.linspace(0.0, float(time_s[-1]), _WIND_POINTS)
+    changed = np.stack([np.ones(_WIND_POINTS), (when - about) / float(np.ptp(time_s))])
+    head, cross = (changed.T @ fitted).T[:, ::-1]
+    speed = np.maximum.accumulate(np.interp(when, *seen)[::-1])
+    return Weather(MeasuredWind(speed, head, cross), depth_m)
 
 
 def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
@@ -138,6 +163,7 @@ def _result(
     window: Window,
     ship: Ship,
     parameters: Parameters,
+    reference: Reference,
     notes: tuple[str, ...],
 ) -> Estimate:
     problem, k = found.problem, found.problem.coefficients
@@ -153,8 +179,12 @@ def _result(
             'froude_min'
         )
     grid = np.linspace(low, high, _CURVE_POINTS)
-    part = read(found, grid)
-    curve = _curve(part, grid, ship)
+    part = read(found, grid, calm=False)
+    use = _slowing(part)
+    conditions = _curve(part, use, ship)
+    part = read(found, grid, calm=True)
+    calm = _curve(part, use, ship)
+    curve = conditions if reference.unknown else calm
     stamps = np.concatenate(list(record.stamps.values()))
     tracks = {}
     for name, times in record.stamps.items():
@@ -165,9 +195,12 @@ def _result(
     current = k + motion.CURRENT
     return assembled(
         NAME,
-        curve,
         ValidRange.of_branch(curve),
-        _at_end(found, coast, last),
+        _at_end(found, coast, last, calm=not reference.unknown),
+        calm=calm,
+        conditions=conditions,
+        reference=reference,
+        sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
         start_ns=int(stamps.min()),
         end_ns=int(stamps.max()),
         order=None,
@@ -183,8 +216,9 @@ def _result(
     )
 
 
-def _curve(part: ReadOut, grid: Float64, ship: Ship) -> ResistanceCurve:
-    """Return r(v) from where the force slows the ship."""
+def _slowing(part: ReadOut) -> slice:
+    """Return where the force slows the ship."""
+    grid = part.speed_m_s
     driving = np.flatnonzero(part.resistance_m_s2 <= 0.0)
     use = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
     if len(grid[use]) < 3:
@@ -192,26 +226,41 @@ def _curve(part: ReadOut, grid: Float64, ship: Ship) -> ResistanceCurve:
             f'the fitted force nowhere slows the ship from {grid[-1]:.4g} to {grid[0]:.4g} m/s: '
             'give a window in which she coasts'
         )
+    return use
+
+
+def _of_n_r(part: ReadOut, ship: Ship) -> Float64:
+    """Return what n_r adds to sigma."""
+    found = part.parts_m_s2['n_r']
+    if found.any():
+        return found
     # where the file states retardations, n_r is no unknown of the motion
-    of_n_r = part.parts_m_s2['n_r']
-    if not of_n_r.any():
-        of_n_r = part.resistance_m_s2 / (1.0 + ship.n_r(grid)) * ship.added_mass.sd
+    inertia = 1.0 + ship.n_r(part.speed_m_s)
+    return np.abs(part.resistance_m_s2) / inertia * ship.added_mass.sd
+
+
+def _parts(part: ReadOut, ship: Ship) -> dict[str, Float64]:
+    return part.parts_m_s2 | {'n_r': _of_n_r(part, ship)}
+
+
+def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
+    """Return r(v) over a part of the speeds."""
     per_froude = float(ship.speed(1.0))
     return ResistanceCurve(
-        grid[use].copy(),
+        part.speed_m_s[use].copy(),
         part.resistance_m_s2[use],
-        np.hypot(part.repeatable_m_s2, of_n_r)[use],
+        np.hypot(part.repeatable_m_s2, _of_n_r(part, ship))[use],
         part.repeatable_m_s2[use],
-        ship.froude(grid[use]),
+        ship.froude(part.speed_m_s[use]),
         per_froude * part.slope_1_s[use],
         per_froude * part.slope_sigma_1_s[use],
     )
 
 
-def _at_end(found: RunPosterior, coast: Rows, last: float) -> AtEnd:
+def _at_end(found: RunPosterior, coast: Rows, last: float, *, calm: bool) -> AtEnd:
     """Return speed and r at the end of the window."""
     problem, k = found.problem, found.problem.coefficients
-    at_end = read(found, np.array([last]))
+    at_end = read(found, np.array([last]), calm=calm)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
     now = found.mean.copy()
     now[k + motion.SCALE :] = 0.0  # the speed itself, not the log

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipdrag_ros.display import Table, short_repr
+from shipdrag_ros.posterior.weather import Reference
 from shipdrag_ros.samples import Float64, Int64
 
 if TYPE_CHECKING:
@@ -121,8 +122,9 @@ class Estimate:
         How many samples of each input were used.
     noise_sd
         Estimated standard deviation of each input, in its unit.
-    curve
-        r(v) on the whole monotone branch of v.
+    calm, conditions
+        r(v) on the whole monotone branch of v: of the ship in calm deep water by a true log,
+        and in the wind and depth of the run. The same where an estimator takes neither out.
     froude_valid
         [Fr_min, Fr_max]: where r(v) may be used.
     froude_max_by
@@ -142,6 +144,11 @@ class Estimate:
         How many basis columns needed a second orthogonalisation.
     notes
         What a reader must know to judge the figures, a sentence each.
+    reference
+        What is known of the conditions of the run.
+    sigma_parts
+        Parts of the sigma of `calm` by cause (m,) [m/s^2], whose squares add up to its
+        square; none where they are not known.
     """
 
     __repr__ = short_repr
@@ -153,7 +160,8 @@ class Estimate:
     orders: tuple[OrderTrial, ...]
     samples: dict[str, int]
     noise_sd: dict[str, float]
-    curve: ResistanceCurve
+    calm: ResistanceCurve
+    conditions: ResistanceCurve
     froude_valid: tuple[float, float]
     froude_max_by: FroudeMax
     froude_max_argmax: float
@@ -167,11 +175,28 @@ class Estimate:
     current_sigma_m_s: float | None = None
     reorthogonalised: int = 0
     notes: tuple[str, ...] = field(default=())
+    reference: Reference = field(default_factory=Reference)
+    sigma_parts: dict[str, Float64] = field(default_factory=dict)
+
+    @property
+    def curve(self) -> ResistanceCurve:
+        """r(v) as it is shown: in calm deep water where wind and depth are known."""
+        return self.conditions if self.reference.unknown else self.calm
 
     @property
     def valid_curve(self) -> ResistanceCurve:
         """r(v) inside the valid range."""
         return self.curve.between(*self.froude_valid)
+
+    @property
+    def valid_calm(self) -> ResistanceCurve:
+        """r(v) in calm deep water inside the valid range."""
+        return self.calm.between(*self.froude_valid)
+
+    @property
+    def valid_conditions(self) -> ResistanceCurve:
+        """r(v) in the conditions of the run inside the valid range."""
+        return self.conditions.between(*self.froude_valid)
 
     @property
     def duration_s(self) -> float:

@@ -89,11 +89,40 @@ def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
         low = low.partition(' ')[0]  # the unit stands behind the other end
         date = f'{utc(each.start_ns)}: ' if len(usable) > 1 else ''
         lines.append(
-            f'{date}{force.at(force.near(usual))} Known from {low} to {high}; ± is two standard '
-            'deviations.'
+            f'{date}{force.at(force.near(usual))} Known from {low} to {high}, '
+            f'{conditions(each)}; ± is two standard deviations.'
         )
         missing = missing or no_clean_text(ship, force)
     return (*lines, missing) if missing else tuple(lines)
+
+
+def conditions(estimate: Estimate) -> str:
+    """
+    Say of which conditions the figures are that are shown.
+    """
+    unknown = estimate.reference.unknown
+    if not unknown:
+        return 'of the ship in calm deep water'
+    return (
+        f'of the ship in the {" and ".join(unknown)} of the run, which '
+        f'{"are" if len(unknown) > 1 else "is"} not known'
+    )
+
+
+def in_calm(estimate: Estimate) -> str:
+    """
+    Say what r is in calm deep water, where that is known best; '' where it is what is shown.
+    """
+    curve = estimate.valid_calm
+    if not estimate.reference.unknown or not estimate.sigma_parts or not len(curve):
+        return ''
+    best = int(np.argmin(curve.sigma_m_s2 / np.abs(curve.resistance_m_s2)))
+    r, sigma = float(curve.resistance_m_s2[best]), float(curve.sigma_m_s2[best])
+    return (
+        f' In calm deep water, whatever the weather was, it is {plus_minus(r, 2.0 * sigma)} m/s² '
+        f'at {speed_text(float(curve.speed_m_s[best]), highest_m_s=float(curve.speed_m_s[-1]))} '
+        'm/s.'
+    )
 
 
 def specific(estimate: Estimate) -> str:
@@ -113,7 +142,7 @@ def specific(estimate: Estimate) -> str:
     return (
         f'In SI: r(v) is known from {shown(low)} to {shown(high)} m/s, best at {shown(speed)} '
         f'm/s: there the specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard '
-        'deviations).'
+        f'deviations), {conditions(estimate)}.{in_calm(estimate)}'
     )
 
 

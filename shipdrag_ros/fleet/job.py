@@ -33,7 +33,8 @@ from shipdrag_ros.fleet.rows import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.warnings import run_warnings
-from shipdrag_ros.ship import Fact, RunSheet, Ship
+from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
+from shipdrag_ros.simulation.effects import carrying
 from shipdrag_ros.sources.reading import read_any
 
 _AT_ONCE_BYTES = 1 << 20
@@ -120,7 +121,9 @@ def identify(source: BagToRead) -> Identity | str:
         return str(error)
 
 
-def content_hash(digests: Sequence[str], source: BagToRead) -> str:
+def content_hash(
+    digests: Sequence[str], source: BagToRead, learnt: Sequence[LearntTerm] = ()
+) -> str:
     """
     Return what the rows of a bag depend on, as one digest.
 
@@ -130,9 +133,12 @@ def content_hash(digests: Sequence[str], source: BagToRead) -> str:
         Of the files of its parts, in their order.
     source
         The first part: the ship file, and `run.yaml` beside it.
+    learnt
+        Terms that count besides.
     """
     found = hashlib.sha256()
-    for text in (*digests, source.beside.ship, source.beside.ship_name, source.run):
+    beside = (source.beside.ship, source.beside.ship_name, source.run)
+    for text in (*digests, *beside, *(term.to_yaml() for term in learnt)):
         piece = text.encode('utf-8', 'surrogatepass')
         found.update(len(piece).to_bytes(8, 'little') + piece)
     return found.hexdigest()
@@ -173,10 +179,13 @@ class BagJob(NamedTuple):
         The parts of one recording; of most bags, one.
     content_hash
         What the rows depend on, see `local.content_hash`.
+    learnt
+        Terms beside those of the ship file.
     """
 
     sources: tuple[BagToRead, ...]
     content_hash: str
+    learnt: tuple[LearntTerm, ...] = ()
 
 
 class _ShipInRun(NamedTuple):
@@ -225,6 +234,7 @@ def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
     hull: _ShipInRun | None = None
     for run in runs:
         hull = _hull(source, run)
+        hull = hull._replace(ship=carrying(hull.ship, job.learnt))
         result = replay(run, ship=hull.ship, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]

@@ -181,24 +181,29 @@ def clean(ship: Ship) -> Float64 | None:
 
 def _curve(estimate: Estimate | None) -> Row:
     names = ('resistance_m_s2', 'sigma_m_s2', 'sigma_repeatable_m_s2')
+    of_conditions = ('conditions_resistance_m_s2', 'conditions_sigma_m_s2')
     if estimate is None:
         return {
             'estimator': None,
             'speed_at_stop_m_s': None,
-            **{name: np.full(len(FROUDE), np.nan) for name in names},
+            **{name: np.full(len(FROUDE), np.nan) for name in (*names, *of_conditions)},
+            'reference': None,
             'froude_valid_min': None,
             'froude_valid_max': None,
         }
-    curve, (low, high) = estimate.curve, estimate.froude_valid
+    (low, high) = estimate.froude_valid
     inside = (low <= FROUDE) & (high >= FROUDE)
     on_grid = {}
-    for name in names:
-        value = np.interp(FROUDE, curve.froude, getattr(curve, name), left=np.nan, right=np.nan)
+    for name in (*names, *of_conditions):
+        whole = estimate.conditions if name in of_conditions else estimate.calm
+        of_curve = getattr(whole, name.removeprefix('conditions_'))
+        value = np.interp(FROUDE, whole.froude, of_curve, left=np.nan, right=np.nan)
         on_grid[name] = np.where(inside, value, np.nan)
     return {
         'estimator': estimate.estimator,
-        'speed_at_stop_m_s': float(curve.speed_m_s[-1]),
+        'speed_at_stop_m_s': float(estimate.calm.speed_m_s[-1]),
         **on_grid,
+        'reference': json.dumps(vars(estimate.reference)),
         'froude_valid_min': low,
         'froude_valid_max': high,
     }

@@ -32,7 +32,8 @@ _OF_COASTDOWN = (
     ('string', 'ended_by estimator'),
     ('float64', 'heading_rad speed_at_stop_m_s'),
     ('list of float64', 'froude speed_m_s resistance_m_s2 sigma_m_s2 sigma_repeatable_m_s2'),
-    ('list of float64', 'clean_m_s2'),
+    ('list of float64', 'conditions_resistance_m_s2 conditions_sigma_m_s2 clean_m_s2'),
+    ('string', 'reference'),
     ('float64', 'froude_valid_min froude_valid_max length_m draught_m displaced_volume_m3'),
     ('float64', 'water_temperature_c water_density_kg_m3'),
     ('string', 'verdict effects candidates'),
@@ -286,9 +287,26 @@ def _read(path: Path, schema: pa.Schema) -> pa.Table:
         with path.open('rb') as file:
             return parquet.read_table(file).select(schema.names).cast(schema)
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
+        if _is_older(path, schema):
+            raise FleetError(
+                f'{str(path)!r} is of a version before 0.4.0, whose r(v) was of the conditions of '
+                'each run, not of calm deep water: run `shipdrag fleet` again, which replaces it'
+            ) from error
         raise FleetError(
             f'{str(path)!r} cannot be read: {error}; remove it and run `shipdrag fleet` again'
         ) from error
+
+
+def _is_older(path: Path, schema: pa.Schema) -> bool:
+    """Say whether a file lacks what later versions write."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        names = set(parquet.read_schema(path).names)
+    except (OSError, pa.ArrowException):
+        return False
+    return 'resistance_m_s2' in names and not set(schema.names) <= names
 
 
 def _write(path: Path, rows: list[Row], schema: pa.Schema) -> None:

@@ -24,6 +24,7 @@ from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, identify, wor
 from shipdrag_ros.fleet.rows import BagResult, bag_row, same_time
 from shipdrag_ros.fleet.store import Done, Store, read_coastdowns
 from shipdrag_ros.progress import Progress
+from shipdrag_ros.simulation.effects import terms
 
 
 class Twin(NamedTuple):
@@ -139,12 +140,13 @@ def _jobs(
     for numbers in _recordings(sources, known):
         digests = tuple(known[number].digest for number in numbers)
         copies[digests].append(tuple(sources[number] for number in numbers))
+    learnt = terms()
     jobs: dict[str, BagJob] = {}
     twins: list[Twin] = []
     for digests, same in copies.items():
         parts = max(same, key=lambda each: bool(each[0].run))  # the first that says most
-        digest = content_hash(digests, parts[0])
-        jobs[digest] = BagJob(parts, digest)
+        digest = content_hash(digests, parts[0], learnt)
+        jobs[digest] = BagJob(parts, digest, learnt)
         for other in same:
             if other is not parts:
                 differs = (other[0].beside.ship, other[0].run) != (

@@ -2,6 +2,6 @@
 """
 An effect that the library has no name for: a checked term, learnt from several runs.
 
-`term.LearntTerm` is the term as data, `folder.use` makes the terms of a folder effects of the
-library, `search.learn` finds one.
+`search.learn` finds one among the forms of `forms`; the term as data is `ship.LearntTerm`, and
+`simulation.learnt` makes an effect of it.
 """

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of learnt effects, and how they come into the library."""
+"""Folders of learnt effects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.learning.term import LearntTerm
-from shipdrag_ros.simulation.effects import added
+from shipdrag_ros.ship import LearntTerm
+from shipdrag_ros.ship.term import NAME
+from shipdrag_ros.simulation.effects import OWN
 
 MOST_FILES = 200
 """In one folder."""
@@ -34,17 +34,23 @@ def read_folders(folders: Sequence[Path]) -> tuple[LearntTerm, ...]:
     return tuple(found.values())
 
 
-def using(terms: Sequence[LearntTerm]) -> AbstractContextManager[None]:
+def check_name(name: str) -> str:
     """
-    Have terms in the library of this process, for a while.
+    Return a name that a term may have.
 
-    Examples
-    --------
-    >>> from shipdrag_ros.learning.folder import using
-    >>> with using([]):
-    ...     pass
+    Raises
+    ------
+    EffectFileError
+        If it may not.
     """
-    return added([term.effect() for term in terms])
+    problems = []
+    if not NAME.fullmatch(name):
+        problems.append(f'name: {name[:60]!r}, expected small letters, digits and _')
+    if name in OWN:
+        problems.append(f'name: {name!r} is an effect of the library; give it another')
+    if problems:
+        raise EffectFileError(name[:60], problems)
+    return name
 
 
 def _files(folder: Path) -> list[Path]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The forms that are tried: variable, curve and scope of a force, each a declared term.
+The forms that are tried: channel, variable, curve and scope, each a declared term.
 
 Sizes are pure numbers, times density, gravity, length and displaced volume, so that what is
 learnt carries to a sister. Where a curve turns is looked for among the speeds and times that the
@@ -15,21 +15,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.learning.term import LearntTerm, TermForm, TermParameter
 from shipdrag_ros.parameter import Prior, Shape, either_sign, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
+from shipdrag_ros.ship.term import TermForm, TermParameter
 from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.learnt import effect_of
 
 SMOOTH_OVER_FORM = 30.0
 """Prior odds of something smooth without a formula, over each form."""
 _SIZE = either_sign(0.008, 1.0)  # of A: 3 to 40 % of the resistance of most hulls
+_GAIN = either_sign(0.04, 0.8)  # of A in a log: share of the speed
 _TURNS_AT = (0.55, 0.45)  # share of the highest speed: median, sd of the logarithm
 _LASTS = (0.25, 0.8)  # share of the longest run: the same
 _NARROW, _BROAD = 0.03, 0.1  # widths of steps, shares of the same
 _HUMPS = (0.06, 0.12, 0.24)
-_SCAN = (-1.8, -1.35, -0.9, -0.45, 0.0, 0.45, 0.9, 1.35, 1.8)  # z where a curve may turn
+_SCAN = (-1.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.6)  # z where a curve may turn
+_SIZES = (-1.2, 0.0, 1.2)  # z of a size alone
 _WAYS_ROUND = ((1.0, 0.0), (0.7, 0.7), (0.05, 1.0), (-0.7, 0.7))  # z of two components
 _REFERENCE = 0.2  # Froude number at which A is of the same size whatever the power
 
@@ -45,11 +48,20 @@ class Span:
         Speeds through water.
     longest_s
         Of a coastdown.
+    log
+        Whether the log is seen beside the way over ground.
+    days
+        Of the first and the last run, where that can matter; None: too few or on one day.
+    depth_m
+        Least and most of the water, where it is measured in all runs and differs; None: not.
     """
 
     low_m_s: float
     top_m_s: float
     longest_s: float
+    log: bool = False
+    days: tuple[float, float] | None = None
+    depth_m: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,14 +72,14 @@ class LearnableForm:
     Attributes
     ----------
     kind
-        Variable and shape: what a form is right or wrong in.
+        Channel, variable and shape: what a form is right or wrong in.
     term
         With sizes of what is expected, until it is fitted.
     priors
         Of its parameters.
     """
 
-    kind: tuple[str, str]
+    kind: tuple[str, str, str]
     term: LearntTerm
     priors: tuple[Prior, ...]
 
@@ -75,7 +87,7 @@ class LearnableForm:
         """
         Return it as an effect that may be missing.
         """
-        plain = self.term.effect()
+        plain = effect_of(self.term)
         parameters = tuple(
             replace(q, prior=prior, low=-math.inf, high=math.inf)
             for q, prior in zip(plain.parameters, self.priors, strict=True)
@@ -92,7 +104,7 @@ class LearnableForm:
             first.setdefault(way.mode, way)
         starts: list[tuple[float, ...]] = [(0.0, b, c) for b, c in _WAYS_ROUND]
         if len(self.priors) == 1:
-            starts = [(z,) for z in _SCAN]
+            starts = [(z,) for z in _SIZES]
         elif self.priors[1].shape is Shape.LOG_NORMAL:
             starts = [(0.0, z) for z in _SCAN]
         elif len(self.priors) == 2:
@@ -102,23 +114,25 @@ class LearnableForm:
 
 def forms(ship: Ship, span: Span) -> tuple[LearnableForm, ...]:
     """
-    Return all forms for some runs of a ship.
+    Return all forms that some runs of a ship can carry.
     """
-    return tuple(
-        _form(number, ship, span, *each)
-        for number, each in enumerate(
-            (*_by_speed(ship, span), *_by_time(ship, span), *_by_heading())
-        )
-    )
+    every = [('force', *each) for each in (*_by_speed(ship, span), *_by_time(ship, span))]
+    every += [
+        ('force', *each) for each in (*_by_heading(), *_by_day(span), *_by_depth(ship, span))
+    ]
+    if span.log:
+        every += [('log', *each) for each in _of_log(ship, span)]
+    return tuple(_form(number, span, *each) for number, each in enumerate(every))
 
 
 _Declared = tuple[str, str, str, dict[str, Prior]]
+_OF_EARTH = ('heading', 'depth')
 
 
 def _form(
     number: int,
-    ship: Ship,
     span: Span,
+    channel: str,
     variable: str,
     shape: str,
     expression: str,
@@ -127,19 +141,17 @@ def _form(
     valid = {'u': (round(span.low_m_s, 3), round(1.05 * span.top_m_s, 3))}
     if variable == 'time':
         valid['t'] = (0.0, round(1.05 * span.longest_s, 1))
+    if variable == 'date' and span.days:
+        valid['d'] = span.days
+    if variable == 'depth' and span.depth_m:
+        valid['h'] = span.depth_m
+    scope = 'earth' if variable in _OF_EARTH else 'sensor' if channel == 'log' else 'hull'
     term = LearntTerm(
-        name=f'form_{number}_{variable}_{shape}',
-        form=TermForm(
-            'force',
-            'earth' if variable == 'heading' else 'hull',
-            variable,
-            shape,
-            expression,
-            valid,
-        ),
+        name=f'form_{number}_{channel}_{variable}_{shape}',
+        term=TermForm(channel, scope, variable, shape, expression, valid),
         parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
     )
-    return LearnableForm((variable, shape), term, tuple(parameters.values()))
+    return LearnableForm((channel, variable, shape), term, tuple(parameters.values()))
 
 
 def _as_power(power: int) -> str:
@@ -174,38 +186,77 @@ def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
 
 
 def _by_time(ship: Ship, span: Span) -> Iterator[_Declared]:
+    yield from _over_time(_as_power(2), _SIZE, ship, span)
+
+
+def _of_log(ship: Ship, span: Span) -> Iterator[_Declared]:
+    yield from _over_time('A*u', _GAIN, ship, span)
+    top = span.top_m_s / math.sqrt(GRAVITY_M_S2 * ship.length_m)
+    turns = {'A': _GAIN, 'u_c': log_normal(_TURNS_AT[0] * top, _TURNS_AT[1])}
+    yield 'speed', 'power', 'A*u**2/sqrt(g*L)*4', {'A': _GAIN}
+    for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
+        for width in (_NARROW, _BROAD):
+            yield 'speed', 'step', f'A*u*step({side}, {width * top:.3g}*sqrt(g*L))', turns
+        yield 'speed', 'ramp', f'A*max({side}, 0*u)', turns
+    for width in _HUMPS:
+        away = f'((u - u_c*sqrt(g*L))/({width * top:.3g}*sqrt(g*L)))**2'
+        yield 'speed', 'hump', f'A*u*exp(-{away})', turns
+
+
+def _over_time(base: str, size: Prior, ship: Ship, span: Span) -> Iterator[_Declared]:
+    """Yield what grows, falls or swings in time, of some size A."""
     unit = math.sqrt(ship.length_m / GRAVITY_M_S2)
     longest = span.longest_s / unit
-    lasts = {'A': _SIZE, 'tau': log_normal(_LASTS[0] * longest, _LASTS[1])}
-    base, tau = _as_power(2), 'tau*sqrt(L/g)'
+    lasts = {'A': size, 'tau': log_normal(_LASTS[0] * longest, _LASTS[1])}
+    tau = 'tau*sqrt(L/g)'
     yield 'time', 'decay', f'{base}*exp(-t/({tau}))', lasts
     yield 'time', 'decay', f'{base}*(1 - exp(-t/({tau})))', lasts
     yield 'time', 'ramp', f'{base}*min(t/({tau}), 1)', lasts
     yield 'time', 'ramp', f'{base}*max(1 - t/({tau}), 0)', lasts
     for side in (f't - {tau}', f'{tau} - t'):
         for width in (_NARROW, _BROAD):
-            yield (
-                'time',
-                'step',
-                f'{base}*step({side}, {width * longest:.3g}*sqrt(L/g))',
-                lasts,
-            )
+            step = f'step({side}, {width * longest:.3g}*sqrt(L/g))'
+            yield 'time', 'step', f'{base}*{step}', lasts
     for width in _HUMPS:
         away = f'((t - {tau})/({width * longest:.3g}*sqrt(L/g)))**2'
         yield 'time', 'hump', f'{base}*exp(-{away})', lasts
     for period in (0.15, 0.3, 0.6):
         turn = f'{2.0 * np.pi / (period * longest):.4g}*t*sqrt(g/L)'
         both = f'(A*cos({turn}) + B*sin({turn}))'
-        yield 'time', 'periodic', base.replace('A', both), _two()
+        yield 'time', 'periodic', base.replace('A', both), _two(size)
+
+
+def _by_day(span: Span) -> Iterator[_Declared]:
+    """Yield what grows or falls from run to run."""
+    if span.days is None:
+        return
+    first, last = span.days
+    base, since = _as_power(2), f'(d - {first})/{last - first:.4g}'
+    yield 'date', 'ramp', f'{base}*{since}', {'A': _SIZE}
+    turns = {'A': _SIZE, 'x': log_normal(*_TURNS_AT)}
+    for side in (f'x - {since}', f'{since} - x'):
+        yield 'date', 'step', f'{base}*step({side}, {_NARROW})', turns
+    yield 'date', 'decay', f'{base}*exp(-{since}/x)', turns
+
+
+def _by_depth(ship: Ship, span: Span) -> Iterator[_Declared]:
+    """Yield what grows where the water is shallower, or acts below a depth."""
+    if span.depth_m is None:
+        return
+    middle = math.sqrt(span.depth_m[0] * span.depth_m[1]) / ship.length_m
+    base, turns = _as_power(2), {'A': _SIZE, 'x': log_normal(middle, _TURNS_AT[1])}
+    for power in (1, 2, 4):
+        yield 'depth', 'power', f'{base}*({middle:.4g}*L/h)**{power}', {'A': _SIZE}
+    yield 'depth', 'step', f'{base}*step(x*L - h, {_NARROW * middle:.3g}*L)', turns
 
 
 def _by_heading() -> Iterator[_Declared]:
     both = '(A*cos(psi) + B*sin(psi))'
     for power in (0, 1, 2):
-        yield 'heading', 'periodic', _as_power(power).replace('A', both), _two()
+        yield 'heading', 'periodic', _as_power(power).replace('A', both), _two(_SIZE)
     some = _as_power(2) + '*(1 + b*cos(psi) + c*sin(psi))'
     yield 'heading', 'periodic', some, {'A': _SIZE, 'b': normal(0.7), 'c': normal(0.7)}
 
 
-def _two() -> dict[str, Prior]:
-    return {name: normal(1.2 * _SIZE.first) for name in 'AB'}
+def _two(size: Prior) -> dict[str, Prior]:
+    return {name: normal(1.2 * size.first) for name in 'AB'}

@@ -21,25 +21,32 @@ from shipdrag_ros.diagnosis.facts import stated_facts
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Where
-from shipdrag_ros.diagnosis.sights import ship_runs
+from shipdrag_ros.diagnosis.sights import day_of, ship_runs
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
-from shipdrag_ros.learning.term import LearntTerm, TermEvidence, TermLimit, TermParameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit, TermParameter
+from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
-_FITTED = 16  # forms that are fitted: of each kind the best by the linear response, and more
+_FITTED, _KINDS = (
+    16,
+    10,
+)  # forms that are fitted: by the linear response, the best of so many kinds
+_BEGUN = 2  # starts of each
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
 _LOOKS, _NEAR_S = 2, 4.0  # at runs, and by which a stop may move without another
 _UPPER = 1.645
+_MANY, _APART_D, _DEEPER = 3, 0.5, 1.1  # runs, days and ratio of depths that can show a form
 
 
 @dataclass(frozen=True)
@@ -60,7 +67,7 @@ class Learnt:
         In which channel, when and at which speeds model and data disagree; None where they do
         not.
     largest_percent
-        Of the resistance at the highest speed, by the likeliest form; NaN without one.
+        Of the resistance, or of a reading of the log, by the likeliest form; NaN without one.
     runs
         Names of the runs that were used.
     notes
@@ -169,6 +176,7 @@ class _LearningCase:
     seen: tuple[Observation, ...]
     ship: Ship
     forms: dict[str, LearnableForm]
+    ways: dict[str, list[EffectWay]]
     comparing: Comparing
     found: ComparedHypotheses
 
@@ -176,16 +184,20 @@ class _LearningCase:
     def of(
         cls, runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, progress: Progress
     ) -> _LearningCase:
-        top = max(run.speed_m_s for run in seen)
-        low = min(_slowest(run) for run in seen)
-        longest = max(run.duration_s for run in seen)
-        every = {form.term.name: form for form in forms(ship, Span(low, top, longest))}
+        every = {form.term.name: form for form in forms(ship, _span(seen))}
         progress('looking for forms', 0, 0)
-        order = _comparing(runs, seen, ship, every, library=False).promising(len(every))
-        first = {every[name].kind: name for name in reversed(order)}  # the best of each kind
-        chosen = dict.fromkeys((*first.values(), *order))
-        kept = {name: every[name] for name in list(chosen)[:_FITTED]}
-        return cls.compared(runs, seen, ship, kept, progress)
+        longest = max(run.duration_s for run in seen)
+        ways = {name: form.ways(ship, longest, len(seen)) for name, form in every.items()}
+        ranked: dict[str, list[EffectWay]] = {}
+        for way in _comparing(runs, seen, ship, ways, library=False).promising():
+            ranked.setdefault(way.effect.name, []).append(way)
+        first: dict[object, str] = {}  # the best of each kind
+        for name in ranked:
+            first.setdefault(every[name].kind, name)
+        chosen = list(dict.fromkeys((*list(first.values())[:_KINDS], *ranked)))[:_FITTED]
+        kept = {name: every[name] for name in chosen}
+        begun = {name: ranked[name][:_BEGUN] for name in chosen}
+        return cls.compared(runs, seen, ship, kept, begun, progress)
 
     @classmethod
     def compared(
@@ -194,11 +206,12 @@ class _LearningCase:
         seen: Sequence[Observation],
         ship: Ship,
         kept: dict[str, LearnableForm],
+        ways: dict[str, list[EffectWay]],
         progress: Progress,
     ) -> _LearningCase:
         progress('comparing forms', 0, 0)
-        comparing = _comparing(runs, seen, ship, kept, library=True)
-        return cls(tuple(runs), tuple(seen), ship, kept, comparing, comparing.compare())
+        comparing = _comparing(runs, seen, ship, ways, library=True)
+        return cls(tuple(runs), tuple(seen), ship, kept, ways, comparing, comparing.compare())
 
     def moved_s(self) -> dict[str, float]:
         """Return by how much each stop is later than it is taken for."""
@@ -209,7 +222,7 @@ class _LearningCase:
     def half(self, which: int, progress: Progress) -> _LearningCase:
         """Return the same of every second run."""
         return _LearningCase.compared(
-            self.runs, self.seen[which::2], self.ship, self.forms, progress
+            self.runs, self.seen[which::2], self.ship, self.forms, self.ways, progress
         )
 
     def is_form(self, names: Names) -> bool:
@@ -223,7 +236,7 @@ class _LearningCase:
         if names == UNKNOWN:
             return 'something smooth'
         # a form is what it is, whatever of the library may be beside it
-        of_forms = {' '.join(self.forms[name].kind) for name in names if name in self.forms}
+        of_forms = {kind_text(self.forms[name].kind) for name in names if name in self.forms}
         return ' and '.join(sorted(of_forms or names))
 
 
@@ -231,23 +244,49 @@ def _comparing(
     runs: Sequence[CoastRun],
     seen: Sequence[Observation],
     ship: Ship,
-    kept: dict[str, LearnableForm],
+    ways: dict[str, list[EffectWay]],
     *,
     library: bool,
 ) -> Comparing:
     """Return a comparison of forms, beside the library or not."""
-    own = [e for e in LIBRARY.values() if not e.missing(ship)] if library else []
-    effects = [*own, *(form.effect() for form in kept.values())]
+    own = [e for e in effects_of(ship).values() if not e.missing(ship)] if library else []
+    effects = [*own, *(each[0].effect for each in ways.values())]
     facts_of = {run.name: run.facts for run in runs}
     stops = [run.context.stop for run in seen]
     at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
     stated = [(facts_of[run.name], ns) for run, ns in zip(seen, at_ns, strict=True)]
     known = stated_facts(ship, stated).log_likelihood
     comparing = Comparing(ship_runs(seen, ship), ship, effects, known)
-    longest = max(run.duration_s for run in seen)
-    for name, form in kept.items():
-        comparing.ways[name] = form.ways(ship, longest, len(seen))
+    comparing.ways.update(ways)
     return comparing
+
+
+def kind_text(kind: tuple[str, str, str]) -> str:
+    """
+    Return channel, variable and shape in words.
+    """
+    channel, variable, shape = kind
+    return f'{channel} by {variable} ({shape})'
+
+
+def _span(seen: Sequence[Observation]) -> Span:
+    """Return what runs hold, by which forms may be told apart."""
+    rows = [run.along.rows.kind for run in seen]
+    days = [day_of(run) for run in seen]
+    depths = [run.context.depth_m or 0.0 for run in seen]
+    several = len(seen) >= _MANY
+    return Span(
+        min(_slowest(run) for run in seen),
+        max(run.speed_m_s for run in seen),
+        max(run.duration_s for run in seen),
+        log=any((kind == LOG).any() and (kind != LOG).any() for kind in rows),
+        days=(round(min(days), 1), round(max(days) + 0.1, 1))
+        if several and max(days) - min(days) > _APART_D
+        else None,
+        depth_m=(round(min(depths), 2), round(max(depths) + 0.01, 2))
+        if several and max(depths) > _DEEPER * min(depths) > 0.0
+        else None,
+    )
 
 
 def _slowest(run: Observation) -> float:
@@ -323,7 +362,9 @@ class _Judged:
         """Say whether each half of the runs shows a form."""
         for which in (0, 1):
             half = self.case.half(which, self.progress)
-            mine = [fit.log_evidence for fit in half.found.fitted if fit.names == best]
+            # with another effect beside it, it is shown too
+            kind = self.case.of_kind(best)
+            mine = [f.log_evidence for f in half.found.fitted if half.of_kind(f.names) == kind]
             top = max(fit.log_evidence for fit in half.found.fitted)
             if not mine or max(mine) - top < _HALF:
                 names = ', '.join(run.name for run in half.seen)
@@ -373,7 +414,7 @@ class _Judged:
         single = [
             (fit.log_evidence, names[0])
             for names, fit in self.case.found.best.items()
-            if len(names) == 1 and names != UNKNOWN and names[0] in LIBRARY
+            if len(names) == 1 and names != UNKNOWN and names[0] not in self.case.forms
         ]
         return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
 
@@ -393,6 +434,10 @@ class _Judged:
         run = case.comparing.runs.runs[0]
         speed = np.linspace(_slowest(case.seen[0]), case.seen[0].speed_m_s, 50)
         action = way.effect.action(run.frame, *values)
+        if action.log_error:
+            after = np.linspace(0.0, case.seen[0].duration_s, 50)
+            wrong = [error(speed[::-1], after) / speed[::-1] for error in action.log_error]
+            return float(100.0 * np.max(np.abs(wrong)))
         force = action.resistance_n(speed)
         if action.turns:  # one after the other
             areas = np.cumsum([turn.drag_area_m2 for turn in action.turns])
@@ -402,15 +447,25 @@ class _Judged:
 
     def _next_run(self, kinds: dict[str, float]) -> str:
         """Say which run would decide."""
-        left = [kind for kind, p in kinds.items() if p > _LEFT]
-        variables = {word for kind in left for word in kind.split()} & {'speed', 'time', 'heading'}
-        speeds = {round(run.speed_m_s, 1) for run in self.case.seen}
         if next(iter(kinds)) == self.case.of_kind(NONE):
             return 'none: a diagnosis says how large an effect could still be'
+        left = {
+            self.case.forms[name].kind[:2]
+            for names, p in self.case.found.probability.items()
+            for name in names
+            if p > _LEFT and name in self.case.forms
+        }
+        variables = {variable for _, variable in left}
+        used = ', '.join(f'{v:g}' for v in sorted({round(r.speed_m_s, 1) for r in self.case.seen}))
+        if len({channel for channel, _ in left}) > 1:
+            return 'a run with a speed over ground from GNSS beside the log'
         if 'heading' in variables:
             return 'a run on another heading, at a speed of one of these'
+        if 'depth' in variables:
+            return 'a run in water of another depth, at a speed of one of these'
+        if 'date' in variables:
+            return 'a run some weeks later, at a speed of one of these'
         if len(variables) > 1 or len(self.case.seen) < 2:
-            used = ', '.join(f'{v:g}' for v in sorted(speeds))
             return (
                 f'a run from another speed than {used} m/s: what goes by the speed stays there, '
                 'what goes by the time does not'

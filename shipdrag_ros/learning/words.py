@@ -9,8 +9,10 @@ from typing import Any
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.fields import plain
-from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.learning.search import Learnt, kind_text
 from shipdrag_ros.report.document import write_page
+from shipdrag_ros.ship.expression import unit_text
+from shipdrag_ros.ship.term import RESULT
 
 _SHOWN = 0.001  # probability of a line
 
@@ -22,10 +24,10 @@ def sentence(found: Learnt) -> str:
     term = found.term
     if term is None or term.evidence is None:
         return f'Nothing is written: {found.reason}.'
-    form, rest = term.form, term.evidence
+    form, rest = term.term, term.evidence
     sizes = ', '.join(f'{key} {q.value:.3g} ± {q.sd:.2g}' for key, q in term.parameters.items())
     return (
-        f'{term.name}: a {form.channel} by {form.variable} ({form.shape}), {sizes}, from '
+        f'{term.name}: a {kind_text((form.channel, form.variable, form.shape))}, {sizes}, from '
         f'{len(found.runs)} runs; {rest.held_out_gap_cut:.0%} of the gap of a run is gone that '
         'it was not learnt on.'
     )
@@ -44,12 +46,14 @@ def lines(found: Learnt) -> list[str]:
             f'after the stop, at {low:.1f} to {high:.1f} m/s.'
         )
     if found.term is not None:
-        said.append(f'It is {found.term.form.expression} [N].')
+        unit = unit_text(RESULT[found.term.term.channel])
+        said.append(f'It is {found.term.term.expression} [{unit}].')
         if found.term.looks_like:
             said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')
     if math.isfinite(found.largest_percent):
         said.append(
-            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance.'
+            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance, or of '
+            'a reading of the log.'
         )
     if found.next_run:
         said.append(f'What would decide: {found.next_run}.')
@@ -83,7 +87,7 @@ def document(found: Learnt) -> dict[str, Any]:
         if term is None
         else {
             'name': term.name,
-            'term': plain(term.form),
+            'term': plain(term.term),
             'parameters': plain(term.parameters),
             'evidence': plain(term.evidence),
         },

@@ -36,7 +36,7 @@ from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing, writing
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -213,7 +213,7 @@ class Diagnosis(Shown):
             sized = [
                 (names, each.probability, effect.name, size.name, value.value, value.sd, size.unit)
                 for effect in each.effects
-                for size in LIBRARY[effect.name].parameters
+                for size in find(effect.name).parameters
                 for value in (effect.parameters[size.name],)
             ]
             rows += sized or [(names, each.probability, '', '', None, None, '')]

@@ -17,11 +17,11 @@ from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import Format, ImportResult, Option
+from shipdrag_ros.sources.format import Format, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.declaration import FORMAT as TABLE
 from shipdrag_ros.sources.formats.csv.declaration import read_table
-from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.reading import format_of, job_of
 from shipdrag_ros.sources.run import join, run_of
 from shipdrag_ros.sources.table import Cells, LogTable, TableRows, texts_of

@@ -26,7 +26,8 @@ from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STANDARD_INPUTS, START_NS, Scenario, sense, standard_sensors
-from shipdrag_ros.simulation.effects import LIBRARY, find, parse, values_of
+from shipdrag_ros.simulation.effect import DAY_S
+from shipdrag_ros.simulation.effects import find, parse, terms, values_of
 
 SPEED_FRACTION = 0.8
 """Of the highest speed of the baseline: where a simulation begins."""
@@ -70,7 +71,7 @@ class SimulationSettings:
         effects = [
             {
                 'name': effect.name,
-                'scope': str(LIBRARY[effect.name].scope),
+                'scope': str(find(effect.name).scope),
                 'parameters': values_of(effect, ship),
             }
             for effect in (*ship.effects, *self.effects)
@@ -95,6 +96,7 @@ def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
         lead_in_s=settings.lead_in_s,
         duration_s=settings.duration_s,
         heading_rad=settings.heading_rad,
+        day=(settings.start_ns * 1e-9 + settings.lead_in_s) / DAY_S,
         seed=settings.seed,
     )
     motion = simulation.simulate(
@@ -124,6 +126,9 @@ def write_bag(path: Path, block: Block, ship: Ship, truth: TrueCurve, listener: 
             writer.attach('ship.yaml', ship.to_yaml())
             writer.attach('parameters.yaml', Parameters().to_yaml())
             writer.attach(ATTACHMENT, truth.to_yaml())
+            acting = [each['name'] for each in truth.settings['effects']]
+            for term in terms(acting):
+                writer.attach(f'effects/{term.name}.yaml', term.to_yaml())
             for done in range(0, len(block), _AT_ONCE):
                 writer.write_samples(block[done : done + _AT_ONCE])
                 progress(done, len(block))

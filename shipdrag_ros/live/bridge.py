@@ -41,6 +41,7 @@ from shipdrag_ros.live.verdicts import verdict_part
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
 from shipdrag_ros.messages.heard import (
     ERROR,
+    OF_CONDITIONS,
     OK,
     STALE,
     Health,
@@ -401,6 +402,9 @@ class Bridge:
             }
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
+        estimate = None if self._health is None else self._health.of('estimate')
+        if estimate is not None and OF_CONDITIONS in estimate.values:
+            figures['r_of'] = estimate.values[OF_CONDITIONS]
         ended = [run for run in self.past if run.curve is not None]
         if self._curve is not None:
             figures['usual'] = at_usual_speed(self._curve, self._ship)

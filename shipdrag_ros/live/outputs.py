@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.estimation.force import usual_within
 from shipdrag_ros.messages import MalformedMessage, types
-from shipdrag_ros.messages.reporting import CURVE_FIELDS, FORECAST_FIELDS
+from shipdrag_ros.messages.publishing import CURVE_FIELDS, FORECAST_FIELDS
 from shipdrag_ros.messages.topics import (
     FORECAST,
     FORECAST_PATH,

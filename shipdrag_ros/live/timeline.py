@@ -19,8 +19,8 @@ import numpy as np
 from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
-from shipdrag_ros.messages import outputs
 from shipdrag_ros.messages.heard import Health, Heard, NodeMessage, Samples
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.node.health import InputStates, Standing, state_status
 from shipdrag_ros.node.judging import Counts, InputFacts
 from shipdrag_ros.parameters import Parameters

@@ -10,9 +10,10 @@ message in a batch agree to the last bit.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -142,7 +143,7 @@ def decode_batch(
     """
     n = len(start)
     code, found = np.empty(n, np.uint8), np.full(n, GatherResult.NOTHING, np.uint8)
-    readings = [_READINGS[source] for source in sources]
+    readings = [_readings()[source] for source in sources]
     width = max((reading.width for reading in readings), default=_COLUMNS)
     stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
     unreadable = []
@@ -245,9 +246,12 @@ def _fix(extra: Float64) -> Float64:
     """Return latitude and longitude [deg]; NaN where there is no fix."""
     latitude, longitude, variance_north, variance_east, status, covariance_type = extra.T
     table = _table(latitude, longitude, variance_north, variance_east)
-    table[covariance_type == _FIX.COVARIANCE_TYPE_UNKNOWN, 2:] = np.nan
+    table[covariance_type == types.class_of(types.NAV_SAT_FIX).COVARIANCE_TYPE_UNKNOWN, 2:] = (
+        np.nan
+    )
     # a driver that leaves the status as it is by default, unknown, has not said that there is none
-    none = (status < _FIX_STATUS.STATUS_FIX) & (status != _FIX_STATUS.STATUS_UNKNOWN)
+    of = types.class_of('sensor_msgs/msg/NavSatStatus')
+    none = (status < of.STATUS_FIX) & (status != of.STATUS_UNKNOWN)
     table[none] = np.nan
     return table
 
@@ -274,14 +278,14 @@ def _dvl_water(extra: Float64) -> Float64:
     """Return the speed ahead; NaN where it was measured against the bottom."""
     x, variance, mode = extra.T
     table = _table(x, 0.0, variance, np.nan)
-    table[mode != _DVL.DVL_MODE_WATER, ::2] = np.nan
+    table[mode != types.class_of(types.DVL).DVL_MODE_WATER, ::2] = np.nan
     return table
 
 
 def _dvl_ground(extra: Float64) -> Float64:
     """Return the speed; NaN where it was measured against the water."""
     table = _magnitude(extra[:, :5])
-    table[extra[:, 5] != _DVL.DVL_MODE_BOTTOM, ::2] = np.nan
+    table[extra[:, 5] != types.class_of(types.DVL).DVL_MODE_BOTTOM, ::2] = np.nan
     return table
 
 
@@ -307,11 +311,6 @@ def _compass(extra: Float64) -> Float64:
     with np.errstate(invalid='ignore'):
         yaw_deg = np.remainder(270.0 - extra[:, 0], 360.0) - 180.0
     return _table(np.radians(yaw_deg), 0.0, np.nan, np.nan)
-
-
-_DVL = types.class_of(types.DVL)
-_FIX = types.class_of(types.NAV_SAT_FIX)
-_FIX_STATUS = types.class_of('sensor_msgs/msg/NavSatStatus')
 
 
 def _reading(
@@ -346,7 +345,12 @@ def _computed(
     return Source(channel.input, type_name), reading
 
 
-def _readings() -> Iterator[tuple[Source, _Reading]]:
+@cache
+def _readings() -> Mapping[Source, _Reading]:
+    return dict(_each_reading())
+
+
+def _each_reading() -> Iterator[tuple[Source, _Reading]]:
     speed, ground = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
     linear, x, y = 'twist.twist.linear.x', 'twist.linear.x', 'twist.linear.y'
     cells = [f'twist.covariance[{i}]' for i in (0, 7, 1)]
@@ -394,6 +398,3 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
     yield _reading(Channel.WIND_APPARENT, types.TWIST, x, y)
     depth = ('range', '', 'variance')
     yield _reading(Channel.DEPTH, types.RANGE, *depth, older=types.RANGE_BEFORE_IRON)
-
-
-_READINGS: dict[Source, _Reading] = dict(_readings())

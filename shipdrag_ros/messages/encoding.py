@@ -11,10 +11,11 @@ once, and numbers and times are filled in.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from math import cos, isnan, nan, sin
+from math import cos, inf, nan, sin
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,16 +24,14 @@ from numpy.typing import NDArray
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Channel, Float64, Int64, UInt8
 
-SentNumbers = tuple[NDArray[Any], ...]
+FieldNumbers = Callable[[Float64, Float64], Float64]
+"""Of (n, 2) values and variances, the (n,) numbers of a field."""
 
-_VEHICLE_FRAME = 'base_link'
-_EARTH_FRAME = 'map'
-_STAMP = 'iI'
-# stand for the numbers of a message until its layout is known
-_MARKS: dict[str, tuple[float, ...]] = {
-    'd': tuple(1e-200 * k for k in range(1, 5)),
-    'f': tuple(2.0**-k for k in range(60, 64)),
-    'B': (0xA7,),
+# stand for the numbers of a message until their places in it are known
+_MARKS: dict[str, tuple[str, tuple[float, ...]]] = {
+    'float64': ('<d', tuple(1e-200 * k for k in range(1, 5))),
+    'float32': ('<f', tuple(2.0**-k for k in range(60, 64))),
+    'uint8': ('<B', (0xA7,)),
 }
 
 
@@ -154,9 +153,10 @@ def _rows(channel: Channel, block: Block) -> NDArray[np.uint8]:
     seconds, nanoseconds = np.divmod(block.stamp_ns, SECOND_NS)
     if (seconds != seconds.astype(np.int32)).any():
         raise ValueError('a stamp is beyond what a message can hold, 1901 to 2038')
-    numbers = _ENCODERS[channel].numbers(block.value, block.variance)
-    for name, column in zip(layout.names or (), (seconds, nanoseconds, *numbers), strict=True):
-        fields[name] = column
+    fields['seconds'], fields['nanoseconds'] = seconds, nanoseconds
+    with np.errstate(over='ignore'):  # too large for float32: infinite, and rejected as such
+        for path, numbers in _ENCODERS[channel].numbers.items():
+            fields[path] = numbers(block.value, block.variance)
     return rows
 
 
@@ -164,176 +164,65 @@ def _rows(channel: Channel, block: Block) -> NDArray[np.uint8]:
 def _template(channel: Channel) -> tuple[bytes, np.dtype[Any]]:
     """Return the bytes of a message of a channel, and where its time and numbers lie."""
     encoder = _ENCODERS[channel]
-    marks = [
-        _MARKS[form][encoder.forms[:place].count(form)] for place, form in enumerate(encoder.forms)
-    ]
-    payload = types.serialize(encoder.type, encoder.build(0, *marks))
-    places = [types.ENCAPSULATION_BYTES, types.ENCAPSULATION_BYTES + 4]
-    for form, mark in zip(encoder.forms, marks, strict=True):
-        number = struct.pack(f'<{form}', mark)
-        places.append(payload.index(number))
+    kinds = {leaf.path: leaf.kind for leaf in types.leaves(encoder.type)}
+    marks = {kind: iter(each) for kind, (_, each) in _MARKS.items()}
+    marked = {path: next(marks[_kind(kinds, path)]) for path in encoder.numbers}
+    constants = {'header': types.header(0, encoder.frame), **encoder.constants}
+    payload = types.serialize(encoder.type, types.make(encoder.type, constants | marked))
+    first = types.ENCAPSULATION_BYTES
+    places = {'seconds': ('<i4', first), 'nanoseconds': ('<u4', first + 4)}
+    for path, mark in marked.items():
+        form, _ = _MARKS[_kind(kinds, path)]
+        places[path] = form, payload.index(struct.pack(form, mark))
     layout = np.dtype(
         {
-            'names': [f'{place}' for place in range(len(places))],
-            'formats': [f'<{form}' if form != 'I' else '<u4' for form in _STAMP + encoder.forms],
-            'offsets': places,
+            'names': list(places),
+            'formats': [form for form, _ in places.values()],
+            'offsets': [place for _, place in places.values()],
             'itemsize': len(payload),
         }
     )
     return payload, layout
 
 
-def vector3(x: float, y: float) -> Any:
-    """
-    Build a geometry_msgs/Vector3 in the plane.
-    """
-    return types.make('geometry_msgs/msg/Vector3', x=x, y=y, z=0.0)
+def _kind(kinds: Mapping[str, str], path: str) -> str:
+    return kinds[path.partition('[')[0]]
 
 
-def covariance6(variance_x: float, variance_y: float = nan) -> Any:
-    """
-    Build a 6x6 covariance from two variances; unknown ones become 0.
-    """
-    matrix = np.zeros(36)
-    matrix[0] = _known(variance_x)
-    matrix[7] = _known(variance_y)
-    return matrix
+def _x(value: Float64, variance: Float64) -> Float64:
+    return value[:, 0]
 
 
-def _known(variance: float) -> float:
-    return 0.0 if isnan(variance) else variance
+def _y(value: Float64, variance: Float64) -> Float64:
+    return value[:, 1]
 
 
-def _twist(x: float, y: float) -> Any:
-    return types.make('geometry_msgs/msg/Twist', linear=vector3(x, y), angular=vector3(0.0, 0.0))
+def _variance_x(value: Float64, variance: Float64) -> Float64:
+    return _known(variance[:, 0])
 
 
-def _speed(stamp_ns: int, x: float, variance: float) -> Any:
-    return types.make(
-        types.TWIST_WITH_COVARIANCE,
-        header=types.header(stamp_ns, _VEHICLE_FRAME),
-        twist=types.make(
-            'geometry_msgs/msg/TwistWithCovariance',
-            twist=_twist(x, 0.0),
-            covariance=covariance6(variance),
-        ),
-    )
+def _variance_y(value: Float64, variance: Float64) -> Float64:
+    return _known(variance[:, 1])
 
 
-def _position(stamp_ns: int, x: float, y: float, *variances: float) -> Any:
-    pose = types.make(
-        'geometry_msgs/msg/Pose',
-        position=types.make('geometry_msgs/msg/Point', x=x, y=y, z=0.0),
-        orientation=_quaternion(0.0, 1.0),
-    )
-    return types.make(
-        types.POSE_WITH_COVARIANCE,
-        header=types.header(stamp_ns, _EARTH_FRAME),
-        pose=types.make(
-            'geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=covariance6(*variances)
-        ),
-    )
-
-
-def _fix(stamp_ns: int, latitude: float, longitude: float, *more: float) -> Any:
-    north, east, kind = more
-    covariance = np.zeros(9)
-    covariance[0], covariance[4] = east, north
-    status = types.class_of('sensor_msgs/msg/NavSatStatus')
-    return types.make(
-        types.NAV_SAT_FIX,
-        header=types.header(stamp_ns, _VEHICLE_FRAME),
-        status=status(status=status.STATUS_FIX, service=status.SERVICE_UNKNOWN),
-        latitude=latitude,
-        longitude=longitude,
-        altitude=nan,
-        position_covariance=covariance,
-        position_covariance_type=kind,
-    )
-
-
-def _quaternion(z: float, w: float) -> Any:
-    return types.make('geometry_msgs/msg/Quaternion', x=0.0, y=0.0, z=z, w=w)
-
-
-def _heading(stamp_ns: int, z: float, w: float) -> Any:
-    return types.make(
-        types.QUATERNION,
-        header=types.header(stamp_ns, _VEHICLE_FRAME),
-        quaternion=_quaternion(z, w),
-    )
-
-
-def _joint(name: str, *, moves: bool, stamp_ns: int, value: float) -> Any:
-    return types.make(
-        types.JOINT_STATE,
-        header=types.header(stamp_ns, ''),
-        name=[name],
-        position=np.array([nan if moves else value]),
-        velocity=np.array([value if moves else nan]),
-        effort=np.empty(0),
-    )
-
-
-def _wind(stamp_ns: int, x: float, y: float) -> Any:
-    return types.make(
-        types.TWIST, header=types.header(stamp_ns, _VEHICLE_FRAME), twist=_twist(x, y)
-    )
-
-
-def _depth(stamp_ns: int, depth_m: float, variance: float) -> Any:
-    return types.make(
-        types.RANGE,
-        header=types.header(stamp_ns, _VEHICLE_FRAME),
-        radiation_type=types.class_of(types.RANGE).ULTRASOUND,
-        field_of_view=0.0,
-        min_range=0.0,
-        max_range=float('inf'),
-        range=depth_m,
-        variance=variance,
-    )
-
-
-# the numbers that a message holds, of (n, 2) values and variances
-
-
-def _one(value: Float64, variance: Float64) -> SentNumbers:
-    return (value[:, 0],)
-
-
-def _two(value: Float64, variance: Float64) -> SentNumbers:
-    return value[:, 0], value[:, 1]
-
-
-def _one_known(value: Float64, variance: Float64) -> SentNumbers:
-    return value[:, 0], _zero(variance[:, 0])
-
-
-def _two_known(value: Float64, variance: Float64) -> SentNumbers:
-    return *_two(value, variance), _zero(variance[:, 0]), _zero(variance[:, 1])
-
-
-def _fix_numbers(value: Float64, variance: Float64) -> SentNumbers:
+def _kind_of_covariance(value: Float64, variance: Float64) -> Float64:
     fix = types.class_of(types.NAV_SAT_FIX)
-    known = _zero(variance).any(axis=1)
-    kind = np.where(known, fix.COVARIANCE_TYPE_DIAGONAL_KNOWN, fix.COVARIANCE_TYPE_UNKNOWN)
-    return *_two_known(value, variance), kind
+    known = _known(variance).any(axis=1)
+    kinds = fix.COVARIANCE_TYPE_UNKNOWN, fix.COVARIANCE_TYPE_DIAGONAL_KNOWN
+    return np.take(np.array(kinds, np.float64), known.astype(np.intp))
 
 
-def _half_angle(value: Float64, variance: Float64) -> SentNumbers:
-    # of the C library, whose last bit is the same for one and for many
-    half = (0.5 * value[:, 0]).tolist()
-    return np.array([*map(sin, half)]), np.array([*map(cos, half)])
-
-
-def _float32(value: Float64, variance: Float64) -> SentNumbers:
-    with np.errstate(over='ignore'):  # too large for float32: infinite, and rejected as such
-        depth, known = _one_known(value, variance)
-        return depth.astype(np.float32), known.astype(np.float32)
-
-
-def _zero(variance: Float64) -> Float64:
+def _known(variance: Float64) -> Float64:
     return np.where(np.isnan(variance), 0.0, variance)
+
+
+# of the C library, whose last bit is the same for one and for many
+def _sine_of_half(value: Float64, variance: Float64) -> Float64:
+    return np.array([*map(sin, (0.5 * value[:, 0]).tolist())])
+
+
+def _cosine_of_half(value: Float64, variance: Float64) -> Float64:
+    return np.array([*map(cos, (0.5 * value[:, 0]).tolist())])
 
 
 class _Encoder(NamedTuple):
@@ -343,36 +232,77 @@ class _Encoder(NamedTuple):
     Attributes
     ----------
     type
-    build
-        Makes the message of a stamp and of the numbers it holds.
-    forms
-        Of these numbers, as `struct` writes them.
+    frame
+        In which they are measured.
     numbers
-        The numbers, (n,) each, of (n, 2) values and variances.
+        Of each message, by the path of the field that holds them.
+    constants
+        The same in all messages, by path; other fields are zero or empty.
     """
 
     type: str
-    build: Callable[..., Any]
-    forms: str
-    numbers: Callable[[Float64, Float64], SentNumbers]
+    frame: str
+    numbers: Mapping[str, FieldNumbers]
+    constants: Mapping[str, Any] = MappingProxyType({})
 
 
 def _of_joint(name: str, *, moves: bool) -> _Encoder:
-    def build(stamp_ns: int, value: float) -> Any:
-        return _joint(name, moves=moves, stamp_ns=stamp_ns, value=value)
+    joint = {'name': [name], 'position': np.array([nan]), 'velocity': np.array([nan])}
+    moving = 'velocity[0]' if moves else 'position[0]'
+    return _Encoder(types.JOINT_STATE, '', {moving: _x}, joint)
 
-    return _Encoder(types.JOINT_STATE, build, 'd', _one)
 
-
+_SPEED = _Encoder(
+    types.TWIST_WITH_COVARIANCE,
+    'base_link',
+    {'twist.twist.linear.x': _x, 'twist.covariance[0]': _variance_x},
+)
 _ENCODERS: dict[Channel, _Encoder] = {
-    Channel.SPEED_THROUGH_WATER: _Encoder(types.TWIST_WITH_COVARIANCE, _speed, 'dd', _one_known),
-    Channel.SPEED_OVER_GROUND: _Encoder(types.TWIST_WITH_COVARIANCE, _speed, 'dd', _one_known),
-    Channel.POSITION: _Encoder(types.POSE_WITH_COVARIANCE, _position, 'dddd', _two_known),
-    Channel.POSITION_GEODETIC: _Encoder(types.NAV_SAT_FIX, _fix, 'ddddB', _fix_numbers),
-    Channel.HEADING: _Encoder(types.QUATERNION, _heading, 'dd', _half_angle),
+    Channel.SPEED_THROUGH_WATER: _SPEED,
+    Channel.SPEED_OVER_GROUND: _SPEED,
+    Channel.POSITION: _Encoder(
+        types.POSE_WITH_COVARIANCE,
+        'map',
+        {
+            'pose.pose.position.x': _x,
+            'pose.pose.position.y': _y,
+            'pose.covariance[0]': _variance_x,
+            'pose.covariance[7]': _variance_y,
+        },
+        {'pose.pose.orientation.w': 1.0},
+    ),
+    Channel.POSITION_GEODETIC: _Encoder(
+        types.NAV_SAT_FIX,
+        'base_link',
+        {
+            'latitude': _x,
+            'longitude': _y,
+            # in east, north, up
+            'position_covariance[4]': _variance_x,
+            'position_covariance[0]': _variance_y,
+            'position_covariance_type': _kind_of_covariance,
+        },
+        {
+            'altitude': nan,
+            'status.status': types.class_of('sensor_msgs/msg/NavSatStatus').STATUS_FIX,
+            'status.service': types.class_of('sensor_msgs/msg/NavSatStatus').SERVICE_UNKNOWN,
+        },
+    ),
+    Channel.HEADING: _Encoder(
+        types.QUATERNION,
+        'base_link',
+        {'quaternion.z': _sine_of_half, 'quaternion.w': _cosine_of_half},
+    ),
     **{each: _of_joint(each.name.lower(), moves=True) for each in SHAFTS},
     **{each: _of_joint(each.name.lower(), moves=False) for each in PITCHES},
     Channel.RUDDER: _of_joint('rudder', moves=False),
-    Channel.WIND_APPARENT: _Encoder(types.TWIST, _wind, 'dd', _two),
-    Channel.DEPTH: _Encoder(types.RANGE, _depth, 'ff', _float32),
+    Channel.WIND_APPARENT: _Encoder(
+        types.TWIST, 'base_link', {'twist.linear.x': _x, 'twist.linear.y': _y}
+    ),
+    Channel.DEPTH: _Encoder(
+        types.RANGE,
+        'base_link',
+        {'range': _x, 'variance': _variance_x},
+        {'radiation_type': types.class_of(types.RANGE).ULTRASOUND, 'max_range': inf},
+    ),
 }

@@ -14,9 +14,8 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import types as nb
 
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64, UInt8
@@ -306,23 +305,14 @@ def _long(data: Any, at: int) -> Any:
     return word(data, at + 4, False) << _U(32) | word(data, at, False)
 
 
-_BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
-_PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
+_GIVEN = 'Array({}, 1, "C", readonly=True)'
+_OCTETS, _PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
 
 
-_SIGNATURE: Signature = nb.int64(
-    _BUFFER,
-    _PLACES,
-    _PLACES,
-    _PLACES,
-    nb.Array(nb.int64, 2, 'C', readonly=True),
-    nb.int64[::1],
-    nb.float64[:, ::1],
-    nb.uint8[::1],
+@compiled(
+    f'i8({_OCTETS}, {_PLACES}, {_PLACES}, {_PLACES}, Array(i8, 2, "C", readonly=True), '
+    'i8[::1], f8[:, ::1], u1[::1])'
 )
-
-
-@compiled(_SIGNATURE)
 def gather(
     data: UInt8,
     start: Int64,

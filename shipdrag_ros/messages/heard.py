@@ -17,6 +17,8 @@ from shipdrag_ros.samples import Block
 
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 OK, WARN, ERROR, STALE = range(4)
+OF_CONDITIONS = 'they are'
+"""Key of the conditions that the figures of an estimate are of."""
 READY_S = 600.0  # of steady sailing from which the noise is known well enough
 
 

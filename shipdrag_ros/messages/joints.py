@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types as nb
 from numpy.typing import NDArray
 
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.messages.gather import (
     BAD,
     BODY,
@@ -300,28 +299,15 @@ def _read_arrays(data: Any, body: int, at: int, size: int, big: bool, scratch: A
     return size - at <= _PADDING
 
 
-_BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
-_PLACES_READ = nb.Array(nb.int64, 1, 'C', readonly=True)
+_GIVEN = 'Array({}, 1, "C", readonly=True)'
+_OCTETS, _PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
 
 
-_SIGNATURE: Signature = nb.UniTuple(nb.int64, 2)(
-    _BUFFER,
-    _PLACES_READ,
-    _PLACES_READ,
-    _PLACES_READ,
-    nb.boolean,
-    nb.int64[::1],
-    nb.uint8[::1],
-    nb.float64[:, ::1],
-    nb.uint8[::1],
-    nb.int64[::1],
-    nb.int64[::1],
-    nb.uint8[::1],
-    nb.float64[::1],
+@compiled(
+    f'UniTuple(i8, 2)({_OCTETS}, {_PLACES}, {_PLACES}, {_PLACES}, b1, '
+    'i8[::1], u1[::1], f8[:, ::1], u1[::1], i8[::1], i8[::1], u1[::1], f8[::1])',
+    uncounted=True,
 )
-
-
-@compiled(_SIGNATURE, uncounted=True)
 def _read_all(
     data: UInt8,
     start: Int64,

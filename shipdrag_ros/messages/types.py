@@ -10,14 +10,18 @@ older bags are read.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from functools import cache, reduce
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from shipdrag_ros.samples import SECOND_NS
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
@@ -50,28 +54,35 @@ _TIME = struct.Struct('iI')  # builtin_interfaces/Time: the first that a header 
 
 RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
 
-_store = get_typestore(Stores.ROS2_JAZZY)
-_store.register(
-    get_types_from_msg(
-        'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
-        'float32 min_range\nfloat32 max_range\nfloat32 range\n',
-        RANGE_BEFORE_IRON,
+
+@cache
+def _store() -> Typestore:
+    """Return the store, whose layouts take a while to import."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(
+        get_types_from_msg(
+            'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
+            'float32 min_range\nfloat32 max_range\nfloat32 range\n',
+            RANGE_BEFORE_IRON,
+        )
     )
-)
-# not of ROS itself; what a bag holds is read without its package
-_store.register(
-    get_types_from_msg(
-        'uint8 DVL_MODE_BOTTOM=1\nuint8 DVL_MODE_WATER=2\n'
-        'uint8 DVL_TYPE_PISTON=0\nuint8 DVL_TYPE_PHASED_ARRAY=1\n'
-        'std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\n'
-        'geometry_msgs/Vector3 velocity\nfloat64[9] velocity_covar\n'
-        'float64 altitude\nfloat64 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n'
-        'float32 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\n'
-        'geometry_msgs/Vector3[4] beam_unit_vec\nfloat64[4] range\nfloat32[4] range_covar\n'
-        'float32[4] beam_quality\nfloat32[4] beam_velocity\nfloat32[4] beam_velocity_covar\n',
-        DVL,
+    # not of ROS itself; what a bag holds is read without its package
+    store.register(
+        get_types_from_msg(
+            'uint8 DVL_MODE_BOTTOM=1\nuint8 DVL_MODE_WATER=2\n'
+            'uint8 DVL_TYPE_PISTON=0\nuint8 DVL_TYPE_PHASED_ARRAY=1\n'
+            'std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\n'
+            'geometry_msgs/Vector3 velocity\nfloat64[9] velocity_covar\n'
+            'float64 altitude\nfloat64 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n'
+            'float32 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\n'
+            'geometry_msgs/Vector3[4] beam_unit_vec\nfloat64[4] range\nfloat32[4] range_covar\n'
+            'float32[4] beam_quality\nfloat32[4] beam_velocity\nfloat32[4] beam_velocity_covar\n',
+            DVL,
+        )
     )
-)
+    return store
 
 
 class Leaf(NamedTuple):
@@ -94,14 +105,50 @@ def class_of(type_name: str) -> Any:
     """
     Return the class of a message type, for its constants.
     """
-    return _store.types[type_name]
+    return _store().types[type_name]
 
 
-def make(type_name: str, /, **fields: Any) -> Any:
+def make(type_name: str, fields: Mapping[str, Any] | None = None, /, **more: Any) -> Any:
     """
-    Build a message; every field must be given.
+    Build a message; what is not given is zero or empty.
+
+    Parameters
+    ----------
+    type_name
+    fields
+        By path: `twist.twist.linear.x` or `twist.covariance[7]` for instance.
+    more
+        The same of fields whose names are paths.
     """
-    return class_of(type_name)(**fields)
+    message = _blank(type_name)
+    for path, value in {**(fields or {}), **more}.items():
+        *way, last = path.split('.')
+        owner = reduce(getattr, way, message)
+        name, bracket, place = last.partition('[')
+        if bracket:
+            getattr(owner, name)[int(place.removesuffix(']'))] = value
+        else:
+            setattr(owner, name, value)
+    return message
+
+
+def _blank(type_name: str) -> Any:
+    """Return a message of zeros, empty texts and empty sequences."""
+    fields = _store().fielddefs[type_name][1]
+    return class_of(type_name)(**{name: _blank_field(*each) for name, each in fields})
+
+
+def _blank_field(node: Nodetype, about: Any) -> Any:
+    if node is Nodetype.NAME:
+        return _blank(about)
+    if node is Nodetype.BASE:
+        kind = about[0]
+        return '' if kind == 'string' else np.dtype(kind).type(0).item()
+    (inner, of), length = about
+    count = length if node is Nodetype.ARRAY else 0
+    if inner is Nodetype.BASE and of[0] != 'string':
+        return np.zeros(count, of[0])
+    return [_blank_field(inner, of) for _ in range(count)]
 
 
 def header(stamp_ns: int, frame_id: str) -> Any:
@@ -125,7 +172,7 @@ def serialize(type_name: str, message: Any) -> bytes:
     """
     Return the CDR bytes of a message, little endian.
     """
-    return bytes(_store.serialize_cdr(message, type_name, little_endian=True))
+    return bytes(_store().serialize_cdr(message, type_name, little_endian=True))
 
 
 def deserialize(type_name: str, payload: bytes) -> Any:
@@ -148,12 +195,12 @@ def deserialize(type_name: str, payload: bytes) -> Any:
 def _deserialize(type_name: str, payload: bytes) -> Any:
     if payload[:2] not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or len(payload) < ENCAPSULATION_BYTES:
         raise MalformedMessage(f'unknown encapsulation {payload[:2]!r}')
-    definition = _store.get_msgdef(type_name)
+    definition = _store().get_msgdef(type_name)
     little = payload[:2] == _LITTLE_ENDIAN
     read = definition.deserialize_cdr_le if little else definition.deserialize_cdr_be
     body = payload[ENCAPSULATION_BYTES:]
     try:
-        message, end = read(body, 0, definition.cls, _store)
+        message, end = read(body, 0, definition.cls, _store())
     except (SerdeError, struct.error, ValueError) as error:
         raise MalformedMessage(f'not a {type_name}: {error}') from error
     if len(body) - end > PADDING_BYTES:
@@ -165,7 +212,7 @@ def leaves(type_name: str, path: str = '') -> Iterator[Leaf]:
     """
     Yield the fields of a type in their order, those of its fields in their place.
     """
-    for name, (node, about) in _store.fielddefs[type_name][1]:
+    for name, (node, about) in _store().fielddefs[type_name][1]:
         match node:
             case Nodetype.NAME:
                 yield from leaves(about, f'{path}{name}.')
@@ -184,7 +231,7 @@ def definition(type_name: str) -> str:
     """
     Return the full `ros2msg` text of a type, dependencies included.
     """
-    text: str = _store.generate_msgdef(type_name, ros_version=2)[0]
+    text: str = _store().generate_msgdef(type_name, ros_version=2)[0]
     return text
 
 
@@ -192,7 +239,7 @@ def type_hash(type_name: str) -> str:
     """
     Return the RIHS01 hash by which ROS 2 knows definitions.
     """
-    digest: str = _store.hash_rihs01(type_name)
+    digest: str = _store().hash_rihs01(type_name)
     return digest
 
 
@@ -200,7 +247,7 @@ def is_stamped(type_name: str) -> bool:
     """
     Say whether a type begins with a header, which holds the time of measurement.
     """
-    return any(name == 'header' for name, _ in _store.fielddefs[type_name][1][:1])
+    return any(name == 'header' for name, _ in _store().fielddefs[type_name][1][:1])
 
 
 def from_ros1(type_name: str, payload: bytes) -> bytes:
@@ -214,7 +261,7 @@ def from_ros1(type_name: str, payload: bytes) -> bytes:
     """
     name = RANGE_BEFORE_IRON if type_name == RANGE else type_name
     try:
-        return bytes(_store.ros1_to_cdr(payload, name))
+        return bytes(_store().ros1_to_cdr(payload, name))
     except Exception as error:  # the code that is generated for a type raises what it happens to
         raise MalformedMessage(f'{type(error).__name__}: {error}') from error
 
@@ -239,4 +286,4 @@ def is_known(type_name: str) -> bool:
     """
     Say whether the store has a definition of this type.
     """
-    return type_name in _store.fielddefs
+    return type_name in _store().fielddefs

@@ -14,7 +14,7 @@ from collections import Counter
 from datetime import date
 from enum import Enum
 from functools import lru_cache
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from shipdrag_ros.nmea.sentences import (
     READERS,
@@ -38,7 +38,7 @@ _DATE = re.compile(r'(\d\d)(\d\d)(\d\d)')
 _RANK = {kind: place for place, kind in enumerate(READERS)}
 _KEPT = 1 << 14  # sentences; instruments say the same again and again
 
-AnySource = TypeVar('AnySource', 'SentenceSource', 'tuple[SentenceSource, str]')
+AnySource = TypeVar('AnySource', bound=tuple[Any, ...])
 
 
 class Checksum(Enum):
@@ -145,6 +145,8 @@ class SentenceReader:
         if star and (len(stated) != 2 or checksum_of(content) != stated.upper()):
             return 'wrong checksum'
         address, *texts = content.split(',')
+        if ' ' in content or '\t' in content:
+            texts = [each.strip() for each in texts]
         parts = _parts(address)
         if parts is None:
             return 'no address'
@@ -216,6 +218,7 @@ def _time(fields: Fields) -> SentenceTime | NoValue | None:
     return SentenceTime(of_day_ns, day, fields.kind == 'ZDA' or has_fix(fields))
 
 
+@lru_cache(256)  # several sentences of one fix have its time
 def _of_day_ns(text: str) -> int:
     found = _TIME.fullmatch(text)
     if found is None:
@@ -232,11 +235,14 @@ def _day(fields: Fields) -> int | None:
     if fields.kind == 'ZDA':
         texts = [fields[name] for name in ('year', 'month', 'day')]
         return _days(*texts) if all(texts) else None
-    if fields.kind != 'RMC' or not fields['date']:
-        return None
-    found = _DATE.fullmatch(fields['date'])
+    return _rmc_day(fields['date']) if fields.kind == 'RMC' and fields['date'] else None
+
+
+@lru_cache(64)
+def _rmc_day(text: str) -> int:
+    found = _DATE.fullmatch(text)
     if found is None:
-        raise NoValue('no possible date', fields['date'])
+        raise NoValue('no possible date', text)
     century = 19 if int(found[3]) >= _CENTURY_TURNS else 20
     return _days(f'{century}{found[3]}', found[2], found[1])
 

@@ -73,11 +73,11 @@ class Fields(dict[str, str]):
     kind
         Of the sentence.
     texts
-        What follows its address.
+        What follows its address, without blanks around them.
     """
 
     def __init__(self, kind: str, texts: Sequence[str]) -> None:
-        super().__init__(zip(_NAMES.get(kind, ()), map(str.strip, texts)))
+        super().__init__(zip(_NAMES.get(kind, ()), texts))
         self.kind = kind
 
     def __missing__(self, name: str) -> str:

@@ -27,6 +27,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
+from shipdrag_ros.simulation.effects import carrying
 
 _GOES_ON = (
     'The coastdown alone is diagnosed here; `shipdrag diagnose BAG` of the recording holds all of '
@@ -98,7 +99,7 @@ class Diagnosing:
     """
 
     def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:
-        self._ship = ship
+        self._ship = carrying(ship)  # terms of this process, in the one that diagnoses
         self._parameters = parameters
         self._queue = ThreadPoolExecutor(max_workers=1, thread_name_prefix='diagnosis')
         self._lock = Lock()

@@ -18,8 +18,9 @@ from shipdrag_ros.coastdown.events import State
 from shipdrag_ros.coastdown.health import MonitorProgress
 from shipdrag_ros.display import printable
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.words import conditions
 from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
+from shipdrag_ros.messages.heard import ERROR, OF_CONDITIONS, OK, WARN, Status
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.judging import Finding, InputFacts, Recently, behind_others, judge
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
@@ -261,6 +262,7 @@ def estimate_status(estimate: Estimate | None, why_none: str) -> Status:
         'its standard deviation [m/s]': estimate.last_speed_sigma_m_s,
         'specific resistance [m/s^2]': estimate.last_resistance_m_s2,
         'standard deviation of it [m/s^2]': estimate.last_sigma_m_s2,
+        OF_CONDITIONS: conditions(estimate),
         'valid from Froude number [1]': low,
         'valid to Froude number [1]': high,
         'w, largest deviation over largest resistance [1]': estimate.max_relative_sigma,

@@ -16,12 +16,12 @@ from std_srvs.srv import Trigger
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.node.recorder import RecordingState
+from shipdrag_ros.node.requests import LONGEST, TooLong, unpack_no_giants
 from shipdrag_ros.node.session import Session
 
 CHANGES = (2.0, 20.0)  # a second in the long run, and at once
 TRIGGERS = (0.2, 10.0)  # each may make a file, or drop an hour of memory
 READS = (50.0, 200.0)
-LONGEST = 1000  # names or parameters of a request
 TOO_LONG = f'refused: more than {LONGEST} entries'
 REFUSED = 'refused: asked too often; ask again in some seconds'
 _LIMITS = {
@@ -104,6 +104,7 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
     """
     for service in services:
         limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
+        unpack_no_giants(service)
         service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
@@ -135,7 +136,7 @@ def _limited(
 
     def limited(request: Any, response: Any) -> Any:
         nonlocal refusing
-        if _entries(request) > LONGEST:
+        if isinstance(request, TooLong):
             warn(f'{name}: {TOO_LONG}')
             return _refuse(request, response, TOO_LONG)
         if limit.allows():
@@ -149,10 +150,6 @@ def _limited(
     return limited
 
 
-def _entries(request: Any) -> int:
-    return max(len(getattr(request, name, ())) for name in ('parameters', 'names', 'prefixes'))
-
-
 def _refuse(request: Any, response: Any, why: str) -> Any:
     """Say no in the words of the service; what only reads gives nothing."""
     refusal = SetParametersResult(successful=False, reason=why)
@@ -161,7 +158,8 @@ def _refuse(request: Any, response: Any, why: str) -> Any:
     if hasattr(response, 'message'):
         response.message = why
     if isinstance(response, SetParameters.Response):
-        response.results = [refusal] * min(len(request.parameters), LONGEST)
+        many = isinstance(request, TooLong)
+        response.results = [refusal] * (LONGEST if many else len(request.parameters))
     elif isinstance(response, SetParametersAtomically.Response):
         response.result = refusal
     return response

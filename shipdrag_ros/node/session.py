@@ -30,12 +30,12 @@ from shipdrag_ros.messages import (
     Source,
     decode,
     event_message,
-    outputs,
     reset_request,
     silence_mark,
     stop_mark,
     types,
 )
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.node.recorder import RawMessage, Recorder
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 

@@ -53,6 +53,7 @@ _CLOSE = 0.1  # of -2 ln posterior
 _LONGEST = 1.5  # of a step in z
 _HOPELESS, _TRIED = 25.0, 3  # nats behind the best, from where none is fitted on, and not before
 _STARTS = 2  # of each way that are fitted
+_AT_ONCE = 100  # ways scored together: each is compared with each
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
@@ -300,14 +301,17 @@ class Comparing:
         every += self._weigh(self._beside(every))
         return ComparedHypotheses(self.runs, self.effects, tuple(every))
 
-    def promising(self, most: int) -> list[str]:
+    def promising(self) -> list[EffectWay]:
         """
-        Return names of the effects that explain most by the linear response, the best first.
+        Return all ways, that which explains most by the linear response first.
         """
         ways = [way for each in self.ways.values() for way in each]
-        scores, _, _ = self._score(self.fit_nothing(), ways)
-        names = [ways[i].effect.name for i in np.argsort(-scores).tolist()]
-        return list(dict.fromkeys(names))[:most]
+        nothing = self.fit_nothing()
+        parts = [
+            self._score(nothing, ways[first : first + _AT_ONCE])[0]
+            for first in range(0, len(ways), _AT_ONCE)
+        ]
+        return [ways[i] for i in np.argsort(-np.concatenate(parts)).tolist()]
 
     def fit_nothing(self) -> Fitted:
         """Fit the runs with nothing missing, under usual noise."""

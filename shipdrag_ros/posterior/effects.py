@@ -23,7 +23,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Scope
-from shipdrag_ros.simulation.effects import find
+from shipdrag_ros.simulation.effects import effects_of
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
@@ -115,7 +115,7 @@ def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     """
     Return an effect of the ship file, as well known as the file says.
     """
-    effect = find(stated.name)
+    effect = effects_of(ship)[stated.name]
     unknowns = []
     for q in effect.parameters_of(ship):
         given = stated.parameters.get(q.name, Parameter(float(np.nan_to_num(q.value)), 0.0))

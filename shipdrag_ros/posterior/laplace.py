@@ -32,6 +32,7 @@ _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
 _ROUNDS = 12  # linearisations about the mean of the mixture
 _CLOSE = 0.05  # of chi^2, from one step to the next
 _STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
+_UNLIKELY, _QUICK = -7.0, -5.0  # log odds to the likeliest family; less is left out
 _LEAST = 1e-3  # weight of a model; less is left out of the spread
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
@@ -110,6 +111,25 @@ def of_family(
         for a in range(p):
             log_evidence += 0.5 * step[a] * right[a, 0] - np.log(lower[a, a] / scale[a])
     return solved, log_evidence, step, lower, scale
+
+
+@compiled
+def each_of_families(
+    products: Float64, mean: Float64, precision: Float64
+) -> tuple[Float64, Float64]:
+    """
+    Solve a linear model under each of some priors (f, p), as `of_family`.
+
+    Returns
+    -------
+    log_evidence, step : (f,), (f, p)
+    """
+    logs, steps = np.full(len(mean), -np.inf), np.zeros(mean.shape)
+    for q in range(len(mean)):
+        solved, log_evidence, step, _, _ = of_family(products, mean[q], precision[q])
+        if solved and np.isfinite(log_evidence):
+            logs[q], steps[q] = log_evidence, step
+    return logs, steps
 
 
 @compiled
@@ -195,8 +215,8 @@ def _families(problem: RunModel, families: tuple[Family, ...], now: Float64) -> 
     """Return what families say of the unknowns that are free, from some unknowns on."""
     free = problem.free
     return Families(
-        np.array([each.mean[free] - now[free] for each in families]),
-        np.array([each.precision[free] for each in families]),
+        np.array([each.mean for each in families])[:, free] - now[free],
+        np.array([each.precision for each in families])[:, free],
         np.log(np.array([each.chance for each in families])),
     )
 
@@ -222,15 +242,22 @@ def _prepared(
     return table[kept], problem.white._replace(damping_1_s=damping, inertia=inertia)
 
 
+def _likely(problem: RunModel, now: Float64, typical: Settings, least: float) -> RunModel:
+    """Return the problem with the families that count under a setting of the noise."""
+    logs = _each_family(problem, now, _linear(problem, now), typical).log_evidence
+    kept = zip(problem.families, logs - logs.max())
+    return replace(problem, families=tuple(each for each, log in kept if log > least))
+
+
 def _mixed(
-    problem: RunModel, now: Float64, settings: Settings
+    problem: RunModel, taught: tuple[Family, ...], now: Float64, settings: Settings
 ) -> tuple[Float64, Float64, Float64]:
-    """Return step, covariance and weights at some unknowns."""
+    """Return step, covariance and weights at some unknowns; noise was learnt by `taught`."""
     table, white = _linear(problem, now)
     families = _families(problem, problem.families, now)
-    taught = _families(problem, problem.taught, now)
+    of_taught = _families(problem, taught, now)
     of_free, spread, weight = mix(
-        table, problem.rows, white, problem.steady, settings, families, taught
+        table, problem.rows, white, problem.steady, settings, families, of_taught
     )
     step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families[0].precision)
     step[problem.free] = of_free
@@ -264,9 +291,8 @@ def _each_family(
     misfit = float(products[0, 0])
     products *= min(1.0, n / misfit)
     priors = _families(problem, problem.families, now)
-    solved = [of_family(products, *each) for each in zip(priors.mean, priors.precision)]
-    logs = np.array([each[1] if each[0] else -np.inf for each in solved])
-    return _Linear(misfit, logs + priors.log_chance, np.array([each[2] for each in solved]))
+    logs, steps = each_of_families(products, priors.mean, priors.precision)
+    return _Linear(misfit, logs + priors.log_chance, steps)
 
 
 def _objective(problem: RunModel, now: Float64, misfit: float, which: int) -> float:
@@ -360,12 +386,17 @@ def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False
     now = problem.start
     if seen is not None:
         problem, now = _begun(problem, seen)
-    now = _climbed(problem, now, prior_of(_seen(problem, now), problem.speed_m_s).typical)
+    usual = problem.usual
+    now = _climbed(usual, now, prior_of(_seen(problem, now), problem.speed_m_s).typical)
     noise = learn(_seen(problem, now), problem.speed_m_s, quick=quick)
-    now = _climbed(problem, now, noise.typical)
+    now = _climbed(usual, now, noise.typical)
+    taught, problem = (
+        problem.taught,
+        _likely(problem, now, noise.typical, _QUICK if quick else _UNLIKELY),
+    )
     away, part = np.inf, 1.0
     for _ in range(_ROUNDS):
-        step, covariance, weight = _mixed(problem, now, noise.settings)
+        step, covariance, weight = _mixed(problem, taught, now, noise.settings)
         before, away = away, _moved(problem, step, covariance)
         if not away < before:
             part *= 0.5

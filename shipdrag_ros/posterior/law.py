@@ -8,7 +8,9 @@ volume alone, whose waves have humps. s is a spline relative to r, orthogonal to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,7 @@ from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
 from shipdrag_ros.simulation.hydrodynamics import USUAL_FORM_FACTOR, drag_n, friction_n, viscous_n
 
 _NODES = 97  # of the grid of speeds
-_ABOVE = 1.25  # of the highest speed that a fit may try
+ABOVE = 1.25  # of the highest speed that a fit may try
 _SPLINE_FROUDE, _MOST = 0.02, 14  # spacing and largest number of splines
 _UNIT = 0.2  # size of s by itself over that of what both parts leave of it, from Fr 0.05 to 0.2
 _ALIKE, _OWN = 5.0, 0.02  # spacings over which neighbours are alike, and the part that is not
@@ -31,6 +33,34 @@ _NEGLIGIBLE = 0.03  # size of a column, of the largest
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 _HUMP_FROUDE, _HUMP_POWER = 0.5, 8
 _HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
+
+
+class WeatherState(NamedTuple):
+    """Probability of a state of wind or depth, and what it says of its columns (w,)."""
+
+    chance: float
+    mean: Float64
+    sd: Float64
+
+
+class Influence(NamedTuple):
+    """
+    What wind or depth adds to r, and is no part of the hull.
+
+    Attributes
+    ----------
+    known : (m,)
+        Without an unknown [m/s^2].
+    columns : (w, m)
+    states
+    inertia
+        What it adds to 1 + n_r.
+    """
+
+    known: Float64
+    columns: Float64
+    states: tuple[WeatherState, ...]
+    inertia: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -73,7 +103,7 @@ class HullLaw:
         low_m_s, top_m_s
             Speeds of the run, over which s is spread.
         """
-        speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
+        speed = np.linspace(0.0, ABOVE * top_m_s, _NODES)
         stated = ship.baseline is not None
         parts = parts_n(ship, speed) / ship.mass_kg
         spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
@@ -83,22 +113,33 @@ class HullLaw:
         none = 0 if stated else None
         return cls(speed, parts, shapes, humps[:none], dry[:none], stated)
 
-    def forces(self, ship: Ship, tau_s: float) -> Forces:
+    def forces(self, ship: Ship, tau_s: float, weather: Sequence[Influence] = ()) -> Forces:
         """
         Return what the motion takes.
+
+        Parameters
+        ----------
+        ship
+        tau_s
+            Of the shaft; see `motion.Forces`.
+        weather
+            What wind and depth add.
         """
         step = float(self.speed_m_s[1])
-        columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry])
+        of_weather = [each.columns for each in weather]
+        columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry, *of_weather])
         columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
 
+        known = sum((each.known for each in weather), self.parts.sum(axis=0))
+        inertia = 1.0 + sum(each.inertia for each in weather)
         return Forces(
             step,
-            with_slope(self.parts.sum(axis=0)),
+            with_slope(known),
             with_slope(columns),
-            with_slope(1.0 + ship.n_r(self.speed_m_s)),
+            with_slope(inertia + ship.n_r(self.speed_m_s)),
             tau_s,
         )
 

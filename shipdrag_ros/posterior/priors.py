@@ -155,6 +155,34 @@ WRONG = Declared(
 CALM_CURRENT = Declared(
     'c', 'the same where none is missing', normal(0.05), 'm/s', 'still water is seldom still'
 )
+# the weather
+LIGHT_AIR = Declared(
+    'w', 'true wind where little blows, ahead and across', normal(1.2), 'm/s', _REALITY
+)
+WINDY = Declared(
+    'w',
+    'chance that more blows, as much as the effect has it, where neither anemometer nor fact says',
+    0.5,
+    '',
+    'mean winds at sea of 4 to 9 m/s; crews choose calm days for trials',
+)
+WIND_OFFSET = Declared(
+    'w', 'error of a true wind from an anemometer', normal(0.6), 'm/s', 'a hull bends the flow'
+)
+WIND_GAIN = Declared('w', 'gain of an anemometer, less one', normal(0.05), '', _REALITY)
+WIND_TURNED = Declared('w', 'by which a vane is turned', normal(0.05), 'rad', _REALITY)
+AIR_AREA = Declared(
+    'A C',
+    'air drag area over V^(2/3), where the ship file states none',
+    log_normal(0.5, 0.6),
+    '',
+    'merchant ships in ballast and laden: 0.25 to 1',
+)
+DEPTH_READ = Declared('h', 'relative error of an echo sounder', normal(0.03), '', _REALITY)
+LENGTH_OVER_BREADTH = Declared(
+    'L/B', 'for the effect of the depth, where the ship file states no breadth', 6.5, '', _REALITY
+)
+BLOCK = Declared('C_B', 'the same where it states no draught', 0.7, '', _REALITY)
 FREE_SHAFT = Declared(
     '-',
     'shaft speed of a propeller that the water turns, over that under power',
@@ -163,7 +191,8 @@ FREE_SHAFT = Declared(
     'four-quadrant open-water data of B4-70',
 )
 SHELTERED_M_S = 5.0
-"""Below it a current is weaker, with the square of the speed: slow craft are tried in basins."""
+"""Below it current and wind are weaker, with the square of the speed: slow craft are tried in
+basins."""
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15)
@@ -216,5 +245,14 @@ TABLE: tuple[Declared, ...] = (
     CALM_CURRENT,
     FREE_SHAFT,
     WRONG,
+    LIGHT_AIR,
+    WINDY,
+    WIND_OFFSET,
+    WIND_GAIN,
+    WIND_TURNED,
+    AIR_AREA,
+    DEPTH_READ,
+    LENGTH_OVER_BREADTH,
+    BLOCK,
 )
 """What docs/model.md prints, in its order."""

@@ -9,7 +9,7 @@ probability. All families share the rows and the unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -20,8 +20,9 @@ import numpy as np
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import HullLaw, wave_with_friction
+from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
+from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 
@@ -84,6 +85,8 @@ class RunModel:
     low_m_s, speed_m_s
         At the end and at the stop, roughly.
     law
+    weather
+        What wind and depth add to it; their columns are the last ones.
     """
 
     rows: Rows
@@ -96,6 +99,12 @@ class RunModel:
     low_m_s: float
     speed_m_s: float
     law: HullLaw
+    weather: tuple[Influence, ...] = ()
+
+    @property
+    def of_hull(self) -> int:
+        """How many of the coefficients are of the hull, before those of wind and depth."""
+        return self.coefficients - sum(len(each.columns) for each in self.weather)
 
     @property
     def coefficients(self) -> int:
@@ -117,6 +126,12 @@ class RunModel:
         )
 
     @property
+    def usual(self) -> RunModel:
+        """The same in the first state of wind and depth: a fit climbs there."""
+        states = math.prod(len(each.states) for each in self.weather)
+        return replace(self, families=self.families[::states])
+
+    @property
     def widest(self) -> Family:
         """The family that holds the coefficients least."""
         return min(
@@ -134,6 +149,7 @@ class RunModel:
         *,
         speed_m_s: float,
         low_m_s: float,
+        weather: Weather | None = None,
     ) -> RunModel:
         """
         Set up the model of a run.
@@ -150,10 +166,13 @@ class RunModel:
         stop
         speed_m_s, low_m_s
             At the stop and at the end, roughly.
+        weather
+            None: wind and depth are part of r.
         """
         law = HullLaw.of(ship, low_m_s, speed_m_s)
         tau_s = _tau_s(stop)
-        forces = law.forces(ship, tau_s)
+        adds = () if weather is None else weather.influences(ship, law.speed_m_s)
+        forces = law.forces(ship, tau_s, adds)
         end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
         ones = np.ones(len(variance))
         position = rows.value[rows.kind == POSITION]
@@ -165,7 +184,7 @@ class RunModel:
             at = np.searchsorted(rows.time_s[rows.kind == POSITION], 0.0)
             start[k + motion.PLACE] = position[min(int(at), len(position) - 1)]
         kinds = frozenset(np.unique(rows.kind).tolist())
-        families = tuple(_all_families(ship, law, stop, start, kinds))
+        families = tuple(_all_families(ship, law, adds, stop, start, kinds))
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -177,6 +196,7 @@ class RunModel:
             low_m_s,
             speed_m_s,
             law,
+            adds,
         )
         start[:k] = families[0].mean[:k]
         return found
@@ -242,22 +262,33 @@ def _extras(
 
 
 def _all_families(
-    ship: Ship, law: HullLaw, stop: StopPrior, start: Float64, kinds: frozenset[int]
+    ship: Ship,
+    law: HullLaw,
+    weather: Sequence[Influence],
+    stop: StopPrior,
+    start: Float64,
+    kinds: frozenset[int],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
-    for (name, chance, scales, size, level, of_dry), (part, lag) in product(
-        _hulls(ship), _lags(kinds)
+    states = tuple(product(*(each.states for each in weather)))
+    for (name, chance, scales, size, level, of_dry), (part, lag), state in product(
+        _hulls(ship), _lags(kinds), states
     ):
-        mean = np.concatenate([[each[0] for each in scales], zeros, extra_mean])
+        of_weather = [each.mean for each in state]
+        mean = np.concatenate([[each[0] for each in scales], zeros, *of_weather, extra_mean])
         sizes = np.full(len(law.shapes), size)
         humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
         dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY))
-        sd = np.concatenate([[each[1] for each in scales], sizes, humps, dry, extra_sd])
+        of_weather = [each.sd for each in state]
+        sd = np.concatenate(
+            [[each[1] for each in scales], sizes, humps, dry, *of_weather, extra_sd]
+        )
         if lag is not None:
             at = motion.LAG - EXTRAS
             mean[at], sd[at] = lag.mean, lag.sd
-        yield Family(name, chance * part, mean, 1.0 / sd**2, level)
+        chance *= part * math.prod(each.chance for each in state)
+        yield Family(name, chance, mean, 1.0 / sd**2, level)
 
 
 def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, priors.Declared | None]]:

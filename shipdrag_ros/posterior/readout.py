@@ -9,13 +9,8 @@ import numpy as np
 
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior
+from shipdrag_ros.posterior.weather import Reference
 from shipdrag_ros.samples import Float64
-
-PARTS = {
-    'log': (motion.SCALE, motion.OFFSET, motion.LAG),
-    'n_r': (motion.INERTIA,),
-}
-"""Unknowns that a part of sigma is due to."""
 
 
 @dataclass(frozen=True)
@@ -26,24 +21,29 @@ class ReadOut:
     Attributes
     ----------
     speed_m_s, resistance_m_s2, sigma_m_s2 : (m,)
-    repeatable_m_s2 : (m,)
-        sigma without what n_r adds, which repeats from run to run.
     slope_1_s, slope_sigma_1_s : (m,)
         dr/dv.
     parts_m_s2
-        What log and n_r add to sigma, by name (m,).
+        Parts of sigma by cause (m,): `n_r`, `log`, `wind`, `depth`, `law` and `noise`, whose
+        squares add up to its square. Each is what would go if the cause were known, of what
+        those before it leave.
     """
 
     speed_m_s: Float64
     resistance_m_s2: Float64
     sigma_m_s2: Float64
-    repeatable_m_s2: Float64
     slope_1_s: Float64
     slope_sigma_1_s: Float64
     parts_m_s2: dict[str, Float64]
 
+    @property
+    def repeatable_m_s2(self) -> Float64:
+        """sigma without what n_r adds, which repeats from run to run."""
+        of_n_r = self.parts_m_s2['n_r']
+        return np.sqrt(np.maximum(self.sigma_m_s2**2 - of_n_r**2, 0.0))
 
-def read(found: RunPosterior, speed_m_s: Float64) -> ReadOut:
+
+def read(found: RunPosterior, speed_m_s: Float64, *, calm: bool = True) -> ReadOut:
     """
     Read r(v) and its band.
 
@@ -52,35 +52,56 @@ def read(found: RunPosterior, speed_m_s: Float64) -> ReadOut:
     found
     speed_m_s : (m,)
         Through water.
+    calm
+        Of the ship in calm deep water; else in the wind and depth of the run.
     """
     problem, k = found.problem, found.problem.coefficients
-    theta = found.mean[:k]
     known, (columns, slopes) = motion.shapes_at(problem.forces, speed_m_s)
-    covariance = found.covariance
+    if calm:
+        grid = problem.law.speed_m_s
+        for each in problem.weather:
+            slope = np.gradient(each.known, grid, edge_order=2)
+            known -= np.array([np.interp(speed_m_s, grid, value) for value in (each.known, slope)])
+        columns[problem.of_hull :] = slopes[problem.of_hull :] = 0.0
+    theta, covariance = found.mean[:k], found.covariance
     cross = columns.T @ covariance[:k]  # of r with every unknown
     variance = np.einsum('km,mk->m', columns, cross[:, :k])
-    parts = {
-        name: np.sqrt(_due(cross, covariance, [k + one for one in which]))
-        for name, which in PARTS.items()
-    }
-    own = np.maximum(variance - parts['n_r'] ** 2, 0.0)
     of_slope = np.einsum('km,kl,lm->m', slopes, covariance[:k, :k], slopes)
     return ReadOut(
         speed_m_s,
         known[0] + theta @ columns,
         np.sqrt(variance),
-        np.sqrt(own),
         known[1] + theta @ slopes,
         np.sqrt(of_slope),
-        parts,
+        _parts(found, cross, variance),
     )
 
 
-def _due(cross: Float64, covariance: Float64, which: list[int]) -> Float64:
-    """Return the variance (m,) that would go if some unknowns were known."""
-    block = covariance[np.ix_(which, which)]
-    part = cross[:, which]
-    result: Float64 = np.maximum(
-        np.einsum('mi,im->m', part, np.linalg.pinv(block, hermitian=True) @ part.T), 0.0
-    )
-    return result
+def _causes(found: RunPosterior) -> dict[str, list[int]]:
+    """Return the unknowns of each cause."""
+    problem, k = found.problem, found.problem.coefficients
+    causes = {
+        'n_r': [k + motion.INERTIA],
+        'log': [k + motion.SCALE, k + motion.OFFSET, k + motion.LAG],
+    }
+    first = problem.of_hull
+    for name, each in zip(vars(Reference()), problem.weather):
+        causes[name] = list(range(first, first + len(each.columns)))
+        first += len(each.columns)
+    causes['law'] = list(range(2, problem.of_hull))
+    return causes
+
+
+def _parts(found: RunPosterior, cross: Float64, variance: Float64) -> dict[str, Float64]:
+    """Return the parts of sigma, one cause after the other."""
+    covariance, left, parts = found.covariance.copy(), variance.copy(), {}
+    for name, which in _causes(found).items():
+        block = np.linalg.pinv(covariance[np.ix_(which, which)], hermitian=True)
+        due = np.maximum(np.einsum('mi,ij,mj->m', cross[:, which], block, cross[:, which]), 0.0)
+        due = np.minimum(due, left)
+        parts[name] = np.sqrt(due)
+        left -= due
+        by = block @ covariance[which]
+        cross = cross - cross[:, which] @ by
+        covariance = covariance - covariance[:, which] @ by
+    return parts | {'noise': np.sqrt(left)}

@@ -17,6 +17,7 @@ from shipdrag_ros.samples import Float64
 
 _FIRST_PART, _FIRST_S, _GROWTH = 60.0, 3.0, 1.06  # of all, longest, and from one to the next
 _LONGEST_PART, _LONGEST_S = 80.0, 12.0
+_QUICK = 0.5  # of the number of parts, where time is short
 _EVEN = 0.05  # of the time in which the speed halves: its mean is 3e-4 off that of a straight line
 _NEIGHBOURS = 9  # whose medians show where a reading should be, and how fast it changes
 
@@ -56,7 +57,9 @@ def right(time_s: Float64, value: Float64, sd: Float64, wrong: float) -> Float64
     return found
 
 
-def edges_of(end_s: float, start_s: float = 0.0, halved_s: float = np.inf) -> Float64:
+def edges_of(
+    end_s: float, start_s: float = 0.0, halved_s: float = np.inf, *, quick: bool = False
+) -> Float64:
     """
     Return the edges of bins from a start to an end; short where the motion changes.
 
@@ -65,8 +68,11 @@ def edges_of(end_s: float, start_s: float = 0.0, halved_s: float = np.inf) -> Fl
     end_s, start_s
     halved_s
         In which the speed halves, from the start on.
+    quick
+        Whether fewer will do.
     """
-    longest = max(_LONGEST_S, (end_s - start_s) / _LONGEST_PART)
+    fewer = _QUICK if quick else 1.0
+    longest = max(_LONGEST_S, (end_s - start_s) / _LONGEST_PART) / fewer
     first = min(_FIRST_S, (end_s - start_s) / _FIRST_PART)
     even = _EVEN * halved_s * np.exp(_EVEN * np.arange(400.0))
     widths = np.minimum(np.minimum(first * _GROWTH ** np.arange(400), longest), even)
@@ -86,7 +92,12 @@ def _crude(rows: Rows, speed_m_s: float, halved_s: float) -> Float64:
 
 
 def condense(
-    rows: Rows, variance: Float64, speed_m_s: float = 0.0, halved_s: float = np.inf
+    rows: Rows,
+    variance: Float64,
+    speed_m_s: float = 0.0,
+    halved_s: float = np.inf,
+    *,
+    quick: bool = False,
 ) -> tuple[Rows, Float64]:
     """
     Average readings over bins.
@@ -99,13 +110,15 @@ def condense(
         Of their white noise.
     speed_m_s, halved_s
         At the start, and the time in which it halves, roughly: what bends there is no error.
+    quick
+        Whether fewer bins will do.
 
     Returns
     -------
     rows, variance
         In ascending time; a bin without readings is left out.
     """
-    edges = edges_of(float(rows.time_s[-1]), float(rows.time_s[0]), halved_s)
+    edges = edges_of(float(rows.time_s[-1]), float(rows.time_s[0]), halved_s, quick=quick)
     bent = rows.value - _crude(rows, speed_m_s, halved_s)
     times, kinds, values, variances = [], [], [], []
     for kind in range(KIND_COUNT):

@@ -89,6 +89,10 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
         'resistance_m_s2': [],
         'sigma_m_s2': [],
         'sigma_repeatable_m_s2': [],
+        'conditions_resistance_m_s2': [],
+        'conditions_sigma_m_s2': [],
+        'reference': None,
+        'sigma_parts': {},
         'froude': [],
         'froude_valid': None,
         'froude_max_by': None,
@@ -101,7 +105,9 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
     }
     if estimate is None:
         return found
-    curve = estimate.valid_curve
+    curve, conditions = estimate.valid_calm, estimate.valid_conditions
+    low, high = estimate.froude_valid
+    inside = (estimate.calm.froude >= low) & (estimate.calm.froude <= high)
     current = None
     if estimate.current_m_s is not None:
         current = {'value': estimate.current_m_s, 'sd': estimate.current_sigma_m_s}
@@ -113,6 +119,10 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
         'resistance_m_s2': curve.resistance_m_s2,
         'sigma_m_s2': curve.sigma_m_s2,
         'sigma_repeatable_m_s2': curve.sigma_repeatable_m_s2,
+        'conditions_resistance_m_s2': conditions.resistance_m_s2,
+        'conditions_sigma_m_s2': conditions.sigma_m_s2,
+        'reference': {name: how.value for name, how in vars(estimate.reference).items()},
+        'sigma_parts': {name: part[inside] for name, part in estimate.sigma_parts.items()},
         'froude': curve.froude,
         'froude_valid': estimate.froude_valid,
         'froude_max_by': estimate.froude_max_by.value,

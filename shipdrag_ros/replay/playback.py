@@ -24,7 +24,8 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
-from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
+from shipdrag_ros.messages import DEFAULT_NODE, TOPICS
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded

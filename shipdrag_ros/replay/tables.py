@@ -25,6 +25,8 @@ COLUMNS = (
     'sigma_repeatable_m_s2',
     'froude',
 )
+OF_CONDITIONS = ('resistance_m_s2', 'sigma_m_s2')
+"""Columns that stand once more behind these, of the run's conditions."""
 
 
 def facts(coastdown: EndedCoastdown) -> Table:
@@ -141,11 +143,15 @@ def write_curves(path: Path, runs: Sequence[RunResult]) -> None:
     """
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
-        writer.writerow(('bag', 'coastdown', *COLUMNS))
+        behind = [f'conditions_{name}' for name in OF_CONDITIONS]
+        writer.writerow(('bag', 'coastdown', *COLUMNS, *behind))
         for run in runs:
             for number, coastdown in enumerate(run.coastdowns, start=1):
                 if coastdown.estimate is None:
                     continue
-                curve = coastdown.estimate.valid_curve
-                for values in zip(*(getattr(curve, name).tolist() for name in COLUMNS)):
+                calm = coastdown.estimate.valid_calm
+                conditions = coastdown.estimate.valid_conditions
+                columns = [getattr(calm, name).tolist() for name in COLUMNS]
+                columns += [getattr(conditions, name).tolist() for name in OF_CONDITIONS]
+                for values in zip(*columns):
                     writer.writerow((spreadsheet_text(run.bag), number, *values))

@@ -9,9 +9,17 @@ from shipdrag_ros.ship.added_mass import (
 )
 from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, CoefficientSd, TableBaseline
 from shipdrag_ros.ship.facts import Fact, parse_fact
-from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
+from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, Ship
 from shipdrag_ros.ship.run_sheet import RunSheet
-from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import (
+    GRAVITY_M_S2,
+    Air,
+    Propeller,
+    Propulsion,
+    StatedEffect,
+    Water,
+)
+from shipdrag_ros.ship.term import LearntTerm
 
 __all__ = [
     'AIR_DENSITY_KG_M3',
@@ -23,6 +31,7 @@ __all__ = [
     'CoefficientSd',
     'ConstantAddedMass',
     'Fact',
+    'LearntTerm',
     'MerchantAddedMass',
     'Propeller',
     'Propulsion',

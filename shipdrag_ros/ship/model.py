@@ -37,9 +37,17 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import (
+    GRAVITY_M_S2,
+    Air,
+    Economics,
+    Propeller,
+    Propulsion,
+    StatedEffect,
+    Water,
+)
+from shipdrag_ros.ship.term import LearntTerm, learnt_term
 
-GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
 _SIZES = ('length_m', 'displaced_volume_m3', 'breadth_m', 'draught_m', 'wetted_surface_m2')
 
@@ -86,6 +94,11 @@ class Ship:
     baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
+    )
+    learnt: tuple[LearntTerm, ...] = declare(
+        list_of(learnt_term()),
+        'effects that the library lacks, as `learn` writes them',
+        default=(),
     )
     economics: Economics | None = declare(
         section(Economics), 'prices, for a trend over months', default=None

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from shipdrag_ros.fields import choice, declare, named, number, section, text
 from shipdrag_ros.parameter import Parameter
 
+GRAVITY_M_S2 = 9.81
+
 
 @dataclass(frozen=True)
 class Water:

@@ -20,6 +20,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.scenario import Turn
 
 ResistanceLaw = Callable[[Float64], Float64]
+ReadingError = Callable[[Float64, Float64], Float64]
 Vector = tuple[float, float]
 
 
@@ -72,6 +73,9 @@ class Action:
         Below this speed u the log reads u^2 / log_dead_band_m_s.
     log_late_s
         A reading of the log is of this time before its stamp.
+    log_error
+        Functions of speed through water [m/s] and time since the end of the lead-in [s] that
+        return what the log reads too much [m/s].
     radar_factor
         Positions and speeds over ground read (1 + radar_factor) times truth.
     ground_lag_s
@@ -98,6 +102,7 @@ class Action:
     log_lag_s: float = 0.0
     log_dead_band_m_s: float = 0.0
     log_late_s: float = 0.0
+    log_error: tuple[ReadingError, ...] = ()
     radar_factor: float = 0.0
     ground_lag_s: float = 0.0
 

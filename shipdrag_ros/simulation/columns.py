@@ -173,7 +173,10 @@ def simulate_columns(
     for i, action in enumerate(actions):
         path = whole[prepared.motion[i]]
         if action.log_lag_s or action.log_late_s:
-            log[i] = log_reading(action, seen, path[:, 0], time)
+            log[i] = log_reading(action, seen, path[:, 0], time, scenario.lead_in_s)
+        else:
+            for error in action.log_error:
+                log[i] += error(speed[i], time - scenario.lead_in_s)
         if action.ground_lag_s > 0.0:
             moved = np.hypot(path[:, 3], path[:, 4])
             over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))

@@ -193,6 +193,8 @@ class Scenario:
         Velocity of the water over ground, to the east and to the north.
     depth_m
         Water depth.
+    day
+        Day of the end of the lead-in, counted from 1970-01-01 UTC; of what goes by the date.
     orders
         Engine orders in the order of time; none: steady sailing throughout.
     turns
@@ -217,6 +219,7 @@ class Scenario:
     shaft_rad_s: float = 11.5
     current_m_s: tuple[float, float] = (0.0, 0.0)
     depth_m: float = 200.0
+    day: float = 20605.0
     orders: tuple[EngineOrder, ...] = (STOP,)
     turns: tuple[Turn, ...] = ()
     water_speed: GaussMarkov | None = None
@@ -229,7 +232,7 @@ class Scenario:
             raise SimulationError('scenario: ' + '; '.join(problems))
 
     def _problems(self) -> Iterator[str]:
-        for name in ('speed_m_s', 'lead_in_s', 'duration_s', 'shaft_rad_s', 'depth_m'):
+        for name in ('speed_m_s', 'lead_in_s', 'duration_s', 'shaft_rad_s', 'depth_m', 'day'):
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0.0):
                 yield f'{name} is {value!r}, expected 0 or more'

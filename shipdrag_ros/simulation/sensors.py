@@ -23,7 +23,9 @@ from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
 
 
-def log_reading(action: Action, time_s: Float64, speed_m_s: Float64, at_s: Float64) -> Float64:
+def log_reading(
+    action: Action, time_s: Float64, speed_m_s: Float64, at_s: Float64, stop_s: float
+) -> Float64:
     """
     Return what the log reads.
 
@@ -36,6 +38,8 @@ def log_reading(action: Action, time_s: Float64, speed_m_s: Float64, at_s: Float
         True speed through water, linear between and constant outside.
     at_s : (m,)
         Stamps of the readings.
+    stop_s
+        End of the lead-in.
 
     Returns
     -------
@@ -43,6 +47,8 @@ def log_reading(action: Action, time_s: Float64, speed_m_s: Float64, at_s: Float
         [m/s]
     """
     flow = log_flow(speed_m_s, action.log_dead_band_m_s, action.log_factor, action.log_offset_m_s)
+    for error in action.log_error:
+        flow += error(speed_m_s, time_s - stop_s)
     if action.log_lag_s > 0.0:
         flow = lagged(time_s, flow, action.log_lag_s)
     reading: Float64 = np.interp(at_s - action.log_late_s, time_s, flow)
@@ -280,7 +286,8 @@ def _perfect_values(whole: Truth, time: Float64, channel: Channel) -> Float64:
     match channel:
         case Channel.SPEED_THROUGH_WATER:
             speed = whole.speed_through_water_m_s
-            return log_reading(action, whole.time_s, speed, time)[:, None]
+            stop_s = whole.scenario.lead_in_s
+            return log_reading(action, whole.time_s, speed, time, stop_s)[:, None]
         case Channel.SPEED_OVER_GROUND:
             shown: Float64 = np.hypot(*truth.velocity_over_ground_m_s.T)
             if action.ground_lag_s > 0.0:

@@ -10,12 +10,11 @@ from datetime import date
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.sources.log import Log, Understood
+from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.opened import beginning
 
 CERTAIN, LIKELY, POSSIBLE, NO = 1.0, 0.7, 0.3, 0.0
@@ -178,27 +177,6 @@ class Job:
     source: Path
     options: Mapping[str, Any] = field(default_factory=dict)
     progress: PartDone | None = None
-
-
-class ImportResult(Protocol):
-    """What became of a file: a dataclass that shows itself."""
-
-    @property
-    def written(self) -> Mapping[str, int]:
-        """Samples by input."""
-
-    @property
-    def understood(self) -> Sequence[Understood]:
-        """What each input was taken from."""
-
-    def table(self) -> Table:
-        """Return messages by input."""
-
-    def summary(self, bag: Path) -> list[str]:
-        """Return sentences above the table."""
-
-    def details(self) -> list[str]:
-        """Return sentences below the table: what was not used, and why."""
 
 
 class Format(NamedTuple):

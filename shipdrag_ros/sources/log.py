@@ -5,14 +5,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, tzinfo
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
+from shipdrag_ros import display
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
@@ -24,10 +26,16 @@ LIMIT_NS = 2**31 * SECOND_NS
 BATCH_SAMPLES = 4096
 """Taken at a time."""
 
+BASE_NS = 946_684_800 * SECOND_NS
+"""2000-01-01, where times that are no dates begin."""
+
+UNDATED = 'The log has no fix that gives the date; its times count from 2000-01-01.'
+
 ATTACHMENT = 'import.yaml'
 """Where a bag says what it was made from."""
 
 _FIRST_LINES = 3
+_LISTED = 20  # kinds that are not used
 _SHOWN = 40  # characters of a cell
 
 
@@ -237,42 +245,111 @@ def iso_ns(text: str, zone: tzinfo) -> int | None:
     return time_ns if 0 <= time_ns < LIMIT_NS else None
 
 
-def backward_and_repeated(backward: int, repeated: int) -> list[str]:
+Counted = Mapping[str, Mapping[str, int]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportResult:
     """
-    Say how many samples a replay will reject for their stamps.
+    What became of a file.
+
+    Attributes
+    ----------
+    written
+        Samples by input.
+    rejected
+        By input, 'time' or 'line', and reason.
+    start_ns, end_ns
+        First and last time written [ns].
+    backward, repeated
+        Samples stamped before, or as, an earlier one of their input; a replay
+        rejects them and says so.
+    understood
+        What each input was taken from.
+    notes
+        What is to be known of it, a sentence each.
+    sources
+        What each input is taken from, in short.
+    not_taken
+        By input, values of the sources that it is not taken from.
+    not_used
+        What states no input, by name.
     """
-    lines = []
-    if backward:
-        lines.append(
-            f'{backward} messages are stamped before an earlier one of their input; a replay '
-            'rejects those.'
+
+    written: Mapping[str, int]
+    rejected: Mapping[str, Mapping[str, Rejected]]
+    start_ns: int
+    end_ns: int
+    backward: int = 0
+    repeated: int = 0
+    understood: tuple[Understood, ...] = ()
+    notes: tuple[str, ...] = ()
+    sources: Mapping[str, str] = field(default_factory=dict)
+    not_taken: Counted = field(default_factory=dict)
+    not_used: Mapping[str, int] | Sequence[str] = field(default_factory=dict)
+
+    counted: ClassVar = ('messages', ' of their input')
+    """What `backward` and `repeated` count."""
+
+    @property
+    def size(self) -> str:
+        """What was read, `7 lines` for instance."""
+        raise NotImplementedError
+
+    def summary(self, bag: Path) -> list[str]:
+        """
+        Say how much was read, and what is to be known of it.
+        """
+        length_s = (self.end_ns - self.start_ns) * 1e-9
+        lines = [
+            f'{bag}: {sum(self.written.values())} messages of {self.size}, '
+            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}',
+            *self.notes,
+        ]
+        counts = ((self.backward, 'are stamped before'), (self.repeated, 'have the stamp of'))
+        what, of = self.counted
+        return lines + [
+            f'{count} {what} {how} an earlier one{of}; a replay rejects those.'
+            for count, how in counts
+            if count
+        ]
+
+    def table(self) -> Table:
+        """
+        Return messages by input, and what each was taken from.
+        """
+        if not self.sources:
+            rows = tuple((name, f'{n}') for name, n in self.written.items())
+            return Table(('input', 'messages'), rows)
+        return Table(
+            ('input', 'from', 'messages'),
+            tuple((name, self.sources[name], f'{n}') for name, n in self.written.items()),
         )
-    if repeated:
-        lines.append(
-            f'{repeated} messages have the stamp of an earlier one of their input; a replay '
-            'rejects those.'
-        )
-    return lines
+
+    def details(self) -> list[str]:
+        """
+        Say what was not used, and why.
+        """
+        lines = [
+            f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'
+            for name, counts in self.not_taken.items()
+        ]
+        return lines + rejected_words(self.rejected) + self._not_used()
+
+    def _not_used(self) -> list[str]:
+        """Say what states no input."""
+        return [f'Not used: {most_of(self.not_used)}'] if self.not_used else []
 
 
-def table_of_messages(written: Mapping[str, int], sources: Mapping[str, str]) -> Table:
+def most_of(counts: Mapping[str, int] | Sequence[str]) -> str:
     """
-    Return messages by input, and what each was taken from.
+    List the most frequent ones, with how often they are.
     """
-    return Table(
-        ('input', 'from', 'messages'),
-        tuple((name, sources[name], f'{n}') for name, n in written.items()),
-    )
-
-
-def not_taken_words(not_taken: Mapping[str, Mapping[str, int]]) -> list[str]:
-    """
-    Say which other sources held an input.
-    """
-    return [
-        f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'
-        for name, counts in not_taken.items()
-    ]
+    if not isinstance(counts, Mapping):
+        return ', '.join(map(repr, counts))
+    shown = sorted(counts.items(), key=lambda each: -each[1])
+    more = f' and {len(shown) - _LISTED} more kinds' if len(shown) > _LISTED else ''
+    return ', '.join(f'{name} {count}' for name, count in shown[:_LISTED]) + more
 
 
 def rejected_words(rejected: Mapping[str, Mapping[str, Rejected]]) -> list[str]:
@@ -280,7 +357,7 @@ def rejected_words(rejected: Mapping[str, Mapping[str, Rejected]]) -> list[str]:
     Say what was rejected, and why.
     """
     return [
-        f'{name}: {each.count} rejected, {reason}: {each.first[0]}'
+        f'{name}: {each.count} rejected, {reason}: {", ".join(each.first)}'
         for name, reasons in rejected.items()
         for reason, each in reasons.items()
     ]

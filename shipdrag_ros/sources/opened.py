@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.progress import PartDone
 
 GZIP = b'\x1f\x8b'
 HEAD_BYTES = 1 << 16
@@ -20,7 +21,8 @@ LINE_BYTES = 1 << 16
 
 _FREE_BYTES = 64 << 20  # unpacked from any file
 _RATIO = 200  # text packs to a tenth, a bomb to a thousandth
-_BROKEN = (OSError, EOFError, zlib.error)
+BROKEN = (OSError, EOFError, zlib.error)
+"""What reading a damaged file raises."""
 
 
 def beginning(path: Path) -> bytes:
@@ -43,7 +45,7 @@ def beginning(path: Path) -> bytes:
             while file is not packed and size <= _FREE_BYTES and (more := file.read(1 << 20)):
                 size += len(more)
                 check_unpacked(path, size, packed.tell())
-    except _BROKEN as error:
+    except BROKEN as error:
         if raw:
             return raw  # whoever reads it says how far it goes
         why = getattr(error, 'strerror', None) or str(error)
@@ -75,61 +77,75 @@ def opened(path: Path) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
 
 class Lines:
     """
-    The lines of a text file, one by one.
+    The lines of a text file, without blanks around them.
 
     Parameters
     ----------
     path
         Plain or packed with gzip.
+    encoding
+    longest
+        A line of as many characters is left out.
+    progress
+        Called with how many bytes are read, and of how many.
 
     Attributes
     ----------
     number
         Lines read so far.
     too_long
-        Lines of more than `LINE_BYTES`, which are left out.
+        Numbers of the lines that were left out.
     damage
         Why the file could not be read to its end; '' if it could.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        encoding: str = 'utf-8-sig',
+        longest: int = LINE_BYTES,
+        progress: PartDone | None = None,
+    ) -> None:
         self.path = path
         self.number = 0
-        self.too_long = 0
+        self.too_long: list[int] = []
         self.damage = ''
-        self.done_bytes = 0
+        self._encoding = encoding
+        self._longest = longest
+        self._progress = progress
 
     def __iter__(self) -> Iterator[str]:
-        self.number = self.too_long = 0
-        self.damage = ''
+        self.number, self.too_long, self.damage = 0, [], ''
         try:
             with opened(self.path) as (raw, file):
                 yield from self._lines(raw, file)
-        except _BROKEN as error:
+        except BROKEN as error:
             self.damage = f'after line {self.number}: {error}'
 
     def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
         # a line ends with LF, CR or both; a serial adapter writes CR alone
-        text = TextIOWrapper(cast(BufferedReader, file), encoding='utf-8-sig', errors='replace')
-        size = 0
+        text = TextIOWrapper(cast(BufferedReader, file), encoding=self._encoding, errors='replace')
+        most, size, total = self._longest, 0, self.path.stat().st_size
+        packed = file is not raw
         try:
-            while line := text.readline(LINE_BYTES):
+            while line := text.readline(most):
                 self.number += 1
-                whole = line
-                while len(line) == LINE_BYTES and not line.endswith('\n'):
-                    line = text.readline(LINE_BYTES)
-                    size += len(line)
-                    if file is not raw:
-                        check_unpacked(self.path, size, raw.tell())
-                size += len(whole)
-                if file is not raw:
+                rest, length = line, len(line)
+                while len(rest) == most and not rest.endswith('\n'):
+                    rest = text.readline(most)
+                    length += len(rest)
+                    if packed:
+                        check_unpacked(self.path, size + length, raw.tell())
+                size += length
+                if packed:
                     check_unpacked(self.path, size, raw.tell())
-                if self.number % 1000 == 0:
-                    self.done_bytes = raw.tell()
-                if len(whole) == LINE_BYTES and not whole.endswith('\n'):
-                    self.too_long += 1
+                if self._progress is not None and self.number % 1000 == 0:
+                    self._progress(raw.tell(), total)
+                if len(line) >= most - 1:
+                    self.too_long.append(self.number)
                 else:
-                    yield whole.strip()
+                    yield line.strip()
         finally:
             text.detach()  # whoever opened the file closes it
 

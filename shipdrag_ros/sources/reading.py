@@ -12,7 +12,8 @@ from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import Format, ImportResult, Job, best_of, head_of
+from shipdrag_ros.sources.format import Format, Job, best_of, head_of
+from shipdrag_ros.sources.log import ImportResult
 from shipdrag_ros.sources.run import read_joined, run_of
 
 

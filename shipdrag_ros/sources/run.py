@@ -37,8 +37,8 @@ from shipdrag_ros.samples import (
     concatenate,
     in_arrival_order,
 )
-from shipdrag_ros.sources.format import Format, ImportResult, Job
-from shipdrag_ros.sources.log import ATTACHMENT, Log, key_of, new_bag
+from shipdrag_ros.sources.format import Format, Job
+from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of, new_bag
 
 _APART_M = (
     2000.0  # more than a ship is long, and more than clocks make of it that disagree a little

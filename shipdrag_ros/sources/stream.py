@@ -4,33 +4,36 @@ A log of messages, each with its time.
 
 What every format of messages shares: one source an input, times that do not
 jump, and a count of what is left out. A format gives a function that reads its
-file and yields readings; it is called twice, first to see who sends what.
+file and yields readings.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from shipdrag_ros import display, strict_yaml
-from shipdrag_ros.display import Table
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel
+from shipdrag_ros.nmea.reading import best
+from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     BATCH_SAMPLES,
     LIMIT_NS,
+    ImportResult,
     Log,
     Rejected,
     Understood,
-    backward_and_repeated,
-    not_taken_words,
+    most_of,
     rejected_words,
-    table_of_messages,
 )
 
 JUMP_NS = 10 * SECOND_NS
@@ -107,8 +110,8 @@ class Tally:
 FileReader = Callable[[Tally], Iterator[Reading]]
 
 
-@dataclass(frozen=True)
-class StreamResult:
+@dataclass(frozen=True, kw_only=True)
+class StreamResult(ImportResult):
     """
     What became of a log of messages.
 
@@ -117,70 +120,140 @@ class StreamResult:
     format
     records
         Lines or messages in it.
-    written
-        Samples by input.
-    sources
-        What each input is taken from.
-    not_taken
-        By input, values of the sources that it is not taken from.
-    not_used
-        Messages that state no input, by name.
-    rejected
-        By input, 'time' or 'line', and reason.
-    start_ns, end_ns
-        First and last time written [ns].
-    backward, repeated
-        Samples stamped before, or as, an earlier one of their input; a replay
-        rejects them and says so.
-    notes
-        What is to be known of it, a sentence each.
-    understood
-        What each input was taken from.
     """
 
     format: str
     records: int
-    written: dict[str, int]
-    sources: dict[str, str]
-    not_taken: dict[str, dict[str, int]]
-    not_used: dict[str, int]
-    rejected: dict[str, dict[str, Rejected]]
-    start_ns: int
-    end_ns: int
-    backward: int
-    repeated: int
-    notes: tuple[str, ...]
-    understood: tuple[Understood, ...]
 
-    def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
-        length_s = (self.end_ns - self.start_ns) * 1e-9
-        return [
-            f'{bag}: {sum(self.written.values())} messages of {self.records} records, '
-            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}',
-            *self.notes,
-            *backward_and_repeated(self.backward, self.repeated),
-        ]
+    @property
+    def size(self) -> str:
+        """What was read."""
+        return f'{self.records} records'
 
-    def table(self) -> Table:
-        """
-        Return messages by input.
-        """
-        return table_of_messages(self.written, self.sources)
 
-    def details(self) -> list[str]:
+AnyOrigin = TypeVar('AnyOrigin', bound=tuple[Any, ...])
+
+
+class SourcedValues(Generic[AnyOrigin]):
+    """
+    Values with who sends them, from which one source an input is chosen in the end.
+
+    Attributes
+    ----------
+    at
+        Where each stands, or when it was measured, as it was added.
+    a, b
+        The values.
+    """
+
+    def __init__(self) -> None:
+        self.at, self.a, self.b = array('q'), array('d'), array('d')
+        self._source = array('i')
+        self._numbers: dict[tuple[Channel, AnyOrigin], int] = {}
+
+    def add(self, channel: Channel, origin: AnyOrigin, at: int, a: float, b: float) -> None:
         """
-        Say what was not used, and why.
+        Take one more.
         """
-        lines = not_taken_words(self.not_taken) + rejected_words(self.rejected)
-        if self.not_used:
-            shown = sorted(self.not_used.items(), key=lambda each: -each[1])
-            others = ', '.join(f'{name} {count}' for name, count in shown[:20])
-            more = f' and {len(shown) - 20} more kinds' if len(shown) > 20 else ''
-            lines.append(f'Not used: {others}{more}')
-        return lines
+        self._source.append(self._numbers.setdefault((channel, origin), len(self._numbers)))
+        self.at.append(at)
+        self.a.append(a)
+        self.b.append(b)
+
+    def counts(self) -> dict[Channel, Counter[AnyOrigin]]:
+        """
+        Return the number of values by source, of each channel.
+        """
+        found: dict[Channel, Counter[AnyOrigin]] = {}
+        counts = np.bincount(np.array(self._source), minlength=len(self._numbers)).tolist()
+        for (channel, origin), number in zip(self._numbers, counts, strict=True):
+            found.setdefault(channel, Counter())[origin] = number
+        return dict(sorted(found.items()))
+
+    def chosen(self) -> dict[Channel, AnyOrigin]:
+        """
+        Return the one source of each channel.
+        """
+        return {channel: best(each) for channel, each in self.counts().items()}
+
+    def taken(self) -> tuple[NDArray[np.intp], UInt8]:
+        """
+        Return the places (n,) of the values of the chosen sources, and their channels.
+        """
+        chosen, source = self.chosen(), np.array(self._source, np.intp)
+        use = np.array([chosen[c] == each for c, each in self._numbers], np.bool_)
+        code = np.array([channel for channel, _ in self._numbers], np.uint8)
+        place = np.flatnonzero(use[source]) if len(source) else source
+        return place, code[source[place]]
+
+    def block(self, place: NDArray[np.intp], code: UInt8, stamp_ns: Int64) -> Block:
+        """
+        Return samples (n,) whose arrival never goes back, so that a replay has their order.
+
+        Parameters
+        ----------
+        place, code : (n,)
+            Of those that `taken` gives.
+        stamp_ns : (n,)
+        """
+        value = np.column_stack((np.array(self.a)[place], np.array(self.b)[place]))
+        arrived = np.maximum.accumulate(stamp_ns) if len(stamp_ns) else stamp_ns
+        return Block(code, stamp_ns, arrived, value, np.full(value.shape, np.nan))
+
+    def about(self, block: Block, log: Log) -> dict[str, Any]:
+        """
+        Write samples into a log; return what `ImportResult` says of them.
+
+        Parameters
+        ----------
+        block
+            From `block`, with one sample at least.
+        log
+        """
+        for first in range(0, len(block), BATCH_SAMPLES):
+            log.write_samples(block[first : first + BATCH_SAMPLES])
+        chosen = self.chosen()
+        sources: dict[str, dict[str, None]] = {}
+        not_taken: dict[str, Counter[str]] = {}
+        for channel, counts in self.counts().items():
+            sources.setdefault(channel.input, {})[str(chosen[channel])] = None
+            others = {str(each): n for each, n in counts.items() if each != chosen[channel]}
+            if others:
+                not_taken.setdefault(channel.input, Counter()).update(others)
+        backward, repeated = _out_of_order(block)
+        written: Counter[str] = Counter()
+        for code, number in zip(*np.unique(block.channel, return_counts=True), strict=True):
+            written[Channel(code).input] += int(number)
+        return {
+            'written': {name: written[name] for name in INPUTS if written[name]},
+            'sources': {name: ', '.join(each) for name, each in sources.items()},
+            'not_taken': {name: dict(counts) for name, counts in not_taken.items()},
+            'start_ns': int(block.stamp_ns[0]),
+            'end_ns': int(block.receive_ns[-1]),
+            'backward': backward,
+            'repeated': repeated,
+            'understood': tuple(
+                Understood(
+                    channel.input,
+                    str(chosen[channel]),
+                    getattr(chosen[channel], 'unit', ''),
+                    first,
+                    geodetic=channel is Channel.POSITION_GEODETIC,
+                )
+                for channel, first in sorted(log.first.items())
+            ),
+        }
+
+
+def _out_of_order(block: Block) -> tuple[int, int]:
+    """Return how many samples are stamped before, and how many as, an earlier one."""
+    backward = repeated = 0
+    for code in np.unique(block.channel):
+        stamps = block.stamp_ns[block.channel == code]
+        newest = np.maximum.accumulate(stamps)[:-1]
+        backward += int(np.sum(stamps[1:] < newest))
+        repeated += int(np.sum(stamps[1:] == newest))
+    return backward, repeated
 
 
 def read_stream(
@@ -197,7 +270,7 @@ def read_stream(
     name
         Of the format.
     read
-        Yields the readings of the file in their order; called twice.
+        Yields the readings of the file in their order.
     about
         Said of it besides.
 
@@ -211,30 +284,25 @@ def read_stream(
     Each input is taken from one source, the best ranked of those with at least
     half as many values as the most frequent.
     """
-    counts: dict[Channel, Counter[Origin]] = {}
-    survey = Tally()
-    for reading in _checked(read(survey), survey):
-        counts.setdefault(reading.channel, Counter())[reading.origin] += 1
-    if not counts:
-        raise ImportDataError(_nothing(job.source, name, survey))
-    chosen = {channel: _best(found) for channel, found in counts.items()}
     tally = Tally()
-    record = _ArrivedSamples()
-    for reading in _checked(read(tally), tally):
-        if reading.origin == chosen[reading.channel]:
-            record.take(reading)
-            if len(record.samples) >= BATCH_SAMPLES:
-                log.write_samples(record.pop())
-    log.write_samples(record.pop())
-    result = _result(name, tally, record, _understood(log, chosen), counts, chosen)
+    values: SourcedValues[Origin] = SourcedValues()
+    for channel, origin, stamp_ns, a, b in _checked(read(tally), tally):
+        values.add(channel, origin, stamp_ns, a, b)
+    if not len(values.at):
+        raise ImportDataError(_nothing(job.source, name, tally))
+    place, code = values.taken()
+    block = values.block(place, code, np.array(values.at)[place])
+    result = StreamResult(
+        format=name,
+        records=tally.records,
+        rejected=tally.rejected,
+        not_used=dict(tally.not_used),
+        notes=tuple(tally.notes),
+        **values.about(block, log),
+    )
     about_log = {'source': job.source.name, **(about or {}), **asdict(result)}
     log.attach(ATTACHMENT, strict_yaml.dump(about_log))
     return result
-
-
-def _best(counts: Counter[Origin]) -> Origin:
-    most = max(counts.values())
-    return min(origin for origin, n in counts.items() if 2 * n >= most)
 
 
 def _checked(readings: Iterator[Reading], tally: Tally) -> Iterator[Reading]:
@@ -300,89 +368,10 @@ def _possible(reading: Reading) -> bool:
     return abs(reading.a) <= largest and abs(reading.b) <= largest  # false of NaN too
 
 
-class _ArrivedSamples:
-    """Samples with a time of arrival that never goes back."""
-
-    def __init__(self) -> None:
-        self.samples: list[tuple[int, int, int, float, float]] = []
-        self.written: Counter[str] = Counter()
-        self.backward = 0
-        self.repeated = 0
-        self.start_ns: int | None = None
-        self.newest_ns = -1
-        self._newest: dict[Channel, int] = {}
-
-    def take(self, reading: Reading) -> None:
-        newest_ns = self._newest.get(reading.channel, -1)
-        self.backward += reading.stamp_ns < newest_ns
-        self.repeated += reading.stamp_ns == newest_ns
-        self._newest[reading.channel] = max(newest_ns, reading.stamp_ns)
-        if self.start_ns is None:
-            self.start_ns = reading.stamp_ns
-        self.newest_ns = max(self.newest_ns, reading.stamp_ns)
-        self.samples.append(
-            (reading.channel, reading.stamp_ns, self.newest_ns, reading.a, reading.b)
-        )
-        self.written[reading.channel.input] += 1
-
-    def pop(self) -> Block:
-        samples, self.samples = self.samples, []
-        return Block.of_samples(samples)
-
-
-def _understood(log: Log, chosen: Mapping[Channel, Origin]) -> tuple[Understood, ...]:
-    return tuple(
-        Understood(
-            channel.input,
-            chosen[channel].name,
-            chosen[channel].unit,
-            first,
-            geodetic=channel is Channel.POSITION_GEODETIC,
-        )
-        for channel, first in sorted(log.first.items())
-    )
-
-
-def _result(
-    name: str,
-    tally: Tally,
-    record: _ArrivedSamples,
-    understood: Sequence[Understood],
-    counts: Mapping[Channel, Counter[Origin]],
-    chosen: Mapping[Channel, Origin],
-) -> StreamResult:
-    not_taken: dict[str, dict[str, int]] = {}
-    for channel, of_channel in sorted(counts.items()):
-        for origin, count in of_channel.items():
-            if origin != chosen[channel]:
-                others = not_taken.setdefault(channel.input, {})
-                others[origin.name] = others.get(origin.name, 0) + count
-    sources: dict[str, dict[str, None]] = {}
-    for each in understood:
-        sources.setdefault(each.input, {})[each.source] = None
-    assert record.start_ns is not None  # a source was chosen, which has a value
-    return StreamResult(
-        format=name,
-        records=tally.records,
-        written={each: record.written[each] for each in INPUTS if record.written[each]},
-        sources={each: ', '.join(names) for each, names in sources.items()},
-        not_taken=not_taken,
-        not_used=dict(tally.not_used),
-        rejected=tally.rejected,
-        start_ns=record.start_ns,
-        end_ns=record.newest_ns,
-        backward=record.backward,
-        repeated=record.repeated,
-        notes=tuple(tally.notes),
-        understood=tuple(understood),
-    )
-
-
 def _nothing(source: Path, name: str, tally: Tally) -> str:
     reasons = [*tally.notes, *rejected_words(tally.rejected)]
     if tally.not_used:
-        others = ', '.join(f'{each} {n}' for each, n in tally.not_used.most_common(10))
-        reasons.append(f'not used: {others}')
+        reasons.append(f'not used: {most_of(tally.not_used)}')
     return (
         f'{str(source)!r}, read as {name}, gave no sample from {tally.records} record(s); '
         f'{"; ".join(reasons) or "it holds no measurement of motion"}'

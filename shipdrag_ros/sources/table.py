@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.sources.formats.csv.columns import role_and_unit
+from shipdrag_ros.sources.formats.csv.columns import OTHER_UNITS, UNITS, role_and_unit
 from shipdrag_ros.sources.opened import check_unpacked, opened
 
 DELIMITERS = ',;\t|'
@@ -36,14 +36,7 @@ ROWS = 1 << 10
 _SAMPLE_LINES = 400
 _LINE = 1 << 20  # characters; no row of a table is as long
 _DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
-UNITS = (
-    *('m/s', 'mps', 'kn', 'kt', 'kts', 'knot', 'knots', 'km/h', 'kmh', 'kph', 'ft/s', 'fps'),
-    'mph',
-    *('rad', 'deg', '°', 'rad/s', 'rpm', '1/min', 'min-1', 'rps', 'rev/s', '1/s', 's-1', 'hz'),
-    *('s', 'ms', 'us', 'ns', 'sec', 'm', 'km', 'ft', 'nmi', 'nm', '%', 'utc', 'hh:mm:ss'),
-)
-"""What stands in a line of units."""
-
+_KNOWN_UNITS = {*UNITS, *OTHER_UNITS, 'utc', 'hh:mm:ss'}
 _UNIT = re.compile(r'[\[(]?([^\[\]()]*)[\])]?')
 
 
@@ -375,7 +368,7 @@ def _is_measured(cell: str) -> bool:
 def _units(cells: Sequence[str]) -> tuple[str, ...] | None:
     """Return the units of a line that holds nothing else; None of any other line."""
     found = [match[1].strip() if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
-    known = sum(each.lower() in UNITS for each in found)
+    known = sum(each.lower() in _KNOWN_UNITS for each in found)
     if not known or any(map(_is_measured, cells)):
         return None
     return tuple(found)

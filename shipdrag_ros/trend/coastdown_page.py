@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,10 @@ from shipdrag_ros.display import (
     ship_speed,
     utc,
 )
+from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.report.document import page_text
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import find
 from shipdrag_ros.trend import pictures
 from shipdrag_ros.trend.series import CoastdownRow
 
@@ -208,8 +210,8 @@ def _candidates(row: CoastdownRow) -> tuple[tuple[str, Table], ...]:
 
 def _size(effect: str, name: str, size: Parameter) -> str:
     """Return the size of an effect in words; of one that this version does not know, as it is."""
-    known = LIBRARY[effect].parameters if effect in LIBRARY else ()
-    for quantity in known:
-        if quantity.name == name:
-            return f'{words.quantity_text(quantity)} {words.size(quantity, size)}'
+    with suppress(SimulationError):
+        for quantity in find(effect).parameters:
+            if quantity.name == name:
+                return f'{words.quantity_text(quantity)} {words.size(quantity, size)}'
     return f'{name} {plus_minus(size.value, 2.0 * size.sd)}'

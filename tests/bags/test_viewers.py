@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
-from shipdrag_ros.messages.reporting import CURVE_FIELDS
+from shipdrag_ros.messages.publishing import CURVE_FIELDS
 from shipdrag_ros.messages.topics import DEFAULT_NODE, RESISTANCE_CURVE
 
 CONFIG = Path(__file__).parents[2] / 'config'

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.cli import main, verbs
 from shipdrag_ros.cli.completion import SHELLS, script
 
 LIMIT_S = 200
@@ -33,7 +33,7 @@ def written(tmp_path: Path) -> Path:
     ('words', 'expected'),
     [
         ('dia', {'diagnose'}),
-        ('', {verb.name for verb in VERBS}),
+        ('', {verb.name for verb in verbs()}),
         ('diagnose --f', {'--fact'}),
         ('completion ', set(SHELLS)),
     ],

@@ -4,15 +4,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from shipdrag_ros.bags.reader import open_runs
 from shipdrag_ros.cli import main
+from shipdrag_ros.fleet.store import read_coastdowns
+from shipdrag_ros.ship import LearntTerm, Ship
+from shipdrag_ros.simulation.effects import LIBRARY, carrying, effects_of, using
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml'
 SHIP = ROOT / 'config' / 'vitus_bering.yaml'
+EFFECTS = ['--effects', str(WEED.parent)]
 
 
 def test_a_sound_file_can_be_used(capsys: pytest.CaptureFixture[str]) -> None:
@@ -37,18 +43,90 @@ def test_the_list_shows_what_is_learnt(capsys: pytest.CaptureFixture[str]) -> No
     assert any(line.startswith('fouling') for line in lines)
 
 
-def test_a_learnt_effect_is_simulated_and_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bag, effects = tmp_path / 'weed.mcap', ['--effects', str(WEED.parent)]
+@pytest.fixture(scope='module')
+def weedy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated run with weed, alone in a folder."""
+    bag = tmp_path_factory.mktemp('bags') / 'weed.mcap'
     line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--effect', 'weed=0.002']
     assert main(line) == 1  # without the folder it is not known
-    assert main([*line, *effects]) == 0
-    capsys.readouterr()
-    assert main(['diagnose', str(bag), *effects, '--json']) == 0
+    assert main([*line, *EFFECTS]) == 0
+    return bag
+
+
+def test_a_learnt_effect_is_named_and_written_into_the_ship_file(
+    weedy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written = tmp_path / 'weedy.yaml'
+    line = ['diagnose', str(weedy), '--json']
+    assert main([*line, *EFFECTS, '--write', str(written)]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document['verdict'] == 'named'
     (found,) = document['effects']
     assert found['name'] == 'weed'
     size = found['parameters']['A']
     assert abs(size['value'] - 0.002) < 3.0 * size['sd']
+    # the file holds the term, so that no folder is needed from here on
+    (term,) = Ship.load(written).learnt
+    assert term == LearntTerm.load(WEED)
+    assert main([*line, '--ship', str(written)]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again['verdict'] == 'none'
+    again_bag = tmp_path / 'again.mcap'
+    assert main(['simulate', '--ship', str(written), '-o', str(again_bag)]) == 0
+    assert 'weed: A = ' in capsys.readouterr().out
+
+
+def test_a_hostile_term_in_a_ship_file_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mark, hostile = tmp_path / 'mark', tmp_path / 'ship.yaml'
+    term = LearntTerm.load(WEED)
+    ship = replace(Ship.load(SHIP), learnt=(term,)).to_yaml()
+    hostile.write_text(ship.replace('0.5*rho', f"open('{mark}', 'w')*rho"))
+    assert main(['simulate', '--ship', str(hostile), '-o', str(tmp_path / 'a.mcap')]) == 1
+    said = capsys.readouterr().err
+    assert 'learnt[0].term.expression' in said
+    assert not mark.exists()
+    hostile.write_text(ship.replace('name: weed', 'name: fouling'))
+    assert main(['simulate', '--ship', str(hostile), '-o', str(tmp_path / 'a.mcap')]) == 1
+    assert 'effect of the library' in capsys.readouterr().err
+
+
+def test_the_terms_in_use_are_attached_to_a_recording(weedy: Path) -> None:
+    attached = open_runs([weedy])[0].attachments
+    assert LearntTerm.from_yaml(attached['effects/weed.yaml']) == LearntTerm.load(WEED)
+
+
+def test_a_fleet_names_it_and_does_a_bag_again_for_it(
+    weedy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ['fleet', str(weedy.parent), '-o', str(tmp_path / 'store'), '--workers', '1', '--json']
+    assert main(line) == 0
+    named = []
+    for _ in range(2):
+        capsys.readouterr()
+        assert main([*line, *EFFECTS]) == 0
+        named.append(json.loads(capsys.readouterr().out)['new'])
+    assert named == [1, 0]
+    (row,) = read_coastdowns(tmp_path / 'store').to_pylist()
+    assert row['verdict'] == 'named'
+    assert 'weed' in str(row['effects'])
+
+
+@pytest.mark.parametrize('verb', ['replay', 'forecast', 'watch', 'trend', 'poster', 'node'])
+def test_every_verb_takes_a_folder_of_effects(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = {'node': ['--ship', str(SHIP), '--out', str(tmp_path)]}.get(verb, ['none'])
+    (tmp_path / 'bad.yaml').write_text('name: fouling')
+    assert main([verb, *more, '--effects', str(tmp_path)]) == 1
+    assert 'bad.yaml' in capsys.readouterr().err
+
+
+def test_the_ship_of_another_process_carries_the_terms() -> None:
+    ship = Ship.load(SHIP)
+    with using([LearntTerm.load(WEED)]):
+        carried = carrying(ship)
+    assert carrying(ship) == ship
+    assert Ship.from_yaml(carried.to_yaml(), subject='ship') == carried
+    assert set(effects_of(carried)) - set(LIBRARY) == {'weed'}

@@ -78,12 +78,12 @@ def test_wrong_usage_is_2(line: list[str], capsys: pytest.CaptureFixture[str]) -
 def test_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
     assert stopped(['--help']) == 0
     captured = capsys.readouterr().out
-    for verb in cli.VERBS:
+    for verb in cli.verbs():
         assert f'    {verb.name}' in captured
         assert verb.summary in ' '.join(captured.split())
 
 
-@pytest.mark.parametrize('verb', [verb.name for verb in cli.VERBS])
+@pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
 def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert stopped([verb, '--help']) == 0
     captured = capsys.readouterr().out
@@ -91,7 +91,7 @@ def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> No
     assert 'None' not in captured
 
 
-@pytest.mark.parametrize('verb', [verb.name for verb in cli.VERBS])
+@pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
 def test_each_option_is_explained(verb: str) -> None:
     top = cli.parser(verb)
     (verbs,) = [item for item in top._actions if isinstance(item, argparse._SubParsersAction)]

@@ -88,7 +88,7 @@ def test_odd_records(name: str, ship: Path, tmp_path: Path) -> None:
     page = str(tmp_path / 'page.html')
     said = told('replay', bag, '--ship', str(ship), '--report', page)
     said += told('diagnose', bag, '--ship', str(ship), '--report', page)
-    for start, end in ((0, 1200), (610, 1200), (700, 720)):
+    for start, end in ((610, 1200), (700, 720)):
         window = ('--window', str(start), str(end))
         for estimator in ESTIMATORS if start == 610 else ESTIMATORS[:1]:
             parameters = tmp_path / 'parameters.yaml'

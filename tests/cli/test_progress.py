@@ -11,11 +11,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.output import ProgressLines, compiling_said
+from shipdrag_ros.compiled import compiled
 
 
 @pytest.fixture(scope='module')
@@ -58,14 +58,23 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
     assert said == ['reading', 'fitting: 3 of 8, 5 s left', 'fitting: 6 of 8, 2 s left']
 
 
+@compiled
+def plus(x: float) -> float:
+    return x + 1.0
+
+
+@compiled
+def minus(x: float) -> float:
+    return x - 1.0
+
+
 def test_compiling_is_said_once_and_only_when_something_is_compiled() -> None:
     said: list[str] = []
-    first, second = numba.njit(lambda x: x + 1.0), numba.njit(lambda x: x - 1.0)
     with compiling_said(said.append):
         assert said == []
-        assert first(1.0) == 2.0
-        assert second(1.0) == 0.0
-        assert first(2.0) == 3.0
+        assert plus(1.0) == 2.0
+        assert minus(1.0) == 0.0
+        assert plus(2.0) == 3.0
     assert len(said) == 1
     assert 'compiling, once' in said[0]
 

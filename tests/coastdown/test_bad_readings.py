@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coastdowns through bad readings: a small sample of benchmarks/bad_readings.py."""
+"""Coastdowns through bad readings."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def thinned(block: Block, every) -> Block:
     return block[kept]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     data=st.data(),
     seed=st.integers(0, 1000),
@@ -164,7 +164,7 @@ def test_where_the_record_is_cut_changes_no_bit(
     assert health_again == health
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(data=st.data(), into_s=st.integers(1, 250), seed=st.integers(0, 1000))
 def test_a_reset_in_mid_coastdown_is_a_fresh_start(
     ship, eventful, bits, data, into_s: int, seed: int
@@ -229,7 +229,7 @@ def long_record(record, sensors) -> Block:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(start_s=st.integers(1, 2800), globe=st.booleans())
 def test_a_monitor_that_starts_later_says_the_same(
     ship, long_record, bits, start_s: int, globe: bool

@@ -75,14 +75,14 @@ def learnt(count: int, seed: int = 1) -> LearntBaseline:
 
 
 def test_covers_the_truth() -> None:
-    # 32 seeds of 5 runs each, 2 parts: within 2 sd in 90 % of 64 or more; a t of 4 degrees of
-    # freedom, which 5 runs give, is so in 88 %, and fewer than 50 of 64 then come by chance in 1 %
+    # 8 seeds of 5 runs each, 2 parts: a t of 4 degrees of freedom, which 5 runs give, is within
+    # 2 sd in 88 %, and fewer than 11 of 16 then come by chance in 1 %
     away = []
-    for seed in range(32):
+    for seed in range(8):
         found = learnt(5, seed)
         away.append((found.factors - TRUE) / np.sqrt(np.diag(found.covariance)))
-    assert int((np.abs(away) < 2.0).sum()) >= 50
-    assert 0.5 * SCATTER < np.median([learnt(5, seed).scatter for seed in range(32)]) < 2 * SCATTER
+    assert int((np.abs(away) < 2.0).sum()) >= 11
+    assert 0.5 * SCATTER < np.median([learnt(5, seed).scatter for seed in range(8)]) < 2 * SCATTER
 
 
 def test_the_ship_file_holds_what_was_learnt() -> None:

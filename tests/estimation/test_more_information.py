@@ -3,30 +3,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / 'benchmarks' / 'more_information.py'
+from benchmarks.accuracy import more_information as script
+
 CASES = 4
 
 
-@pytest.fixture(scope='module')
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location('more_information', SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    sys.modules['more_information'] = found
-    spec.loader.exec_module(found)
-    return found
-
-
-def test_no_input_and_no_second_run_makes_it_worse(script: ModuleType) -> None:
+def test_no_input_and_no_second_run_makes_it_worse() -> None:
     # N = 4, seed 0; a step may lose by chance, by less than two standard errors; the benchmark
     # N = 4, seed 0; a step may lose by chance, by less than two standard errors; the benchmark
     # has N = 30. 0.05: the shaft's priors hold all laws of the thrust, which costs a little
@@ -37,7 +22,7 @@ def test_no_input_and_no_second_run_makes_it_worse(script: ModuleType) -> None:
     assert found[:, -1].mean() > found[:, 0].mean()
 
 
-def test_gains_are_those_of_the_same_case(script: ModuleType) -> None:
+def test_gains_are_those_of_the_same_case() -> None:
     # the second set gains 1 and 3 on the first, the third nothing on the second
     (first, of_first), (second, of_second) = script.gains(
         np.array([[0.0, 1.0, 1.0], [10.0, 13.0, 13.0]])

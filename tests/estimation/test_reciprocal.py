@@ -43,7 +43,8 @@ def test_the_current_is_taken_out(coast, ship, log: bool) -> None:
 
 def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
-    more = replace(one, curve=replace(one.curve, resistance_m_s2=1.2 * one.curve.resistance_m_s2))
+    larger = replace(one.curve, resistance_m_s2=1.2 * one.curve.resistance_m_s2)
+    more = replace(one, conditions=larger)
     alike = combine([one, one], [0.0, 0.0])
     apart = combine([one, more], [0.0, 0.0])
     assert np.all(alike.scatter_m_s2 == 0.0)

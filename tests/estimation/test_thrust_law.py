@@ -1,17 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small sample of benchmarks/thrust_law.py: what a shaft does to r."""
+"""A small sample of benchmarks/accuracy/thrust_law.py: what a shaft does to r."""
 
 from __future__ import annotations
-
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / 'benchmarks'))
-
-from thrust_law import CARGO, CASES, LAWS, YACHT, Hull, score
+from benchmarks.accuracy.thrust_law import CARGO, CASES, LAWS, YACHT, Hull, score
 
 RUNS = 5  # seeds 0..4
 SHAFT, WITHOUT, DOUBLED = 0, 2, 3  # of CASES

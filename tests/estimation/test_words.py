@@ -50,7 +50,7 @@ def test_the_summary_says_what_is_over_the_clean_hull(estimate: Estimate, ship: 
 
 def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, ship: Ship) -> None:
     curve = estimate.curve
-    slow = replace(estimate, curve=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
+    slow = replace(estimate, conditions=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
     model = replace(ship, displaced_volume_m3=14.0 / 1025.0)
     first, _, last = slow.summary(model)
     assert first.startswith('At 0.615 m/s: resistance 0.1765 ± 0.0099 N, effective power 0.1086 ')

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.learning.expression import (
+from shipdrag_ros.ship.expression import (
     LONGEST,
     PURE,
     Formula,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.errors import EffectFileError, SimulationError
-from shipdrag_ros.learning.folder import read_folders, using
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.errors import EffectFileError
+from shipdrag_ros.learning.folder import read_folders
+from shipdrag_ros.simulation.effects import LIBRARY, using
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 
@@ -19,7 +19,7 @@ def test_the_files_of_a_folder_are_in_the_library_for_a_while() -> None:
     before = dict(LIBRARY)
     with using(terms):
         assert set(LIBRARY) - set(before) == {term.name for term in terms}
-        with pytest.raises(SimulationError, match='weed'), using(terms):
+        with pytest.raises(EffectFileError, match='weed'), using(terms):
             pass
     assert dict(LIBRARY) == before
 

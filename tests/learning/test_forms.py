@@ -13,25 +13,38 @@ from shipdrag_ros.simulation import Scenario
 from shipdrag_ros.simulation.effect import Frame
 
 SHIP = Ship.example()
-FORMS = forms(SHIP, Span(1.0, 7.0, 1500.0))
+SPAN = Span(1.0, 7.0, 1500.0, log=True, days=(20000.0, 20009.0), depth_m=(10.0, 30.0))
+FORMS = forms(SHIP, SPAN)
 
 
 def test_there_are_forms_by_each_variable() -> None:
-    assert len(FORMS) >= 40
-    assert {form.kind[0] for form in FORMS} == {'speed', 'time', 'heading'}
+    assert len(FORMS) >= 70
+    by_force = {form.kind[1] for form in FORMS if form.kind[0] == 'force'}
+    assert by_force == {'speed', 'time', 'heading', 'date', 'depth'}
+    assert {form.kind[1] for form in FORMS if form.kind[0] == 'log'} == {'speed', 'time'}
     assert len({form.term.name for form in FORMS}) == len(FORMS)
 
 
-@pytest.mark.parametrize('form', FORMS, ids=lambda form: form.term.form.expression)
+@pytest.mark.parametrize('form', FORMS, ids=lambda form: form.term.term.expression)
 def test_each_acts_at_every_start(form: LearnableForm) -> None:
-    frame = Frame(SHIP, Scenario(speed_m_s=7.0, heading_rad=0.4), 0.4)
-    speed = np.linspace(1.0, 7.0, 30)
+    scenario = Scenario(speed_m_s=7.0, heading_rad=0.4, day=20005.0, depth_m=15.0)
+    frame, speed, after = (
+        Frame(SHIP, scenario, 0.4),
+        np.linspace(7.0, 1.0, 30),
+        np.arange(30) * 50.0,
+    )
     acts = []
     for way in form.ways(SHIP, 1500.0, 4):
         action = way.action(frame, way.tried())
-        acts.append(np.abs(action.resistance_n(speed)).max() + len(action.turns))
-        assert np.isfinite(action.resistance_n(speed)).all()
+        shown = [action.resistance_n(speed), *(each(speed, after) for each in action.log_error)]
+        acts.append(np.abs(shown).max() + len(action.turns))
+        assert np.isfinite(shown).all()
     assert max(acts) > 0.0
+
+
+def test_what_the_runs_do_not_hold_is_not_tried() -> None:
+    kinds = {form.kind[:2] for form in forms(SHIP, Span(1.0, 7.0, 1500.0))}
+    assert kinds == {('force', 'speed'), ('force', 'time'), ('force', 'heading')}
 
 
 def test_something_smooth_is_more_probable_than_any_form() -> None:

@@ -10,15 +10,19 @@ import pytest
 
 import shipdrag_ros as sd
 from shipdrag_ros.learning import words
-from shipdrag_ros.learning.folder import using
 from shipdrag_ros.learning.search import Learnt
-from shipdrag_ros.learning.term import LearntTerm
+from shipdrag_ros.ship.term import LearntTerm
+from shipdrag_ros.simulation import Scenario
+from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import using
+from shipdrag_ros.simulation.learnt import force_n
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 # a sharp edge: a broad one looks like a hump about it
 HIDDEN = LearntTerm.from_yaml(WEED.read_text().replace('0.02*sqrt(g*L)', '0.006*sqrt(g*L)'))
 SIZES = {'A': 0.0004, 'u_c': 0.13}
 SHIP = sd.Ship.example()
+FRAME = Frame(SHIP, Scenario(speed_m_s=7.0), 0.0)
 pytestmark = pytest.mark.timeout(900)  # a busy machine compares for minutes
 RUNS = ((7.0, 0.3), (6.6, -1.7), (6.0, 2.1), (6.2, 0.9))  # speed and heading of each
 
@@ -47,11 +51,11 @@ def learnt() -> Learnt:
 def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
     term = learnt.term
     assert term is not None, learnt.reason
-    assert (term.form.variable, term.form.shape) == ('speed', 'step')
+    assert (term.term.variable, term.term.shape) == ('speed', 'step')
     values = tuple(each.value for each in term.parameters.values())
     speed = np.linspace(1.5, 6.5, 60)
-    true = HIDDEN.force_n(SHIP, 0.0, tuple(SIZES.values()), speed)
-    found = term.force_n(SHIP, 0.0, values, speed)
+    true = force_n(HIDDEN, FRAME, tuple(SIZES.values()), speed)
+    found = force_n(term, FRAME, values, speed)
     # nine in ten of what it does to the ship are known
     assert np.sqrt(np.mean((found - true) ** 2)) < 0.2 * np.sqrt(np.mean(true**2))
 

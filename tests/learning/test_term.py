@@ -17,10 +17,18 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
-from shipdrag_ros.simulation import Scenario, simulate
+from shipdrag_ros.ship.term import LearntTerm
+from shipdrag_ros.simulation import (
+    Scenario,
+    sense,
+    simulate,
+    simulate_columns,
+    standard_sensors,
+)
 from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import LIBRARY, declared, parse, using
+from shipdrag_ros.simulation.learnt import force_n
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')
@@ -40,6 +48,32 @@ parameters: {A: {value: 2e-4, sd: 1e-5}, B: {value: 1e-4, sd: 1e-5}}
 """
 
 
+WASHED = """
+name: washed
+term: {channel: log, scope: sensor, variable: time, shape: decay,
+  expression: "A*u*exp(-t/(tau*sqrt(L/g)))", valid: {t: [0, 3000], u: [0.5, 8]}}
+parameters: {A: {value: 0.05, sd: 0.01}, tau: {value: 100, sd: 5}}
+"""
+SANDED = """
+name: sanded
+term: {channel: force, scope: earth, variable: depth, shape: power,
+  expression: "0.5*rho*A*nabla**(2/3)*u**2*(0.1*L/h)**2", valid: {h: [8, 40], u: [0.5, 8]}}
+parameters: {A: {value: 0.02, sd: 0.001}}
+"""
+GROWN = """
+name: grown
+term: {channel: force, scope: hull, variable: date, shape: ramp,
+  expression: "0.5*rho*A*nabla**(2/3)*u**2*(d - 20600)/30",
+  valid: {d: [20600, 20630], u: [0.5, 8]}}
+parameters: {A: {value: 0.02, sd: 0.001}}
+"""
+
+
+def frame_of(ship: Ship) -> Frame:
+    """Return what a term acts in."""
+    return Frame(ship, Scenario(speed_m_s=6.0), 0.0)
+
+
 def plain(text: str) -> dict[str, Any]:
     """Return the plain data of a text."""
     return dict(YAML(typ='safe').load(text))
@@ -52,7 +86,7 @@ def refused(whole: Any) -> None:
     stream = io.StringIO()
     YAML(typ='safe').dump(whole, stream)
     with pytest.raises(EffectFileError):
-        LearntTerm.from_yaml(stream.getvalue())
+        declared(LearntTerm.from_yaml(stream.getvalue()))
 
 
 def test_a_term_acts_as_its_formula_says() -> None:
@@ -62,22 +96,22 @@ def test_a_term_acts_as_its_formula_says() -> None:
     root = math.sqrt(GRAVITY_M_S2 * ship.length_m)
     step = 0.5 * (1.0 + np.tanh((0.09 * root - speed) / (0.02 * root)))
     wanted = 0.5 * ship.water.density_kg_m3 * 0.002 * ship.length_m**2 * speed**2 * step
-    found = term.effect().action(frame, 0.002, 0.09).resistance_n(speed)
+    found = declared(term).action(frame, 0.002, 0.09).resistance_n(speed)
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
 
 
 def test_beyond_its_speeds_a_force_goes_on_as_the_square() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(WEED)
-    inside, beyond = term.force_n(ship, 0.0, (0.002, 0.09), np.array([7.9, 15.8]))
+    inside, beyond = force_n(term, frame_of(ship), (0.002, 0.09), np.array([7.9, 15.8]))
     assert beyond == pytest.approx(4.0 * inside)
-    assert term.force_n(ship, 0.0, (0.002, 0.09), np.array([0.0]))[0] == 0.0
+    assert force_n(term, frame_of(ship), (0.002, 0.09), np.array([0.0]))[0] == 0.0
 
 
 def test_a_force_in_time_is_followed() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(FADING)
     scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
     frame = Frame(ship, scenario, 0.0)
-    action = term.effect().action(frame, 0.02, 100.0)
+    action = declared(term).action(frame, 0.02, 100.0)
     after = np.linspace(0.0, 900.0, 200)
     area = sum(turn.drag_area_m2 * turn.share(after) for turn in action.turns)
     tau_s = 100.0 * math.sqrt(ship.length_m / GRAVITY_M_S2)
@@ -91,15 +125,49 @@ def test_a_force_of_the_earth_turns_with_the_heading() -> None:
     forces = []
     for heading in (0.0, math.pi):
         frame = Frame(ship, Scenario(speed_m_s=6.0, heading_rad=heading), 0.0)
-        forces.append(float(term.effect().action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
+        forces.append(float(declared(term).action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
     assert forces[0] == pytest.approx(-forces[1])
     assert forces[0] > 0.0
 
 
-def test_more_of_it_slows_the_ship_more() -> None:
-    from shipdrag_ros.learning.folder import using
-    from shipdrag_ros.simulation.effects import LIBRARY, parse
+def test_a_log_in_time_reads_as_its_formula_says() -> None:
+    ship, scenario = Ship.example(), Scenario(speed_m_s=6.0, duration_s=900.0)
+    term = LearntTerm.from_yaml(WASHED)
+    with using([term]):
+        truth = simulate(ship, scenario, effects=[parse('washed=0.05')])
+    (sensor,) = standard_sensors(noise=0.0, inputs=['speed_through_water'])
+    block = sense(truth, [sensor], seed=1)
+    time_s = (block.receive_ns - block.receive_ns[0]) * 1e-9
+    since = np.maximum(time_s - scenario.lead_in_s, 0.0)
+    tau_s = 100.0 * math.sqrt(ship.length_m / GRAVITY_M_S2)
+    speed = np.interp(time_s, truth.time_s, truth.speed_through_water_m_s)
+    wanted = speed * (1.0 + 0.05 * np.exp(-since / tau_s))
+    np.testing.assert_allclose(block.value[:, 0], wanted, atol=2e-4)
+    action = declared(term).action(frame_of(ship), 0.05, 100.0)
+    column = simulate_columns(ship, scenario, [action], time_s).log_m_s[0]
+    np.testing.assert_allclose(column, wanted, atol=2e-4)
 
+
+@pytest.mark.parametrize(
+    ('text', 'runs', 'ratio'),
+    [
+        (SANDED, ({'depth_m': 10.0}, {'depth_m': 20.0}), 0.25),
+        (SANDED, ({'depth_m': 40.0}, {'depth_m': 200.0}), 1.0),  # as at the end of what is valid
+        (GROWN, ({'day': 20610.0}, {'day': 20620.0}), 2.0),
+    ],
+)
+def test_a_force_by_depth_or_date_is_of_the_run(
+    text: str, runs: tuple[dict[str, float], dict[str, float]], ratio: float
+) -> None:
+    effect, ship = declared(LearntTerm.from_yaml(text)), Ship.example()
+    one, other = (
+        effect.action(Frame(ship, Scenario(speed_m_s=6.0, **run), 0.0), 0.02).resistance_n(3.0)
+        for run in runs
+    )
+    assert other == pytest.approx(ratio * one)
+
+
+def test_more_of_it_slows_the_ship_more() -> None:
     ship, terms = Ship.example(), [LearntTerm.from_yaml(WEED), LearntTerm.from_yaml(FADING)]
     with using(terms):
         for name in ('weed', 'fading'):
@@ -113,11 +181,11 @@ def test_more_of_it_slows_the_ship_more() -> None:
     assert 'weed' not in LIBRARY
 
 
-@pytest.mark.parametrize('text', [WEED, FADING, TURNED])
+@pytest.mark.parametrize('text', [WEED, FADING, TURNED, WASHED, SANDED, GROWN])
 def test_a_term_survives_its_own_text_and_a_process(text: str) -> None:
     term = LearntTerm.from_yaml(text)
     assert LearntTerm.from_yaml(term.to_yaml()) == term
-    assert pickle.loads(pickle.dumps(term.effect())).act(
+    assert pickle.loads(pickle.dumps(declared(term))).act(
         Frame(Ship.example(), Scenario(speed_m_s=6.0), 0.0), 0.001, 0.1
     )
 
@@ -153,9 +221,9 @@ WRONG_FORMULAS = (
 WRONG: dict[str, tuple[Any, ...]] = {
     'name': ('', 'Weed', '../weed', 'a b', 'fouling', 'x' * 61, 7, None, ['a'], 'weed\n',
              '__init__'),
-    'term.channel': ('thrust', 'log', 'water', 'ground', 'inertia', '', 1, None),
+    'term.channel': ('thrust', 'water', 'ground', 'inertia', '', 1, None),
     'term.scope': ('world', '', 0, None, 'Hull'),
-    'term.variable': ('depth', 'wind', 'shaft', 'mood', '', 3, None, 'time', 'heading'),
+    'term.variable': ('depth', 'date', 'wind', 'shaft', 'mood', '', 3, None, 'time', 'heading'),
     'term.shape': ('wiggle', '', None, 5),
     'term.valid': ({}, {'u': [7.9, 1.1]}, {'u': [1.1]}, {'u': [1.0, 2.0, 3.0]}, {'v': [0, 1]},
                    {'u': [-1, 3]}, {'u': [0, math.inf]}, {'u': [0, math.nan]}, {'u': 'all'},
@@ -254,7 +322,9 @@ def test_any_value_of_a_key_passes_or_is_a_plain_error(key: str, value: Any) -> 
         term = LearntTerm.from_yaml(stream.getvalue())
     except EffectFileError:
         return
-    assert np.isfinite(term.force_n(Ship.example(), 0.0, (0.001, 0.09), np.array([2.0]))).all()
+    assert np.isfinite(
+        force_n(term, frame_of(Ship.example()), (0.001, 0.09), np.array([2.0]))
+    ).all()
 
 
 def test_a_cut_or_turned_file_passes_or_is_a_plain_error() -> None:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.cli import main
@@ -24,6 +23,7 @@ from shipdrag_ros.fleet.job import BagJob, work
 from shipdrag_ros.fleet.rows import BagResult
 from shipdrag_ros.library import diagnosing
 from shipdrag_ros.replay import replay
+from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Propulsion

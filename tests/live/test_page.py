@@ -178,7 +178,7 @@ def test_two_days_are_drawn_at_once_and_night_is_red(serving: Any, view: Any) ->
             document.getElementById('span').dispatchEvent(new Event('change'));
             return performance.now() - t; }"""
         )
-        assert drawn_ms < 2000.0  # benchmarks/live_page.py measures it; here only: not seconds
+        assert drawn_ms < 2000.0  # speed/live_page.py measures it; here: not seconds
         assert viewer.page.evaluate('window.shipdrag.picture.rows.length') < 20_000
         viewer.page.click('#mode')
         viewer.page.click('#mode')

@@ -27,10 +27,10 @@ from shipdrag_ros.messages import (
     EventNote,
     MalformedMessage,
     event_message,
-    outputs,
     read_event,
     reset_request,
 )
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.ship import Ship
 
 STAMP_NS = 1_700_000_000_000_000_001
@@ -56,7 +56,8 @@ def estimate() -> Estimate:
         orders=(),
         samples={},
         noise_sd={},
-        curve=curve,
+        calm=curve,
+        conditions=curve,
         froude_valid=(0.05, 0.15),
         froude_max_by=FroudeMax.BRANCH_TOP,
         froude_max_argmax=0.2,

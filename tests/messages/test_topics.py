@@ -17,7 +17,7 @@ TWIST_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
 def test_every_accepted_type_has_a_decoder_and_no_other() -> None:
     accepted = {Source(name, kind) for name, kinds in TOPICS.items() for kind in kinds}
-    assert set(decoding._READINGS) == accepted
+    assert set(decoding._readings()) == accepted
     assert tuple(TOPICS) == INPUTS
 
 

@@ -116,10 +116,10 @@ def test_from_the_beginning(desk: Desk) -> None:
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.DATA_STOP, EndedBy.RECORD_END]
     figures = [it for it in desk.published if not it.topic.endswith('/events')]
     assert_identical(result, at_least=len(figures))
-    assert len(figures) > 100
+    assert len(figures) > 50
 
 
-@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, 3500.0, 4200.0])
+@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, 3500.0])
 def test_a_recording_that_starts_mid_run(desk: Desk, start_s: float) -> None:
     desk.feed(0, start_s)
     desk.recorder.start()
@@ -148,7 +148,7 @@ def test_after_a_reset(desk: Desk) -> None:
     desk.feed(LEAD_IN_S + 250.0, 1e9)
     (result,) = desk.replay()
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.RESET, EndedBy.RECORD_END]
-    assert_identical(result, at_least=50)
+    assert_identical(result, at_least=30)
 
 
 def test_a_recording_that_starts_after_a_reset(desk: Desk) -> None:
@@ -159,7 +159,7 @@ def test_a_recording_that_starts_after_a_reset(desk: Desk) -> None:
     desk.recorder.start()
     desk.feed(3700.0, 1e9)
     (result,) = desk.replay()
-    assert_identical(result, at_least=50)
+    assert_identical(result, at_least=30)
 
 
 def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
@@ -169,7 +169,7 @@ def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
     first, second = desk.replay()
     assert [it.ended_by for it in first.coastdowns] == [EndedBy.RESET]
     assert_identical(first, at_least=10)
-    assert_identical(second, at_least=100)
+    assert_identical(second, at_least=30)
 
 
 @pytest.mark.parametrize('recorded_from', ['the beginning', 'mid run', 'after the silence'])
@@ -206,11 +206,11 @@ def test_a_clock_that_is_set_forward_ends_the_run(desk: Desk) -> None:
     assert result.coastdowns[0].ended_by is EndedBy.RESET
     assert result.coastdowns[-1].ended_by is EndedBy.RECORD_END
     assert EventKind.CLOCK_JUMP in desk.kinds()
-    assert_identical(result, at_least=50)
+    assert_identical(result, at_least=30)
 
 
 @settings(
-    max_examples=6,
+    max_examples=3,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

@@ -17,6 +17,7 @@ import struct
 import subprocess
 import sys
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -28,6 +29,7 @@ from geometry_msgs.msg import PointStamped, TwistStamped
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
+from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rosgraph_msgs.msg import Clock
 
@@ -86,23 +88,38 @@ class Program:
 class Stranger:
     """A participant of the graph that publishes what it likes, and hears /diagnostics."""
 
-    def __init__(self) -> None:
-        self._context = rclpy.Context()
-        rclpy.init(context=self._context)
-        self.node = rclpy.create_node('stranger', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
+    def __init__(self, ground: Any = TwistStamped, *, name: str = 'stranger') -> None:
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = rclpy.create_node(name, context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self.arrays: list[DiagnosticArray] = []
-        self.node.create_subscription(DiagnosticArray, '/diagnostics', self.arrays.append, 100)
+        self.heard_s: list[float] = []
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 100)
         self.log = self.node.create_publisher(TwistStamped, 'speed_through_water', 1000)
-        self.ground = self.node.create_publisher(TwistStamped, 'speed_over_ground', 1000)
+        if ground is not None:
+            self.send_ground(ground)
         self.place = self.node.create_publisher(PointStamped, 'position', 1000)
         self.clock = self.node.create_publisher(Clock, '/clock', 10)
+
+    def send_ground(self, kind: Any) -> None:
+        self.ground = self.node.create_publisher(kind, 'speed_over_ground', 1000)
 
     def close(self) -> None:
         self._executor.shutdown()
         self.node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
+        rclpy.try_shutdown(context=self.context)
+
+    def _hear(self, array: DiagnosticArray) -> None:
+        self.arrays.append(array)
+        self.heard_s.append(time.monotonic())
+
+    def call(self, client: Client, request: Any) -> Any:
+        """Return the answer of a service."""
+        future = client.call_async(request)
+        self._executor.spin_until_future_complete(future, timeout_sec=WITHIN_S)
+        return future.result()
 
     def spin(self, seconds: float = 0.0) -> None:
         end_s = time.monotonic() + seconds
@@ -133,6 +150,16 @@ class Stranger:
     def now(self, part: str) -> DiagnosticStatus | None:
         return next(iter(self.said(part, since=max(len(self.arrays) - 1, 0))), None)
 
+    def rejected(self, part: str) -> dict[str, float]:
+        """Return how many readings of an input were rejected, by reason."""
+        status = self.now(part)
+        values = {} if status is None else {item.key: item.value for item in status.values}
+        return {
+            key: float(value)
+            for key, value in values.items()
+            if key.startswith(('rejected ', 'unreadable '))
+        }
+
     def value(self, part: str, key: str) -> float:
         """Return a figure of a part, 0 where there is none."""
         status = self.now(part)
@@ -155,9 +182,16 @@ def point(stamp_ns: int, metres: float) -> PointStamped:
     return message
 
 
-def payloads(bags: Sequence[Path], topic: str) -> list[bytes]:
-    """Return the messages of a topic in files that may have been cut off anywhere."""
-    found = []
+def nmea(text: str) -> bytes:
+    """Return a sentence with its checksum."""
+    total = 0
+    for byte in text.encode('latin-1'):
+        total ^= byte
+    return f'${text}*{total:02X}\r\n'.encode('latin-1')
+
+
+def records(bags: Sequence[Path]) -> Iterator[tuple[str, Message]]:
+    """Yield topic and message of files that may have been cut off anywhere."""
     for path in bags:
         channels: dict[int, str] = {}
         with path.open('rb') as stream:
@@ -165,14 +199,27 @@ def payloads(bags: Sequence[Path], topic: str) -> list[bytes]:
                 for record in StreamReader(stream).records:
                     if isinstance(record, Channel):
                         channels[record.id] = record.topic
-                    elif isinstance(record, Message) and channels[record.channel_id] == topic:
-                        found.append(record.data)
+                    elif isinstance(record, Message):
+                        yield channels[record.channel_id], record
             except (McapError, EOFError, struct.error):
                 pass  # here the power went
-    return found
+
+
+def payloads(bags: Sequence[Path], topic: str) -> list[bytes]:
+    """Return the messages of a topic."""
+    return [message.data for found, message in records(bags) if found == topic]
 
 
 def get(url: str) -> Any:
     """Return the JSON behind an address."""
     with urllib.request.urlopen(url, timeout=WITHIN_S) as answer:
         return json.load(answer)
+
+
+def ask(url: str, body: bytes) -> int:
+    """Return the status with which a POST is answered."""
+    try:
+        with urllib.request.urlopen(url, data=body, timeout=WITHIN_S) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return int(error.code)

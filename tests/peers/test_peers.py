@@ -61,7 +61,9 @@ def start_node(programs: list[Program], folder: Path, *ros_arguments: str) -> Pr
 def test_the_client_shares_no_code_with_the_package() -> None:
     for path in HERE.glob('*.py'):
         for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in getattr(node, 'names', ())]
+            if not isinstance(node, ast.Import | ast.ImportFrom):
+                continue
+            names = [alias.name for alias in node.names]
             names.append(getattr(node, 'module', None) or '')
             assert not any(str(name).startswith('shipdrag') for name in names), path
 

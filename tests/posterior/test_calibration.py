@@ -3,24 +3,14 @@
 
 from __future__ import annotations
 
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
-
 import numpy as np
 
-SCRIPT = Path(__file__).resolve().parents[2] / 'benchmarks' / 'posterior_calibration.py'
+from benchmarks.accuracy import posterior_calibration as script
 
 
 def test_bands_and_probabilities_of_drawn_runs() -> None:
     # N = 30, seed 7. Cover within a run is all or nothing at worst: sd 0.95 0.05 / 30 -> 0.04,
     # so 0.83 is three of them below 0.95; probability said and share right differ by 3 sd = 0.24
-    spec = spec_from_file_location('posterior_calibration', SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    script = module_from_spec(spec)
-    sys.modules['posterior_calibration'] = script
-    spec.loader.exec_module(script)
     found = [script.place(np.random.default_rng([7, number])) for number in range(30)]
     assert np.mean([each.cover for each in found]) > 0.83
     assert np.mean([each.chi2 for each in found]) < 2.0

@@ -18,9 +18,9 @@ from shipdrag_ros.messages import (
     Source,
     decode,
     encode,
-    outputs,
     reset_request,
 )
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship

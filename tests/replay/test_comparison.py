@@ -12,7 +12,8 @@ import pytest
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import Event, Update
-from shipdrag_ros.messages import OutputMessage, outputs
+from shipdrag_ros.messages import OutputMessage
+from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.comparison import Comparison
 from shipdrag_ros.replay.words import recorded_sentence
@@ -90,7 +91,7 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
         (
             replace(
                 updates[3].estimate,
-                curve=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
+                conditions=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
             ),
             0.01 / 1.01,
         ),

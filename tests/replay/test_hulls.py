@@ -25,7 +25,7 @@ def coasted(estimate: Estimate, top: float, rule: FroudeMax) -> Estimate:
     )
     # as of an estimator that is valid to the top of the branch whatever r does
     return replace(
-        estimate, curve=curve, froude_valid=(0.05, end), froude_max_by=FroudeMax.BRANCH_TOP
+        estimate, conditions=curve, froude_valid=(0.05, end), froude_max_by=FroudeMax.BRANCH_TOP
     )
 
 

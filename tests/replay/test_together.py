@@ -21,7 +21,9 @@ def later(run: RunResult, *, days: float, factor: float, bag: str = 'later.mcap'
         estimate,
         start_ns=estimate.start_ns + shift,
         end_ns=estimate.end_ns + shift,
-        curve=replace(estimate.curve, resistance_m_s2=factor * estimate.curve.resistance_m_s2),
+        conditions=replace(
+            estimate.curve, resistance_m_s2=factor * estimate.curve.resistance_m_s2
+        ),
     )
     start, end = coastdown.start_ns + shift, coastdown.end_ns + shift
     there = replace(coastdown, start_ns=start, end_ns=end, estimate=moved)

@@ -14,6 +14,7 @@ import pytest
 
 import shipdrag_ros
 from shipdrag_ros.coastdown.regimes.bank import OUT as REGIMES
+from shipdrag_ros.posterior.weather import Reference
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Frame, Scenario
 from shipdrag_ros.simulation.effect import Measure, Scope, WithoutBaseline
@@ -23,8 +24,10 @@ PACKAGE = Path(shipdrag_ros.__file__).parent
 EFFECTS = PACKAGE / 'simulation' / 'effects'
 CONFIG = PACKAGE.parent / 'config'
 SOURCES = sorted(path for path in PACKAGE.rglob('*.py') if EFFECTS not in path.parents)
-# a section of the ship file has the name of an effect as well, and so has a regime
-NAMES = set(LIBRARY) - {field.name for field in fields(Ship)} - set(REGIMES)
+# a section of the ship file has the name of an effect as well, and so have a regime and a
+# condition that r(v) refers to
+NAMES = set(LIBRARY) - {each.name for kind in (Ship, Reference) for each in fields(kind)}
+NAMES -= set(REGIMES)
 OF_LOG_AND_TRACK = [e for e in LIBRARY.values() if WithoutBaseline.LOG_TRACK in e.without_baseline]
 
 

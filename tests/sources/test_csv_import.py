@@ -313,7 +313,12 @@ def test_times_that_say_nothing() -> None:
         ('', ['shaft=1'], {'rate_hz': 1}, 'is empty'),
         ('\n \n', ['shaft=1'], {'rate_hz': 1}, 'is empty'),
         ('t,u\n', ['shaft=u'], {'rate_hz': 1}, r'no sample from 0 row\(s\)'),
-        ('t,u\n1,x\n', ['shaft=u'], {'rate_hz': 1}, "shaft: not a number 1 times, line 2: 'x'"),
+        (
+            't,u\n1,x\n',
+            ['shaft=u'],
+            {'rate_hz': 1},
+            "shaft: 1 rejected, not a number: line 2: 'x'",
+        ),
         ('t,u\n1,2\n', ['shaft=v'], {'rate_hz': 1}, "no column 'v'; it has 't', 'u', and numbers"),
         ('1,2\n', ['shaft=u'], {'rate_hz': 1}, "no column 'u'; it has no header"),
         ('1,2\n', ['shaft=3'], {'rate_hz': 1}, "no column '3'"),

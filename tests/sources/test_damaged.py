@@ -1,46 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Damaged logs: read or refused, and no value that stands in no untouched line.
-
-The script `benchmarks/bad_imports.py` does the same with thousands of each.
-"""
+"""Damaged logs: read or refused, and no value that stands in no untouched line."""
 
 from __future__ import annotations
 
-import importlib.util
 import random
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from shipdrag_ros.errors import ShipdragError
+from tests.sources import damage as bad
 
-BENCHMARKS = Path(__file__).resolve().parents[2] / 'benchmarks'
 KINDS = (
     *('csv', 'csv_commas', 'nmea', 'candump', 'actisense', 'yacht_devices', 'canboat'),
     *('signalk', 'gpx', 'ardupilot', 'ulog', 'ros1', 'sqlite3'),
 )
 LIBRARIES = {'ardupilot': 'pymavlink', 'ulog': 'pyulog'}
 SEEDS = 15
-
-
-def _script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location('bad_imports', BENCHMARKS / 'bad_imports.py')
-    assert spec is not None
-    assert spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    sys.modules['bad_imports'] = script  # where its dataclass looks
-    sys.path.insert(0, str(BENCHMARKS))
-    try:
-        spec.loader.exec_module(script)
-    finally:
-        sys.path.remove(str(BENCHMARKS))
-    return script
-
-
-bad = _script()
 
 
 @pytest.mark.parametrize('kind', KINDS)

@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import gzip
-import importlib.util
 import json
 import math
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -21,21 +19,9 @@ from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import best_of, head_of
 from shipdrag_ros.sources.reading import Understanding, read_any
+from tests.sources import log_samples as made
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def _samples() -> ModuleType:
-    place = ROOT / 'benchmarks' / '_log_samples.py'
-    spec = importlib.util.spec_from_file_location('_log_samples', place)
-    assert spec is not None
-    assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made
-
-
-made = _samples()
 FORMAT_OF = {
     'csv': 'csv',
     'csv_commas': 'csv',

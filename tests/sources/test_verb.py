@@ -84,7 +84,7 @@ def test_the_words_tell_what_was_left_out(
     assert '1200 messages of 1201 rows' in captured
     assert 'The times count from a start; it was put at 2000-01-01' in captured
     assert '1200 rows were not chosen by --where.' in captured
-    assert "speed_through_water: 1 cell(s) rejected, not a number: line 2402: 'fast'" in captured
+    assert "speed_through_water: 1 rejected, not a number: line 2402: 'fast'" in captured
 
 
 def test_times_that_go_back_are_told(
@@ -93,7 +93,7 @@ def test_times_that_go_back_are_told(
     line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
     assert main([*line, '--map', 'speed_through_water=v:kn']) == 0
     # the last of run b is as late as the last of run a
-    assert 'In 1199 rows the time is before' in capsys.readouterr().out
+    assert '1199 rows are stamped before an earlier one' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import typeof, types
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.births import bear, thin
@@ -56,7 +55,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     BankSetting,
     Histories,
 )  # fmt: skip
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
@@ -238,10 +237,9 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
 _SETTING = BankSetting(
     HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0, 0.0
 )  # its types are all that counts
-_SIGNATURE: Signature = types.void(typeof(Bank.fresh()), typeof(_SETTING))
 
 
-@compiled(_SIGNATURE, uncounted=True)
+@compiled('void(Bank, Setting)', like={'Bank': Bank.fresh(), 'Setting': _SETTING}, uncounted=True)
 def step(bank: Bank, setting: BankSetting) -> None:
     """
     Take the bin in `bank.said`; the probabilities are then in `bank.out`.

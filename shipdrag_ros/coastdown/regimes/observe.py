@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import typeof, types
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
@@ -18,7 +17,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
 )
 from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RATE, SHAFTS
-from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Channel, Float64
 
 _LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
@@ -26,10 +25,6 @@ _TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
 _HEADING = int(Channel.HEADING)
 _SHAFT, _SHAFT_2, _PITCH = int(Channel.SHAFT), int(Channel.SHAFT_2), int(Channel.PITCH)
 _COURSE = 6  # bins of a way that shows a course
-
-_SIGNATURE: Signature = types.void(
-    typeof(Bins.fresh(1)), types.int64, types.int64, types.float64, types.float64[::1]
-)
 
 
 @compiled(inline=True, uncounted=True)
@@ -49,7 +44,7 @@ def _apart(one: float, other: float) -> float:
     return math.atan2(math.sin(one - other), math.cos(one - other))
 
 
-@compiled(_SIGNATURE, uncounted=True)
+@compiled('void(Bins, i8, i8, f8, f8[::1])', like={'Bins': Bins.fresh(1)}, uncounted=True)
 def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> None:
     """
     Put what the bins last - width + 1 .. last say into `said`; NaN where they say nothing.

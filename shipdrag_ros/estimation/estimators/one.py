@@ -10,5 +10,4 @@ ESTIMATOR = Estimator(
     estimate=estimate,
     live=estimate_live,
     learns_noise=True,
-    caveat='wind and depth are left in r(v)',
 )

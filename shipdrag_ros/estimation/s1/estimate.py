@@ -97,9 +97,10 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     scale = solution.fit.scale
     return assembled(
         inputs.estimator,
-        curve,
         valid,
         AtEnd.of(motion, ship),
+        calm=curve,
+        conditions=curve,
         start_ns=scale.first_ns,
         end_ns=scale.first_ns + scale.span_ns,
         order=solution.order,

@@ -292,7 +292,8 @@ function showCurve() {
   const whose = usual.run_s == null ? 'this run' : `the run of ${dayAndTime(usual.run_s, zone)}`;
   const compared = over == null ? 'There is no clean hull to compare with.'
     : `At ${units.toSpeed(usual.speed_m_s).toFixed(1)} ${units.speed} ${whose} lies ${Math.abs(100 * over).toFixed(0)} % ${over >= 0 ? 'over' : 'under'} the clean hull (dashed).`;
-  text('curve-say', `${compared} Band of the curve ± ${(200 * usual.r_sigma / usual.r).toFixed(0)} %.`);
+  const of = picture.figures.r_of ? `, ${picture.figures.r_of}` : '';
+  text('curve-say', `${compared} Band of the curve ± ${(200 * usual.r_sigma / usual.r).toFixed(0)} %${of}.`);
 }
 
 function sameCurve(one, other) {

@@ -10,26 +10,34 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import lru_cache
 from importlib import import_module
 from itertools import combinations
 from pkgutil import iter_modules
 from types import MappingProxyType
 
-from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
+from shipdrag_ros.simulation.learnt import effect_of
 
 __all__ = [
     'LIBRARY',
+    'OWN',
     'action_of',
-    'added',
+    'carrying',
     'confounders',
+    'declared',
     'discriminating_measurements',
+    'effects_of',
     'find',
     'inseparable',
     'parse',
+    'terms',
+    'using',
     'values_of',
 ]
 
@@ -45,41 +53,95 @@ _EVERY = {effect.name: effect for effect in _found()}
 LIBRARY: Mapping[str, Effect] = MappingProxyType(_EVERY)
 
 
-@contextmanager
-def added(effects: Sequence[Effect]) -> Iterator[None]:
+OWN = frozenset(LIBRARY)
+"""Names of the library itself, without terms that are added."""
+_TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
+
+
+@lru_cache(256)
+def declared(term: LearntTerm) -> Effect:
     """
-    Have more effects in the library of this process, for a while.
+    Return a learnt term as an effect.
 
     Raises
     ------
-    SimulationError
-        If a name is taken.
+    EffectFileError
+        If its name is that of an effect of the library.
     """
-    taken = [effect.name for effect in effects if effect.name in _EVERY]
+    if term.name in OWN:
+        why = f'name: {term.name!r} is an effect of the library; give it another'
+        raise EffectFileError(term.name, [why])
+    _TERMS[term.name] = term
+    return effect_of(term)
+
+
+@contextmanager
+def using(terms: Sequence[LearntTerm]) -> Iterator[None]:
+    """
+    Have learnt terms in the library of this process, for a while.
+
+    Raises
+    ------
+    EffectFileError
+        If a name is taken.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.simulation.effects import using
+    >>> with using([]):
+    ...     pass
+    """
+    effects = {term.name: declared(term) for term in terms}
+    taken = [name for name in effects if name in _EVERY]
     if taken:
-        raise SimulationError(
-            f'effect {taken[0]!r}: the library has one of this name; give it another'
-        )
-    _EVERY.update({effect.name: effect for effect in effects})
+        raise EffectFileError(taken[0], ['name: there is an effect of this name; give another'])
+    _EVERY.update(effects)
     try:
         yield
     finally:
-        for effect in effects:
-            del _EVERY[effect.name]
+        for name in effects:
+            del _EVERY[name]
+
+
+def effects_of(ship: Ship) -> Mapping[str, Effect]:
+    """
+    Return the effects that a ship may have: the library, and the terms of her file.
+    """
+    if not ship.learnt:
+        return LIBRARY
+    return {**LIBRARY, **{term.name: declared(term) for term in ship.learnt}}
+
+
+def terms(names: Collection[str] | None = None) -> tuple[LearntTerm, ...]:
+    """
+    Return the learnt terms among some effects; of None, those added to the library.
+    """
+    return tuple(_TERMS[name] for name in (_EVERY if names is None else names) if name not in OWN)
+
+
+def carrying(ship: Ship, more: Sequence[LearntTerm] | None = None) -> Ship:
+    """
+    Return a ship whose file holds more learnt terms; None: those added to the library.
+    """
+    own = {term.name for term in ship.learnt}
+    wanted = [term for term in (terms() if more is None else more) if term.name not in own]
+    return replace(ship, learnt=(*ship.learnt, *wanted)) if wanted else ship
 
 
 def find(name: str) -> Effect:
     """
-    Return an effect by its name.
+    Return an effect by its name: of the library, or a learnt term that this process has seen.
 
     Raises
     ------
     SimulationError
         If there is none; the message lists what is known.
     """
-    if name not in LIBRARY:
-        raise SimulationError(f'effect {name!r} is not known; known are {", ".join(LIBRARY)}')
-    return LIBRARY[name]
+    if name in LIBRARY:
+        return LIBRARY[name]
+    if name in _TERMS:
+        return declared(_TERMS[name])
+    raise SimulationError(f'effect {name!r} is not known; known are {", ".join(LIBRARY)}')
 
 
 def confounders(name: str) -> tuple[str, ...]:
@@ -89,15 +151,15 @@ def confounders(name: str) -> tuple[str, ...]:
     It is enough that one of two declares it.
     """
     declared_by = (other.name for other in LIBRARY.values() if name in other.confounders)
-    return tuple(sorted({*LIBRARY[name].confounders, *declared_by}))
+    return tuple(sorted({*find(name).confounders, *declared_by}))
 
 
 def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
     Return what separates two confounders; nothing: no record can.
     """
-    declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
-    return tuple(dict.fromkeys(declared))
+    both = (*find(one).confounders.get(other, ()), *find(other).confounders.get(one, ()))
+    return tuple(dict.fromkeys(both))
 
 
 def inseparable(
@@ -173,16 +235,16 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
         Naming every effect and parameter that cannot be simulated.
     """
     problems: list[str] = []
-    total = Action()
+    total, known = Action(), effects_of(frame.ship)
     names = [effect.name for effect in stated]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
             problems.append(f'{name} is given {names.count(name)} times, expected once')
     for item in stated:
-        if item.name not in LIBRARY:
-            problems.append(f'{item.name!r} is not known; known are {", ".join(LIBRARY)}')
+        if item.name not in known:
+            problems.append(f'{item.name!r} is not known; known are {", ".join(known)}')
             continue
-        effect = LIBRARY[item.name]
+        effect = known[item.name]
         before = len(problems)
         problems.extend(_problems(effect, item, frame))
         if len(problems) == before:
@@ -219,7 +281,7 @@ def values_of(stated: StatedEffect, ship: Ship) -> dict[str, float]:
     Return all parameters of an effect that was checked, defaults included.
     """
     values = {}
-    for parameter in find(stated.name).parameters_of(ship):
+    for parameter in effects_of(ship)[stated.name].parameters_of(ship):
         given = stated.parameters.get(parameter.name)
         values[parameter.name] = parameter.value if given is None else given.value
     return values

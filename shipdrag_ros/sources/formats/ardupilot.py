@@ -12,13 +12,12 @@ from typing import Any
 
 from shipdrag_ros.samples import SHAFTS, Channel
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job, missing_library
-from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.log import BASE_NS, UNDATED, Log
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
 
 # a message begins with A3 95, the first one defines the definitions (type 80)
 _MAGIC = b'\xa3\x95\x80\x80'
 _TYPES = ['GPS', 'POS', 'ATT', 'ESC', 'RPM']
-_BASE_NS = 946_684_800 * 10**9  # 2000-01-01, for a log that never had a fix
 _DATE_S = 1e8
 _FIX = 3
 
@@ -68,8 +67,8 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
         tally.records += 1
         stamp_ns = round(float(message._timestamp) * 1e6) * 1000
         if stamp_ns < _DATE_S * 1e9:
-            stamp_ns += _BASE_NS
-            tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
+            stamp_ns += BASE_NS
+            tally.note(UNDATED)
         fields = message.to_dict()
         for channel, rank, name, a, b in _values(fields):
             if isfinite(a) and isfinite(b):

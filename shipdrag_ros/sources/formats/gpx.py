@@ -41,48 +41,38 @@ def _open(job: Job, log: Log) -> StreamResult:
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
     points = _Points(tally)
+    size, total, chunk = 0, job.source.stat().st_size, b' '
     with opened(job.source) as (raw, file):
-        size = 0
-        while True:
+        while chunk:
             try:
                 chunk = file.read(_CHUNK)
                 size += len(chunk)
                 if file is not raw:
                     check_unpacked(job.source, size, raw.tell())
-                points.feed(chunk)
+                points.parser.Parse(chunk, not chunk)
             except (expat.ExpatError, OSError, EOFError) as error:
                 tally.note(f'The file is damaged, {error}; this is what stands before.')
                 chunk = b''
-            yield from points.take()
-            if not chunk:
-                break
+            yield from points.found
+            points.found.clear()
             if job.progress is not None:
-                job.progress(raw.tell(), job.source.stat().st_size)
+                job.progress(raw.tell(), total)
 
 
 class _Points:
     """The points of a track, while its XML is read."""
 
     def __init__(self, tally: Tally) -> None:
+        self.found: list[Reading] = []
+        self.parser = expat.ParserCreate(namespace_separator=' ')
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+        self.parser.EntityDeclHandler = self.parser.StartDoctypeDeclHandler = self._refuse
         self._tally = tally
-        self._parser = expat.ParserCreate(namespace_separator=' ')
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._text
-        self._parser.EntityDeclHandler = self._refuse
-        self._parser.StartDoctypeDeclHandler = self._refuse
         self._depth = 0
-        self._where: dict[str, str] | None = None
-        self._texts: dict[str, str] = {}
         self._name = ''
-        self._found: list[Reading] = []
-
-    def feed(self, chunk: bytes) -> None:
-        self._parser.Parse(chunk, not chunk)
-
-    def take(self) -> list[Reading]:
-        found, self._found = self._found, []
-        return found
+        self._point: dict[str, str] | None = None  # attributes, time and speed of the open one
 
     def _refuse(self, *_: object) -> None:
         raise ImportDataError(
@@ -96,52 +86,38 @@ class _Points:
             raise ImportDataError(f'the elements of the file stand more than {_DEEPEST} deep')
         self._name = name.rpartition(' ')[2]
         if self._name == 'trkpt':
-            self._where = attributes
-            self._texts = {}
+            self._point = {**attributes, 'time': '', 'speed': ''}
         elif self._name in ('wpt', 'rtept'):
             self._tally.not_used[self._name] += 1
 
     def _text(self, text: str) -> None:
-        if self._where is None or self._name not in ('time', 'speed'):
-            return
-        have = self._texts.get(self._name, '')
-        if len(have) <= _LONGEST:
-            self._texts[self._name] = have + text
+        point = self._point
+        if point is not None and self._name in ('time', 'speed'):
+            point[self._name] = (point[self._name] + text)[:_LONGEST]
 
     def _end(self, name: str) -> None:
         self._depth -= 1
         self._name = ''
-        if name.rpartition(' ')[2] == 'trkpt' and self._where is not None:
-            where, self._where = self._where, None
+        if name.rpartition(' ')[2] == 'trkpt' and self._point is not None:
             self._tally.records += 1
-            self._point(where)
+            self._take(**self._point)
+            self._point = None
 
-    def _point(self, where: dict[str, str]) -> None:
-        text = self._texts.get('time', '').strip()
+    def _take(self, time: str, speed: str, lat: str = '', lon: str = '', **_: str) -> None:
+        text = time.strip()
         stamp_ns = iso_ns(text, UTC)
         if stamp_ns is None:
-            self._tally.reject('time', 'no time of the point' if not text else 'no time', text)
+            self._tally.reject('time', 'no time' if text else 'no time of the point', text)
             return
-        latitude, longitude = where.get('lat', ''), where.get('lon', '')
-        if _is_coordinate(latitude, 90.0) and _is_coordinate(longitude, 180.0):
-            self._found.append(
-                Reading(
-                    Channel.POSITION_GEODETIC,
-                    _POSITION,
-                    stamp_ns,
-                    float(latitude),
-                    float(longitude),
-                )
-            )
+        if _is_coordinate(lat, 90.0) and _is_coordinate(lon, 180.0):
+            where = float(lat), float(lon)
+            self.found.append(Reading(Channel.POSITION_GEODETIC, _POSITION, stamp_ns, *where))
         else:
-            self._tally.reject('position', 'no latitude and longitude', f'{latitude},{longitude}')
-        if speed := self._texts.get('speed', '').strip():
-            if _NUMBER.fullmatch(speed):
-                self._found.append(
-                    Reading(Channel.SPEED_OVER_GROUND, _SPEED, stamp_ns, float(speed))
-                )
-            else:
-                self._tally.reject('speed_over_ground', 'not a number', speed)
+            self._tally.reject('position', 'no latitude and longitude', f'{lat},{lon}')
+        if _NUMBER.fullmatch(speed.strip()):
+            self.found.append(Reading(Channel.SPEED_OVER_GROUND, _SPEED, stamp_ns, float(speed)))
+        elif speed.strip():
+            self._tally.reject('speed_over_ground', 'not a number', speed)
 
 
 def _is_coordinate(text: str, largest: float) -> bool:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import bz2
 import sqlite3
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -30,11 +30,12 @@ from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
+    ImportResult,
     Log,
-    Rejected,
-    Understood,
+    most_of,
     rejected_words,
 )
+from shipdrag_ros.sources.stream import Tally
 
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20
@@ -42,43 +43,26 @@ _MESSAGE_BYTES = 16 << 20
 _TAKEN = {name for names in TOPICS.values() for name in names}
 
 
-@dataclass(frozen=True)
-class CopyResult:
+@dataclass(frozen=True, kw_only=True)
+class CopyResult(ImportResult):
     """
-    What became of a bag.
+    What became of a bag; all of it is by topic.
 
     Attributes
     ----------
     kind
         Of the bag.
-    written
-        Messages by topic.
     inputs
         Topic that carries each input, without any `--remap`.
-    not_used
-        Messages of types that carry no input, by topic.
-    rejected
-        By topic and reason.
-    notes, understood
-        See `stream.StreamResult`.
     """
 
     kind: str
-    written: dict[str, int]
-    inputs: dict[str, str]
-    not_used: dict[str, int]
-    rejected: dict[str, dict[str, Rejected]]
-    notes: tuple[str, ...]
-    understood: tuple[Understood, ...] = ()
+    inputs: Mapping[str, str]
 
-    def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was copied.
-        """
-        lines = [f'{bag}: {sum(self.written.values())} messages of a bag of {self.kind}']
-        if not self.inputs:
-            lines.append('No topic has the name of an input: give replay --remap TOPIC:=INPUT.')
-        return [*lines, *self.notes]
+    @property
+    def size(self) -> str:
+        """What was read."""
+        return f'a bag of {self.kind}'
 
     def table(self) -> Table:
         """
@@ -90,15 +74,9 @@ class CopyResult:
             tuple((topic, carried.get(topic, '-'), f'{n}') for topic, n in self.written.items()),
         )
 
-    def details(self) -> list[str]:
-        """
-        Say what was not copied, and why.
-        """
-        lines = rejected_words(self.rejected)
-        if self.not_used:
-            others = ', '.join(f'{topic} {n}' for topic, n in list(self.not_used.items())[:20])
-            lines.append(f'Of types that carry no input: {others}')
-        return lines
+    def _not_used(self) -> list[str]:
+        found = most_of(self.not_used)
+        return [f'Of types that carry no input: {found}'] if self.not_used else []
 
 
 def _score(head: Head) -> float:
@@ -112,59 +90,55 @@ def _open(job: Job, log: Log) -> CopyResult:
     ros1 = first.startswith(_ROS1)
     kind = 'ROS 1' if ros1 else 'rosbag2 (sqlite3)'
 
-    def messages(copy: _Copy | None = None) -> Iterator[EncodedMessage]:
-        return (_ros1 if ros1 else _sqlite)(job.source, copy or _Copy())
+    def messages(tally: Tally | None = None) -> Iterator[EncodedMessage]:
+        return (_ros1 if ros1 else _sqlite)(job.source, tally or Tally())
 
     # read now to count, and again by whoever uses it: it may not fit into memory
-    copy = _Copy()
-    for message in messages(copy):
+    tally = Tally()
+    for message in messages(tally):
         log.counts[message.topic, message.type] += 1
         log.include(message.log_ns)
     if not log.counts:
-        reasons = '; '.join([*copy.notes, *rejected_words(copy.rejected)])
-        others = ', '.join(f'{topic} {n}' for topic, n in copy.not_used.most_common(10))
+        reasons = '; '.join([*tally.notes, *rejected_words(tally.rejected)])
+        others = most_of(tally.not_used)
         raise ImportDataError(
             f'{str(job.source)!r}, a bag of {kind}, holds no message of a type that carries '
             f'an input; {reasons or f"it has {others or 0}"}'
         )
     log.messages = messages
     log.attach(ATTACHMENT, strict_yaml.dump({'source': job.source.name, 'kind': kind}))
-    return copy.result(kind, log.counts)
+    return _result(kind, log, tally)
 
 
-class _Copy:
-    """What becomes of the messages."""
-
-    def __init__(self) -> None:
-        self.not_used: Counter[str] = Counter()
-        self.rejected: dict[str, dict[str, Rejected]] = {}
-        self.notes: list[str] = []
-        self.seen = 0
-
-    def reject(self, topic: str, reason: str, text: str) -> None:
-        self.rejected.setdefault(topic, {}).setdefault(reason, Rejected()).add(self.seen, text)
-
-    def result(self, kind: str, counts: Counter[tuple[str, str]]) -> CopyResult:
-        inputs = {}
-        written: Counter[str] = Counter()
-        for (topic, _), count in counts.items():
-            written[topic] += count
-        try:
-            matched = match_inputs(counts)
-            inputs = {source.input: topic for (topic, _), source in matched.heard.items()}
-        except BagError as error:
-            self.notes.append(str(error))
-        return CopyResult(
-            kind,
-            dict(written),
-            inputs,
-            dict(self.not_used),
-            self.rejected,
-            tuple(self.notes),
+def _result(kind: str, log: Log, tally: Tally) -> CopyResult:
+    """Say which topics carry inputs."""
+    inputs = {}
+    written: Counter[str] = Counter()
+    for (topic, _), count in log.counts.items():
+        written[topic] += count
+    try:
+        matched = match_inputs(log.counts)
+        inputs = {source.input: topic for (topic, _), source in matched.heard.items()}
+    except BagError as error:
+        tally.notes.append(str(error))
+    if not inputs:
+        tally.notes.insert(
+            0, 'No topic has the name of an input: give replay --remap TOPIC:=INPUT.'
         )
+    start_ns, end_ns = log.span_ns or (0, 0)
+    return CopyResult(
+        kind=kind,
+        written=dict(written),
+        inputs=inputs,
+        not_used=dict(tally.not_used),
+        rejected=tally.rejected,
+        notes=tuple(tally.notes),
+        start_ns=start_ns,
+        end_ns=end_ns,
+    )
 
 
-def _ros1(path: Path, copy: _Copy) -> Iterator[EncodedMessage]:
+def _ros1(path: Path, tally: Tally) -> Iterator[EncodedMessage]:
     """Yield the messages of a bag of ROS 1, in the order of their times."""
     try:
         with Reader(path) as reader:
@@ -173,23 +147,23 @@ def _ros1(path: Path, copy: _Copy) -> Iterator[EncodedMessage]:
                 for place, chunk in reader.chunks.items()
             }
             for connection, time_ns, payload in reader.messages():
-                copy.seen += 1
+                tally.records += 1
                 if connection.msgtype not in _TAKEN:
-                    copy.not_used[connection.topic] += 1
+                    tally.not_used[connection.topic] += 1
                     continue
                 if not 0 < time_ns < LIMIT_NS or len(payload) > _MESSAGE_BYTES:
-                    copy.reject(connection.topic, 'no possible date or size', str(time_ns))
+                    tally.reject(connection.topic, 'no possible date or size', str(time_ns))
                     continue
                 try:
                     cdr = types.from_ros1(connection.msgtype, payload)
                 except MalformedMessage as error:
-                    copy.reject(connection.topic, 'malformed', str(error))
+                    tally.reject(connection.topic, 'malformed', str(error))
                     continue
                 yield EncodedMessage(connection.topic, connection.msgtype, cdr, time_ns, time_ns)
     except (GeneratorExit, BagError):
         raise
     except Exception as error:  # the reader raises what a damaged record happens to raise
-        copy.notes.append(
+        tally.notes.append(
             f'The bag could not be read to its end: {error or type(error).__name__}; '
             '`rosbag reindex` may mend it.'
         )
@@ -206,22 +180,22 @@ def _bounded(decompress: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
     return decompress
 
 
-def _sqlite(path: Path, copy: _Copy) -> Iterator[EncodedMessage]:
+def _sqlite(path: Path, tally: Tally) -> Iterator[EncodedMessage]:
     """Yield the messages of the files of a bag of rosbag2."""
     if path.is_dir():
         if any(path.glob('*.db3.zstd')):
-            copy.notes.append('Files packed with zstd are left out; unpack them with `unzstd`.')
+            tally.notes.append('Files packed with zstd are left out; unpack them with `unzstd`.')
         files = sorted(path.glob('*.db3'), key=lambda file: (len(file.name), file.name))
     else:
         files = [path]
     for file in files:
         try:
-            yield from _one_sqlite(file, copy)
+            yield from _one_sqlite(file, tally)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            copy.notes.append(f'{file.name} could not be read to its end: {error}.')
+            tally.notes.append(f'{file.name} could not be read to its end: {error}.')
 
 
-def _one_sqlite(file: Path, copy: _Copy) -> Iterator[EncodedMessage]:
+def _one_sqlite(file: Path, tally: Tally) -> Iterator[EncodedMessage]:
     uri = f'file:{quote(str(file.resolve()))}?mode=ro&immutable=1'
     with closing(sqlite3.connect(uri, uri=True)) as database:
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MESSAGE_BYTES)
@@ -241,14 +215,14 @@ def _one_sqlite(file: Path, copy: _Copy) -> Iterator[EncodedMessage]:
             'select topic_id, timestamp, data from messages order by timestamp'
         )
         for number, time_ns, payload in rows:
-            copy.seen += 1
+            tally.records += 1
             topic, kind, form = topics.get(number, (f'topic {number}', '', ''))
             if kind not in _TAKEN or form != 'cdr':
-                copy.not_used[topic] += 1
+                tally.not_used[topic] += 1
             elif not isinstance(payload, bytes) or not isinstance(time_ns, int):
-                copy.reject(topic, 'no message', repr(payload)[:40])
+                tally.reject(topic, 'no message', repr(payload)[:40])
             elif not 0 < time_ns < LIMIT_NS:
-                copy.reject(topic, 'no possible date', str(time_ns))
+                tally.reject(topic, 'no possible date', str(time_ns))
             else:
                 yield EncodedMessage(topic, kind, payload, time_ns, time_ns)
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import UTC
+from itertools import accumulate
 from math import cos, pi, remainder, sin
 from typing import Any, TypeGuard
 
@@ -20,18 +21,21 @@ from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, re
 _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')
 _DEEPEST = 12  # brackets in a delta
-_PLAIN: dict[str, tuple[Channel, int, Callable[[float], float]]] = {
-    'navigation.speedThroughWater': (Channel.SPEED_THROUGH_WATER, 0, float),
-    'navigation.speedThroughWaterLongitudinal': (Channel.SPEED_THROUGH_WATER, 1, float),
-    'navigation.speedOverGround': (Channel.SPEED_OVER_GROUND, 0, float),
-    'navigation.headingTrue': (Channel.HEADING, 0, lambda a: remainder(pi / 2 - a, 2 * pi)),
-    'navigation.headingMagnetic': (Channel.HEADING, 1, lambda a: remainder(pi / 2 - a, 2 * pi)),
-    'steering.rudderAngle': (Channel.RUDDER, 0, float),
-    'environment.depth.belowSurface': (Channel.DEPTH, 0, float),
+_PLAIN: dict[str, tuple[Channel, int]] = {
+    'navigation.speedThroughWater': (Channel.SPEED_THROUGH_WATER, 0),
+    'navigation.speedThroughWaterLongitudinal': (Channel.SPEED_THROUGH_WATER, 1),
+    'navigation.speedOverGround': (Channel.SPEED_OVER_GROUND, 0),
+    'navigation.headingTrue': (Channel.HEADING, 0),
+    'navigation.headingMagnetic': (Channel.HEADING, 1),
+    'steering.rudderAngle': (Channel.RUDDER, 0),
+    'environment.depth.belowSurface': (Channel.DEPTH, 0),
 }
+_MAGNETIC = 'MAGNETIC: good for finding turns, not for directions over ground.'
+_POSITION = 'navigation.position'
 _SPEED, _ANGLE = 'environment.wind.speedApparent', 'environment.wind.angleApparent'
-_WIND = Origin(0, 'environment.wind')
 _TOGETHER_NS = 2_000_000_000  # a wind's speed and angle that far apart are not one measurement
+_ENGINE = re.compile(r'propulsion\.([^.]+)\.(?:.*\.)?revolutions')
+_SHAFTS = {'starboard': 1, '1': 1, '2': 2, '3': 3}
 
 
 def _score(head: Head) -> float:
@@ -71,7 +75,7 @@ class _Deltas:
         self._winds: dict[tuple[str, str], tuple[int, float]] = {}
 
     def read(self, job: Job) -> Iterator[Reading]:
-        lines = Lines(job.source)
+        lines = Lines(job.source, progress=job.progress)
         for line in lines:
             self._tally.records += 1
             if line:
@@ -79,17 +83,14 @@ class _Deltas:
         if lines.damage:
             self._tally.note(f'The log could not be read to its end, {lines.damage}.')
         if lines.too_long:
-            self._tally.note(f'{lines.too_long} lines were too long for a delta.')
+            self._tally.note(f'{len(lines.too_long)} lines were too long for a delta.')
 
     def _line(self, line: str) -> Iterator[Reading]:
         text = line[line.find('{') :] if '{' in line[:200] else line  # behind a time or a source
-        depth = 0
-        for letter in text:  # before the parser, which goes as deep as its text
-            depth += letter in '[{'
-            depth -= letter in ']}'
-            if depth > _DEEPEST:
-                self._tally.reject('line', f'more than {_DEEPEST} brackets deep', line)
-                return
+        # before the parser, which goes as deep as its text
+        if max(accumulate((c in '[{') - (c in ']}') for c in text), default=0) > _DEEPEST:
+            self._tally.reject('line', f'more than {_DEEPEST} brackets deep', line)
+            return
         try:
             delta = json.loads(text)
         except (ValueError, RecursionError):
@@ -98,91 +99,76 @@ class _Deltas:
         updates = delta.get('updates') if isinstance(delta, dict) else None
         if not isinstance(updates, list):
             self._tally.reject('line', 'no delta', line)
-            return
-        if not self._is_own(delta.get('context')):
-            return
-        for update in updates:
-            if isinstance(update, dict):
-                yield from self._update(update)
+        elif self._is_own(delta.get('context')):
+            for update in updates:
+                if isinstance(update, dict) and isinstance(update.get('values'), list):
+                    yield from self._update(update)
 
     def _is_own(self, context: Any) -> bool:
         """Say whether a delta is of the ship of the log, and not of another that AIS shows."""
         if context in (None, '', _SELF, self._own):
             return True
-        if not isinstance(context, str) or context != self._own:
-            self._tally.note(f'The own vessel is taken to be {self._own}.')
-            self._tally.not_used['deltas of other vessels'] += 1
-            return False
-        return True
+        self._tally.note(f'The own vessel is taken to be {self._own}.')
+        self._tally.not_used['deltas of other vessels'] += 1
+        return False
 
     def _update(self, update: dict[str, Any]) -> Iterator[Reading]:
         stamp_ns = iso_ns(str(update.get('timestamp', '')), UTC)
-        values = update.get('values')
-        if not isinstance(values, list):
-            return
         if stamp_ns is None:
             self._tally.reject('time', 'no time of an update', str(update.get('timestamp')))
             return
         source = update.get('$source') or update.get('source') or ''
         if isinstance(source, dict):
             source = source.get('label', '')
-        for value in values:
-            if isinstance(value, dict) and isinstance(value.get('path'), str):
-                yield from self._value(value['path'], value.get('value'), stamp_ns, str(source))
+        for each in update['values']:
+            if isinstance(each, dict) and isinstance(path := each.get('path'), str):
+                found = self._value(path, each.get('value'), stamp_ns, str(source))
+                if found is not None:
+                    yield found
 
-    def _value(self, path: str, value: Any, stamp_ns: int, source: str) -> Iterator[Reading]:
-        name = f'{path} {source}'.strip()
-        if path == 'navigation.position':
+    def _value(self, path: str, value: Any, stamp_ns: int, source: str) -> Reading | None:
+        origin = Origin(0, f'{path} {source}'.strip())
+        engine = _ENGINE.fullmatch(path)
+        if path == _POSITION:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
             if _is_number(latitude) and _is_number(longitude) and abs(latitude) <= 90.0:
-                origin = Origin(0, name, 'deg')
-                channel = Channel.POSITION_GEODETIC
-                yield Reading(channel, origin, stamp_ns, float(latitude), float(longitude))
-            else:
-                self._tally.reject('position', 'no latitude and longitude', str(value))
-        elif path in _PLAIN:
-            channel, rank, turn = _PLAIN[path]
-            if _is_number(value):
-                if path == 'navigation.headingMagnetic':
-                    self._tally.note(
-                        'A heading is MAGNETIC: good for finding turns, not for directions over '
-                        'ground.'
-                    )
-                yield Reading(channel, Origin(rank, name), stamp_ns, turn(float(value)))
-            else:
-                self._tally.reject(channel.input, 'no number', f'{path} {value}')
-        elif path in (_SPEED, _ANGLE):
-            yield from self._wind(path, value, stamp_ns, source)
-        elif path.startswith('propulsion.') and path.endswith('.revolutions'):
-            yield from self._engine(path, value, stamp_ns, source)
-        else:
+                origin = origin._replace(unit='deg')
+                return Reading(
+                    Channel.POSITION_GEODETIC, origin, stamp_ns, float(latitude), float(longitude)
+                )
+            self._tally.reject('position', 'no latitude and longitude', str(value))
+        elif engine is not None and self._gear is None:
+            self._tally.not_used[f'{path} (of the engine: --gear RATIO makes it the shaft)'] += 1
+        elif engine is None and path not in (*_PLAIN, _SPEED, _ANGLE):
             self._tally.not_used[path] += 1
+        elif not _is_number(value):
+            wind = Channel.WIND_APPARENT
+            channel = Channel.SHAFT if engine is not None else _PLAIN.get(path, (wind, 0))[0]
+            self._tally.reject(channel.input, 'no number', f'{path} {value}')
+        elif engine is not None and self._gear is not None:
+            rate = float(value) * 2.0 * pi / self._gear
+            return Reading(SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], origin, stamp_ns, rate)
+        elif path in _PLAIN:
+            channel, rank = _PLAIN[path]
+            if channel is Channel.HEADING:
+                value = remainder(pi / 2.0 - value, 2.0 * pi)
+            if path == 'navigation.headingMagnetic':
+                self._tally.note(f'A heading is {_MAGNETIC}')
+            return Reading(channel, origin._replace(rank=rank), stamp_ns, float(value))
+        else:
+            return self._wind(path, float(value), stamp_ns, source)
+        return None
 
-    def _wind(self, path: str, value: Any, stamp_ns: int, source: str) -> Iterator[Reading]:
-        if not _is_number(value):
-            self._tally.reject('wind_apparent', 'no number', f'{path} {value}')
-            return
-        self._winds[path, source] = (stamp_ns, float(value))
+    def _wind(self, path: str, value: float, stamp_ns: int, source: str) -> Reading | None:
+        self._winds[path, source] = (stamp_ns, value)
         speed, angle = self._winds.get((_SPEED, source)), self._winds.get((_ANGLE, source))
         if speed is None or angle is None or abs(speed[0] - angle[0]) > _TOGETHER_NS:
-            return
+            return None
         del self._winds[_SPEED, source], self._winds[_ANGLE, source]
-        origin = Origin(0, f'{_WIND.name} {source}'.strip())
+        origin = Origin(0, f'environment.wind {source}'.strip())
         ahead, port = -speed[1] * cos(angle[1]), speed[1] * sin(angle[1])
-        yield Reading(Channel.WIND_APPARENT, origin, max(speed[0], angle[0]), ahead, port)
-
-    def _engine(self, path: str, value: Any, stamp_ns: int, source: str) -> Iterator[Reading]:
-        if self._gear is None:
-            self._tally.not_used[f'{path} (of the engine: --gear RATIO makes it the shaft)'] += 1
-            return
-        if not _is_number(value):
-            self._tally.reject('shaft', 'no number', f'{path} {value}')
-            return
-        name = path.split('.')[1]
-        place = {'starboard': 1, '1': 1, '2': 2, '3': 3}.get(name.lower(), 0)
-        rate = float(value) * 2.0 * pi / self._gear
-        yield Reading(SHAFTS[place], Origin(0, f'{path} {source}'.strip()), stamp_ns, rate)
+        return Reading(Channel.WIND_APPARENT, origin, max(speed[0], angle[0]), ahead, port)
 
 
 def _is_number(value: Any) -> TypeGuard[float]:

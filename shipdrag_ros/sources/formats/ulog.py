@@ -10,23 +10,18 @@ from math import pi, remainder
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job, missing_library
-from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.log import BASE_NS, UNDATED, Log
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
 
 _MAGIC = b'ULog\x01\x12\x35'
-_BASE_NS = 946_684_800 * 10**9  # 2000-01-01, for a log that never had a fix
 _LIMIT_BYTES = 2 << 30  # pyulog holds the whole log in memory
-_TOPICS = (
-    'vehicle_gps_position',
-    'sensor_gps',
-    'vehicle_global_position',
-    'vehicle_attitude',
-    'esc_status',
-)
+_TOPICS = ['vehicle_gps_position', 'sensor_gps', 'vehicle_global_position', 'vehicle_attitude']
+_TOPICS += ['esc_status']
 _GPS = _TOPICS[:2]
 _FIX = 3
 
@@ -46,7 +41,7 @@ def _open(job: Job, log: Log) -> StreamResult:
         )
     try:
         with redirect_stdout(StringIO()):  # it prints what it finds
-            found = ULog(str(job.source), list(_TOPICS), True)
+            found = ULog(str(job.source), _TOPICS, True)
     except Exception as error:  # the parser raises what a damaged byte happens to raise
         raise ImportDataError(
             f'{str(job.source)!r} is an ULog that cannot be read: {error or type(error).__name__}'
@@ -67,69 +62,61 @@ def _open(job: Job, log: Log) -> StreamResult:
 
 def _read(log: Any, tally: Tally) -> Iterator[Reading]:
     """Yield the readings of all topics by time."""
-    epoch_us = _epoch_us(log)
-    if epoch_us is None:
-        tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
+    base_ns = _base_ns(log)
+    if base_ns == BASE_NS:
+        tally.note(UNDATED)
     found: list[Reading] = []
     for data in log.data_list:
-        name = data.name if data.multi_id == 0 else f'{data.name} {data.multi_id}'
         columns = {key: np.asarray(value) for key, value in data.data.items()}
-        times = columns.get('timestamp')
-        if times is None:
+        if 'timestamp' not in columns:
             continue
-        tally.records += len(times)
-        base_ns = _BASE_NS if epoch_us is None else epoch_us * 1000
-        stamps = [int(each) * 1000 + base_ns for each in times.tolist()]
+        stamps = [int(each) * 1000 + base_ns for each in columns['timestamp'].tolist()]
+        tally.records += len(stamps)
+        name = data.name if data.multi_id == 0 else f'{data.name} {data.multi_id}'
+        origin = Origin(_TOPICS.index(data.name), name)
         for channel, a, b in _values(data.name, columns):
-            origin = Origin(_TOPICS.index(data.name), name)
+            values = zip(stamps, *np.broadcast_arrays(a, b), strict=True)
             found += [
-                Reading(channel, origin, stamp_ns, one, two)
-                for stamp_ns, one, two in zip(stamps, a.tolist(), b.tolist(), strict=True)
+                Reading(channel, origin, stamp_ns, float(one), float(two))
+                for stamp_ns, one, two in values
                 if np.isfinite(one) and np.isfinite(two)
             ]
     yield from sorted(found, key=lambda reading: reading.stamp_ns)
 
 
-def _epoch_us(log: Any) -> int | None:
-    """Return the date of time 0 [us], of the first fix that gives one."""
+def _base_ns(log: Any) -> int:
+    """Return the date of time 0, of the first fix that gives one."""
     for data in log.data_list:
-        utc = data.data.get('time_utc_usec')
-        if data.name in _GPS and utc is not None:
-            known = np.flatnonzero(np.asarray(utc) > 10**15)
-            if len(known):
-                return int(utc[known[0]]) - int(data.data['timestamp'][known[0]])
-    return None
+        utc = np.asarray(data.data.get('time_utc_usec', ())) if data.name in _GPS else np.empty(0)
+        known = np.flatnonzero(utc > 10**15)
+        if len(known):
+            return 1000 * (int(utc[known[0]]) - int(data.data['timestamp'][known[0]]))
+    return BASE_NS
 
 
-def _values(name: str, columns: dict[str, Any]) -> Iterator[tuple[Channel, Float64, Float64]]:
+def _values(name: str, columns: dict[str, Any]) -> Iterator[tuple[Channel, Float64, ArrayLike]]:
     if name in _GPS and 'fix_type' in columns:
         fixed = np.where(columns['fix_type'] >= _FIX, 1.0, np.nan)
         if 'latitude_deg' in columns:
-            latitude, longitude = columns['latitude_deg'] * fixed, columns['longitude_deg'] * fixed
-            yield Channel.POSITION_GEODETIC, latitude, longitude
+            where = columns['latitude_deg'] * fixed, columns['longitude_deg'] * fixed
+            yield Channel.POSITION_GEODETIC, *where
         elif 'lat' in columns and columns['lat'].dtype.kind == 'i':
-            yield (
-                Channel.POSITION_GEODETIC,
-                columns['lat'] * 1e-7 * fixed,
-                columns['lon'] * 1e-7 * fixed,
-            )
+            where = columns['lat'] * 1e-7 * fixed, columns['lon'] * 1e-7 * fixed
+            yield Channel.POSITION_GEODETIC, *where
         if 'vel_m_s' in columns:
-            speed = columns['vel_m_s'].astype(np.float64) * fixed
-            yield Channel.SPEED_OVER_GROUND, speed, np.zeros(len(speed))
+            yield Channel.SPEED_OVER_GROUND, columns['vel_m_s'].astype(np.float64) * fixed, 0.0
     elif name == 'vehicle_global_position' and 'lat' in columns:
-        latitude, longitude = columns['lat'], columns['lon']
-        if latitude.dtype.kind == 'f':
-            yield Channel.POSITION_GEODETIC, latitude, longitude
+        if columns['lat'].dtype.kind == 'f':
+            yield Channel.POSITION_GEODETIC, columns['lat'], columns['lon']
     elif name == 'vehicle_attitude' and 'q[3]' in columns:
         w, x, y, z = (columns[f'q[{k}]'].astype(np.float64) for k in range(4))
         # from north, clockwise; REP-103 counts from east and the other way
         north = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        yaw = np.array([remainder(pi / 2.0 - each, 2.0 * pi) for each in north])
-        yield Channel.HEADING, yaw, np.zeros(len(yaw))
+        yield Channel.HEADING, np.array([remainder(pi / 2.0 - a, 2.0 * pi) for a in north]), 0.0
     elif name == 'esc_status':
         for place, channel in enumerate(SHAFTS):
             if (rpm := columns.get(f'esc[{place}].esc_rpm')) is not None:
-                yield channel, rpm * pi / 30.0, np.zeros(len(rpm))
+                yield channel, rpm * pi / 30.0, 0.0
 
 
 FORMAT = Format(

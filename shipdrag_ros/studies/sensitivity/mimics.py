@@ -18,7 +18,7 @@ from shipdrag_ros.parameter import Prior, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Effect, Frame
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.studies.sensitivity.coast import Coast, Particular
 
 WORST = 0.5  # relative error beyond which no value is thought to be wrong
@@ -74,7 +74,9 @@ def mimics(
         that move nothing in this coastdown.
     """
     stated = {effect.name for effect in ship.effects}
-    effects = [e for e in LIBRARY.values() if not e.missing(ship) and e.name not in stated]
+    effects = [
+        e for e in effects_of(ship).values() if not e.missing(ship) and e.name not in stated
+    ]
     frame = Frame(ship, coast.scenario, coast.scenario.heading_rad)
     sizes = [_usual_values(effect, ship) for effect in effects]
     actions = [effect.action(frame, *size) for effect, size in zip(effects, sizes)]

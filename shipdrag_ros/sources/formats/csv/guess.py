@@ -401,6 +401,23 @@ class _Guesser:
         if text not in self.found.unclear:
             self.found.unclear.append(text)
 
+    def _ask(
+        self,
+        name: str,
+        columns: Sequence[NamedColumn],
+        units: Sequence[str],
+        *,
+        why: str = 'unit not known',
+        other: str = 'another unit',
+    ) -> None:
+        """Say why columns are not used, and what to type."""
+        keys = ', '.join(repr(each.key) for each in columns)
+        typed = ','.join(f'{each.typed}:{unit}' for each, unit in zip(columns, units, strict=True))
+        if len(set(units)) == 1:  # given once it holds for all
+            typed = typed.replace(f':{units[0]},', ',')
+        speeds = f'--speed-unit {_SPEED_UNIT} or m/s, or ' if _SPEED_UNIT in units else ''
+        self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
+
     def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
         self.found.inputs.append(columns_of(name, [each.key for each in columns], list(units)))
 
@@ -437,52 +454,43 @@ class _Guesser:
     # columns by their usual names
 
     def by_names(self, time: TimeColumn | None) -> None:
-        self._position(time)
-        known = [
-            self._speed('stw', 'speed_through_water'),
-            self._speed('sog', 'speed_over_ground'),
-        ]
-        if not known[1]:
+        self._position(self._rows.seconds(time))
+        self._speed('stw', 'speed_through_water')
+        if not self._speed('sog', 'speed_over_ground'):
             self._components()
         self._heading()
         self._rudder()
         self._wind()
-        for role, name, units in (('shaft', 'shaft', 'rpm'), ('depth', 'depth', 'm')):
-            column = self._one(role)
+        for name, unit in (('shaft', 'rpm'), ('depth', 'm')):
+            column = self._one(name)
             if column is None:
                 continue
             try:
                 self._take(name, [column], [column.unit])
             except ImportDataError:  # of none, or of another quantity
-                self._unit_unknown(column, name, units)
+                self._ask(name, [column], [unit])
 
-    def _position(self, time: TimeColumn | None) -> None:
+    def _position(self, time_s: Float64 | None) -> None:
         latitude, longitude = self._one('lat'), self._one('lon')
         x, y = self._one('x'), self._one('y')
-        time_s = self._rows.seconds(time)
         if latitude is not None and longitude is not None:
-            for unit in (latitude.unit, longitude.unit):
-                if unit in _NO_COORDINATES:
-                    self._doubt(
-                        f'{latitude.key!r}, {longitude.key!r}: coordinates in {unit} are not read'
-                    )
-                    return
-            self._take('position', [latitude, longitude], ['deg', 'deg'])
+            both = [latitude, longitude]
+            other = next((each.unit for each in both if each.unit in _NO_COORDINATES), '')
+            if other:
+                keys = ', '.join(repr(each.key) for each in both)
+                self._doubt(f'{keys}: coordinates in {other} are not read')
+                return
+            self._take('position', both, ['deg', 'deg'])
             if time_s is not None:
-                values = self._rows.coordinates([latitude.place, longitude.place])
+                values = self._rows.coordinates([each.place for each in both])
                 self._track = track_speed(time_s, *values)
         elif x is not None and y is not None:
-            if x.unit == y.unit and x.unit in ('m', 'km', 'ft', 'nmi'):
-                self._take('position', [x, y], [x.unit, y.unit])
-                if time_s is not None and x.unit == 'm':
-                    self._track = plane_speed(
-                        time_s, self._rows.values(x.place), self._rows.values(y.place)
-                    )
-            else:
-                self._doubt(
-                    f'{x.key!r}, {y.key!r}: unit not known; --map '
-                    f'{shlex.quote(f"position={x.typed},{y.typed}:m")}'
-                )
+            if x.unit != y.unit or x.unit not in ('m', 'km', 'ft', 'nmi'):
+                self._ask('position', [x, y], ['m', 'm'])
+                return
+            self._take('position', [x, y], [x.unit, y.unit])
+            if time_s is not None and x.unit == 'm':
+                self._track = plane_speed(time_s, *map(self._rows.values, (x.place, y.place)))
 
     def _speed(self, role: str, name: str) -> bool:
         column = self._one(role)
@@ -491,25 +499,23 @@ class _Guesser:
         values = self._rows.values(column.place)
         unit = self._unit_of_speed(column)
         seen = '' if self._track is None else unit_of(values, self._track, unit)
-        if column.unit and not unit:
-            self._unit_unknown(column, name, _SPEED_UNIT)
-            return False
         if unit and seen and seen != unit:
+            why = f'is said to be in {unit}, and agrees with the positions in {seen}'
             self._doubt(
-                f'{column.key!r} is said to be in {unit}, and agrees with the positions in '
-                f'{seen}; --map {shlex.quote(f"{name}={column.typed}:{unit}")}, or {seen}'
+                f'{column.key!r} {why}; --map '
+                f'{shlex.quote(f"{name}={column.typed}:{unit}")}, or {seen}'
             )
             return False
-        if not unit and seen:
+        if not (unit or seen) or (column.unit and not unit):
+            self._ask(name, [column], [_SPEED_UNIT])
+            return False
+        if not unit:
             self.found.notes.append(
                 f'{column.key!r} states no unit; it agrees with the way between the positions in '
                 f'{seen}.'
             )
-        if not (unit or seen):
-            self._unit_unknown(column, name, _SPEED_UNIT)
-            return False
         self._take(name, [column], [unit or seen])
-        if self._track is None:  # the other speed is held against this one
+        if self._track is None:  # the other speed is compared with this one
             self._track = values * SPEED_UNITS[unit or seen]
         return True
 
@@ -525,10 +531,8 @@ class _Guesser:
             return
         unit = east.unit if east.unit == north.unit else ''
         if not unit and self._track is not None:
-            unit = unit_of(
-                np.hypot(self._rows.values(east.place), self._rows.values(north.place)),
-                self._track,
-            )
+            speed = np.hypot(*map(self._rows.values, (east.place, north.place)))
+            unit = unit_of(speed, self._track)
             if unit:
                 self.found.notes.append(
                     f'{east.key!r}, {north.key!r} agree with the way between the positions in '
@@ -538,64 +542,49 @@ class _Guesser:
         if unit in SPEED_UNITS:
             self._take('speed_over_ground', [east, north], [unit, unit])
         else:
-            self._doubt(
-                f'{east.key!r}, {north.key!r}: unit not known; --map '
-                f'{shlex.quote(f"speed_over_ground={east.typed},{north.typed}:m/s")}, or another'
-            )
+            self._ask('speed_over_ground', [east, north], ['m/s', 'm/s'])
 
     def _heading(self) -> None:
         column = self._one('heading')
         if column is None:
             return
-        largest = self._rows.largest(column.place)
         if column.unit == 'rad' and column.key.lower() == 'heading_rad':
             self._take('heading', [column], ['rad'])
             self.found.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
             )
-        elif column.unit == 'deg' or (not column.unit and largest > _TURN):
+        elif self._angle_unit(column) == 'deg':
             self._take('heading', [column], [COMPASS])
             self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:
             unit = column.unit if column.unit == 'rad' else COMPASS
-            self._doubt(
-                f'{column.key!r}: whether it is yaw or compass, or its unit, is not known; --map '
-                f'{shlex.quote(f"heading={column.typed}:{unit}")}, or rad deg '
-                'compass'
-            )
+            why = 'whether it is yaw or compass, or its unit, is not known'
+            self._ask('heading', [column], [unit], why=why, other='rad deg compass')
 
     def _rudder(self) -> None:
         column = self._one('rudder')
         if column is None:
             return
-        unit = column.unit or ('deg' if self._rows.largest(column.place) > _TURN else '')
+        unit = self._angle_unit(column)
         if unit in ('deg', 'rad'):
             self._take('rudder', [column], [unit])
         else:
-            self._unit_unknown(column, 'rudder', 'deg')
+            self._ask('rudder', [column], ['deg'])
 
     def _wind(self) -> None:
         speed, angle = self._one('aws'), self._one('awa')
         if speed is None or angle is None:
             return
-        unit = self._unit_of_speed(speed)
-        turn = angle.unit or ('deg' if self._rows.largest(angle.place) > _TURN else '')
+        unit, turn = self._unit_of_speed(speed), self._angle_unit(angle)
         if unit and turn in ('deg', 'rad'):
             self._take('wind_apparent', [speed, angle], [unit, turn])
         else:
             turn = turn if turn in ('deg', 'rad') else 'deg'
-            typed = f'wind_apparent={speed.typed}:{_SPEED_UNIT},{angle.typed}:{turn}'
-            self._doubt(
-                f'{speed.key!r}, {angle.key!r}: unit not known; --speed-unit {_SPEED_UNIT} or '
-                f'm/s, or --map {shlex.quote(typed)}'
-            )
+            self._ask('wind_apparent', [speed, angle], [_SPEED_UNIT, turn])
 
-    def _unit_unknown(self, column: NamedColumn, name: str, unit: str) -> None:
-        speeds = f'--speed-unit {unit} or m/s, or ' if unit in SPEED_UNITS else ''
-        self._doubt(
-            f'{column.key!r}: unit not known; {speeds}--map '
-            f'{shlex.quote(f"{name}={column.typed}:{unit}")}, or another unit'
-        )
+    def _angle_unit(self, column: NamedColumn) -> str:
+        """Return the unit that is stated, or that the values show; '' for neither."""
+        return column.unit or ('deg' if self._rows.largest(column.place) > _TURN else '')
 
     def nothing(self) -> str:
         """Say that nothing that moves is known, and what to type."""

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,15 +29,24 @@ from shipdrag_ros.sources.formats.csv.cells import (
     has_decimal_commas,
 )
 from shipdrag_ros.sources.formats.csv.columns import InputColumns, TimeColumn
-from shipdrag_ros.sources.formats.csv.row_clock import BASE_NS, RowClock
-from shipdrag_ros.sources.log import ATTACHMENT, Log, Rejected, Understood
+from shipdrag_ros.sources.formats.csv.row_clock import RowClock
+from shipdrag_ros.sources.log import (
+    ATTACHMENT,
+    BASE_NS,
+    ImportResult,
+    Log,
+    Rejected,
+    Understood,
+    most_of,
+    rejected_words,
+)
 from shipdrag_ros.sources.table import Cells, LogTable, TableRows
 
 
-@dataclass(frozen=True)
-class TableResult:
+@dataclass(frozen=True, kw_only=True)
+class TableResult(ImportResult):
     """
-    What became of a table.
+    What became of a table; `not_used` are columns, and out of order are rows.
 
     Attributes
     ----------
@@ -44,95 +54,40 @@ class TableResult:
         Below the header.
     left_out
         Rows that `where` does not choose.
-    written
-        Samples by input; pitches are of `shaft`.
-    rejected
-        By input, or 'time' for a whole row, and reason.
-    start_ns, end_ns
-        First and last time written [ns].
     base_ns
         What was added to the times of the table [ns]; None if they are dates.
-    backward
-        Rows whose time is before that of an earlier row; a replay rejects
-        them and says so.
-    repeated
-        Rows whose time is that of the newest row before; a replay rejects them
-        too.
     delimiter
         That of the table.
     header
         Whether the table has one.
-    understood
-        What each input was taken from.
-    notes
-        What is to be known of it, a sentence each.
-    not_used
-        Columns that nothing is taken from.
     """
 
     rows: int
     left_out: int
-    written: dict[str, int]
-    rejected: dict[str, dict[str, Rejected]]
-    start_ns: int
-    end_ns: int
     base_ns: int | None
-    backward: int
-    repeated: int
     delimiter: str
     header: bool
-    understood: tuple[Understood, ...]
-    notes: tuple[str, ...]
-    not_used: tuple[str, ...]
+    counted: ClassVar = ('rows', '')
+
+    @property
+    def size(self) -> str:
+        """What was read."""
+        return f'{self.rows - self.left_out} rows'
 
     def summary(self, bag: Path) -> list[str]:
         """
         Say how much was read, and what is to be known of it.
         """
-        length_s = (self.end_ns - self.start_ns) * 1e-9
-        lines = [
-            f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
-            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
-        ]
+        first, *others = super().summary(bag)
         if self.base_ns is not None:
-            lines.append(
-                f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
-            )
-        lines += self.notes
+            since = f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
+            others = [since, *others]
         if self.left_out:
-            lines.append(f'{self.left_out} rows were not chosen by --where.')
-        if self.backward:
-            lines.append(
-                f'In {self.backward} rows the time is before that of an earlier row; a replay '
-                'rejects those.'
-            )
-        if self.repeated:
-            lines.append(
-                f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
-                'those.'
-            )
-        return lines
+            others.append(f'{self.left_out} rows were not chosen by --where.')
+        return [first, *others]
 
-    def table(self) -> display.Table:
-        """
-        Return messages by input.
-        """
-        return display.Table(
-            ('input', 'messages'), tuple((name, f'{n}') for name, n in self.written.items())
-        )
-
-    def details(self) -> list[str]:
-        """
-        Say what was not used, and why.
-        """
-        lines = [
-            f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
-            for name, reasons in self.rejected.items()
-            for reason, rejected in reasons.items()
-        ]
-        if self.not_used:
-            lines.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
-        return lines
+    def _not_used(self) -> list[str]:
+        return [f'Columns not used: {most_of(self.not_used)}'] if self.not_used else []
 
 
 _FEW = 10
@@ -380,11 +335,7 @@ class _RowSamples:
     def _why_not(self) -> str:
         if self._left_out == self._rows and self._seen:
             return f'--where chooses none of them: the column holds {", ".join(self._seen)}'
-        reasons = [
-            f'{name}: {reason} {rejected.count} times, {"; ".join(rejected.first)}'
-            for name, by_reason in self._rejected.items()
-            for reason, rejected in by_reason.items()
-        ]
+        reasons = rejected_words(self._rejected)
         if not reasons:
             return 'give a table with a line a sample'
         return (

@@ -28,9 +28,6 @@ from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, TimeColumn
 from shipdrag_ros.sources.log import LIMIT_NS
 from shipdrag_ros.sources.table import Cells, LogTable, texts_of
 
-BASE_NS = 946_684_800 * SECOND_NS
-"""2000-01-01, where a time that counts from the start of a test begins."""
-
 # a count of seconds below this, March 1973, is no date
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _DAY_NS = 86_400 * SECOND_NS

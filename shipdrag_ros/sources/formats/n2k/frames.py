@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from datetime import UTC
 from typing import NamedTuple
 
@@ -13,41 +12,32 @@ from shipdrag_ros.sources.log import iso_ns
 
 MINUTE_NS = 60 * SECOND_NS
 DAY_NS = 1440 * MINUTE_NS
-_HEX = r'[0-9A-Fa-f]'
-# can-utils: `candump -L`, `candump -ta`, `candump`, and a format of its old versions
-_CANDUMP_LOG = re.compile(
-    rf'\((\d{{1,10}})\.(\d{{1,9}})\)\s+\S+\s+({_HEX}{{8}})#({_HEX}*)\s*[RT]?'
+_SINCE = r'\((?P<seconds>\d{1,10})\.(?P<fraction>\d{1,9})\)\s+'
+_CLOCK = r'(?P<hour>\d\d):?(?P<minute>\d\d):?(?P<second>\d\d)\.(?P<fraction>\d{1,6})\s+'
+_ISO = r'\d{4}-\d\d-\d\d[-T ]\d\d:\d\d:\d\d(?:[.,]\d{1,12})?'
+_FORMS = tuple(
+    re.compile(form.replace('HEX', '[0-9A-Fa-f]'))
+    for form in (
+        # can-utils: `candump -L`, then `candump -ta`, `candump`, and a format of its old versions
+        rf'{_SINCE}\S+\s+(?P<id>HEX{{8}})#(?P<data>HEX*)\s*[RT]?',
+        rf'(?:{_SINCE})?\S+\s+(?P<id>HEX{{8}})\s+\[\d+\](?P<data>(?:\s+HEX{{2}})*)',
+        rf'(?:{_SINCE})?<0x(?P<id>HEX{{8}})>\s+\[\d+\](?P<data>(?:\s+HEX{{2}})*)',
+        # candump of can-utils-j1939: the NAME of the sender and the PGN
+        rf'(?:{_SINCE})?\S+?:(?P<sender>HEX{{2,16}}),(?P<pgn>HEX{{5}})\s+-\s+!\d\s+'
+        r'\[\d+\](?P<data>(?:\s+HEX+)*)',
+        # Actisense N2K ASCII: sender, addressee and priority, PGN, the whole message
+        rf'A{_CLOCK}(?P<hex_sender>HEX{{2}})HEX{{3}}\s+(?P<pgn>HEX{{5,6}})\s+(?P<data>HEX+)',
+        # Yacht Devices RAW
+        rf'{_CLOCK}[RT]\s+(?P<id>HEX{{8}})(?P<data>(?:\s+HEX{{2}})+)',
+        # canboat: time, priority, PGN, sender, addressee, length, bytes
+        rf'(?P<iso>{_ISO}Z?),\d,(?P<decimal_pgn>\d{{4,6}}),(?P<sender>\d{{1,3}}),'
+        r'\d{1,3},\d{1,3}(?P<data>(?:,HEX{2})*)',
+        # SLCAN: identifier, length, bytes, and with some adapters milliseconds of a minute
+        r'T(?P<id>HEX{8})(?P<length>[0-8])(?P<data>HEX*)',
+    )
 )
-_CANDUMP = re.compile(
-    rf'(?:\((\d{{1,10}})\.(\d{{1,9}})\)\s+)?(?:\S+\s+({_HEX}{{8}})|<0x({_HEX}{{8}})>)\s+'
-    rf'\[\d+\]((?:\s+{_HEX}{{2}})*)'
-)
-# candump of can-utils-j1939: the NAME of the sender and the PGN
-_J1939 = re.compile(
-    rf'(?:\((\d{{1,10}})\.(\d{{1,9}})\)\s+)?\S+?:({_HEX}{{2,16}}),({_HEX}{{5}})\s+-\s+!(\d)\s+'
-    rf'\[\d+\]((?:\s+{_HEX}+)*)'
-)
-# Actisense N2K ASCII: sender, addressee and priority, PGN, the whole message
-_ACTISENSE = re.compile(
-    rf'A(\d\d)(\d\d)(\d\d)\.(\d{{1,6}})\s+({_HEX}{{2}})({_HEX}{{2}})({_HEX})\s+({_HEX}{{5,6}})\s+'
-    rf'({_HEX}+)'
-)
-# Yacht Devices RAW
-_YACHT_DEVICES = re.compile(
-    rf'(\d\d):(\d\d):(\d\d)\.(\d{{1,6}})\s+[RT]\s+({_HEX}{{8}})((?:\s+{_HEX}{{2}})+)'
-)
-# SLCAN: identifier, length, bytes, and with some adapters milliseconds of a minute
-_SLCAN = re.compile(rf'T({_HEX}{{8}})([0-8])({_HEX}*)')
 # what loggers write before a line: the date and time
-_LED = re.compile(
-    r'[\[(]?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:[.,]\d{1,12})?\s?(?:Z|[+-]\d\d:?\d\d)?)[\])]?'
-    r'[\s,;]+(.+)'
-)
-# canboat: time, priority, PGN, sender, addressee, length, bytes
-_CANBOAT = re.compile(
-    r'(\d{4}-\d\d-\d\d[-T ]\d\d:\d\d:\d\d(?:[.,]\d+)?Z?),(\d),(\d{4,6}),(\d{1,3}),'
-    rf'(\d{{1,3}}),(\d{{1,3}})((?:,{_HEX}{{2}})*)'
-)
+_LED = re.compile(rf'[\[(]?({_ISO}\s?(?:Z|[+-]\d\d:?\d\d)?)[\])]?[\s,;]+(.+)')
 
 
 class N2kFrame(NamedTuple):
@@ -77,108 +67,62 @@ def parse(line: str) -> N2kFrame | None:
     """
     Take a line apart; None where it is no frame.
     """
-    frame = next((frame for read in _READERS if (frame := read(line)) is not None), None)
-    if frame is None and (led := _LED.fullmatch(line)) is not None:
-        frame = parse(led[2])
-        time_ns = iso_ns(led[1], UTC)
-        if frame is not None and time_ns is not None:
-            return frame._replace(time_ns=time_ns, cycle_ns=0)
-    return frame
-
-
-def _candump_log(line: str) -> N2kFrame | None:
-    found = _CANDUMP_LOG.fullmatch(line)
-    if found is None or len(found[4]) % 2:
+    for form in _FORMS:
+        found = form.fullmatch(line)
+        frame = None if found is None else _frame(found.groupdict(''))
+        if frame is not None:
+            return frame
+    led = _LED.fullmatch(line)
+    if led is None:
         return None
-    return _of_can_id(_epoch_ns(found[1], found[2]), 0, found[3], bytes.fromhex(found[4]))
+    frame, time_ns = parse(led[2]), iso_ns(led[1], UTC)
+    if frame is None or time_ns is None:
+        return frame
+    return frame._replace(time_ns=time_ns, cycle_ns=0)
 
 
-def _candump(line: str) -> N2kFrame | None:
-    found = _CANDUMP.fullmatch(line)
-    if found is None:
+def _frame(parts: dict[str, str]) -> N2kFrame | None:
+    """Put the parts of a line together; None where they do not go together."""
+    digits = re.sub(r'[\s,]+', '', parts['data'])
+    time_ns, cycle_ns = None, 0
+    if 'length' in parts:
+        end = 2 * int(parts['length'])
+        digits, clock = digits[:end], digits[end:]
+        time_ns, cycle_ns = int(clock, 16) * 1_000_000 if clock else None, MINUTE_NS
+        if len(digits) < end or len(clock) not in (0, 4) or (time_ns or 0) >= MINUTE_NS:
+            return None
+    elif 'hour' in parts:
+        time_ns, cycle_ns = _of_day_ns(parts), DAY_NS
+    elif 'iso' in parts:
+        time_ns = iso_ns(f'{parts["iso"][:10]}T{parts["iso"][11:]}', UTC)
+    elif parts['seconds']:
+        time_ns = int(parts['seconds']) * SECOND_NS + _fraction_ns(parts)
+    if len(digits) % 2:
         return None
-    time_ns = None if found[1] is None else _epoch_ns(found[1], found[2])
-    return _of_can_id(time_ns, 0, found[3] or found[4], bytes.fromhex(found[5]))
+    data = bytes.fromhex(digits)
+    if 'id' in parts:  # of 29 bits; a PGN below 0xF000 is addressed
+        number = int(parts['id'], 16) & 0x1FFFFFFF
+        pgn = (number >> 8) & 0x3FFFF
+        if (pgn >> 8) & 0xFF < 0xF0:
+            pgn &= 0x3FF00
+        if len(data) > 8:
+            return None
+        return N2kFrame(time_ns, cycle_ns, pgn, str(number & 0xFF), data, False)
+    if 'decimal_pgn' in parts:
+        pgn, sender, whole = int(parts['decimal_pgn']), parts['sender'], len(data) > 8
+    elif 'hex_sender' in parts:
+        pgn, sender, whole = int(parts['pgn'], 16), str(int(parts['hex_sender'], 16)), True
+    else:
+        pgn, sender, whole = int(parts['pgn'], 16), parts['sender'], False
+    return N2kFrame(time_ns, cycle_ns, pgn, sender, data, whole)
 
 
-def _j1939(line: str) -> N2kFrame | None:
-    found = _J1939.fullmatch(line)
-    if found is None or len(found[6].replace(' ', '')) % 2:
+def _of_day_ns(parts: dict[str, str]) -> int | None:
+    hour, minute, second = (int(parts[name]) for name in ('hour', 'minute', 'second'))
+    if hour > 23 or minute > 59 or second > 60:
         return None
-    time_ns = None if found[1] is None else _epoch_ns(found[1], found[2])
-    data = bytes.fromhex(found[6].replace(' ', ''))
-    return N2kFrame(time_ns, 0, int(found[4], 16), found[3], data, False)
+    return (3600 * hour + 60 * minute + second) * SECOND_NS + _fraction_ns(parts)
 
 
-def _actisense(line: str) -> N2kFrame | None:
-    found = _ACTISENSE.fullmatch(line)
-    if found is None or len(found[9]) % 2:
-        return None
-    time_ns = _of_day_ns(found[1], found[2], found[3], found[4])
-    data = bytes.fromhex(found[9])
-    return N2kFrame(time_ns, DAY_NS, int(found[8], 16), str(int(found[5], 16)), data, True)
-
-
-def _yacht_devices(line: str) -> N2kFrame | None:
-    found = _YACHT_DEVICES.fullmatch(line)
-    if found is None:
-        return None
-    time_ns = _of_day_ns(found[1], found[2], found[3], found[4])
-    return _of_can_id(time_ns, DAY_NS, found[5], bytes.fromhex(found[6]))
-
-
-def _canboat(line: str) -> N2kFrame | None:
-    found = _CANBOAT.fullmatch(line)
-    if found is None:
-        return None
-    text = found[1]
-    time_ns = iso_ns(f'{text[:10]}T{text[11:]}', UTC)
-    data = bytes.fromhex(found[7].replace(',', ' '))
-    return N2kFrame(time_ns, 0, int(found[3]), found[4], data, len(data) > 8)
-
-
-def _slcan(line: str) -> N2kFrame | None:
-    found = _SLCAN.fullmatch(line)
-    if found is None:
-        return None
-    length = 2 * int(found[2])
-    data, clock = found[3][:length], found[3][length:]
-    if len(data) < length or len(clock) not in (0, 4):
-        return None
-    time_ns = int(clock, 16) * 1_000_000 if clock else None
-    if time_ns is not None and time_ns >= MINUTE_NS:
-        return None
-    return _of_can_id(time_ns, MINUTE_NS, found[1], bytes.fromhex(data))
-
-
-_READERS: tuple[Callable[[str], N2kFrame | None], ...] = (
-    _candump_log,
-    _candump,
-    _j1939,
-    _actisense,
-    _yacht_devices,
-    _canboat,
-    _slcan,
-)
-
-
-def _of_can_id(time_ns: int | None, cycle_ns: int, text: str, data: bytes) -> N2kFrame | None:
-    """Take a 29 bit identifier apart; a PGN below 0xF000 is addressed."""
-    number = int(text, 16) & 0x1FFFFFFF
-    pgn = (number >> 8) & 0x3FFFF
-    if (pgn >> 8) & 0xFF < 0xF0:
-        pgn &= 0x3FF00
-    if len(data) > 8:
-        return None
-    return N2kFrame(time_ns, cycle_ns, pgn, str(number & 0xFF), data, False)
-
-
-def _epoch_ns(seconds: str, fraction: str) -> int:
-    return int(seconds) * SECOND_NS + int(fraction[:9].ljust(9, '0'))
-
-
-def _of_day_ns(hour: str, minute: str, second: str, fraction: str) -> int | None:
-    if int(hour) > 23 or int(minute) > 59 or int(second) > 60:
-        return None
-    seconds = 3600 * int(hour) + 60 * int(minute) + int(second)
-    return seconds * SECOND_NS + int(fraction[:9].ljust(9, '0'))
+def _fraction_ns(parts: dict[str, str]) -> int:
+    return int(parts['fraction'][:9].ljust(9, '0'))

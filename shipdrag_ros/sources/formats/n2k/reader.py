@@ -18,13 +18,14 @@ from typing import Any
 from nmea2000 import backend
 
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.nmea.sentences import NoValue
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.n2k.frames import DAY_NS, MINUTE_NS, N2kFrame, parse
+from shipdrag_ros.sources.log import BASE_NS
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, Tally
 
-_BASE_NS = 946_684_800 * SECOND_NS  # 2000-01-01, for lines without a time
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _SYSTEM_TIME, _GNSS = 126992, 129029
 _DATED_FRAMES = 50_000  # in which a date is looked for
@@ -70,7 +71,7 @@ def clock_of(job: Job) -> FrameClock:
     if first is None:
         raise ImportDataError(f'{name} holds no frame of NMEA 2000')
     if rate_hz is not None:
-        return FrameClock(rate_hz, days * DAY_NS if days else _BASE_NS)
+        return FrameClock(rate_hz, days * DAY_NS if days else BASE_NS)
     if first.time_ns is None:
         raise ImportDataError(
             f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
@@ -85,13 +86,13 @@ def clock_of(job: Job) -> FrameClock:
                 f'{name}: its times are no dates and go back and forth, as those of `candump -td` '
                 'do; log with `candump -L`, or give --rate HZ'
             )
-        return FrameClock(base_ns=_BASE_NS)
+        return FrameClock(base_ns=BASE_NS)
     known_ns = _start_in(chain([first], islice(frames, _DATED_FRAMES)))
     if first.cycle_ns == MINUTE_NS:
         notes = ['The times of the frames count within a minute: a pause of a minute is not seen.']
         if known_ns is None:
             notes.append('No frame states the date; the times count from 2000-01-01.')
-        start_ns = _BASE_NS if days is None else days * DAY_NS
+        start_ns = BASE_NS if days is None else days * DAY_NS
         return FrameClock(base_ns=start_ns if known_ns is None else known_ns, notes=tuple(notes))
     if days is None and known_ns is not None:
         days = known_ns // DAY_NS
@@ -157,7 +158,39 @@ class _Packets:
 
 
 N2kValue = tuple[Channel, int, float, float]
-N2kFields = Mapping[str, Any]
+"""Channel, rank of the source, and two values."""
+
+
+class _Fields:
+    """The fields of a message, and what is known besides."""
+
+    def __init__(
+        self, message: Any, options: Mapping[str, Any], note: Callable[[str], None]
+    ) -> None:
+        self._fields = {field.id: field for field in message.fields}
+        self.options = options
+        self.note = note
+
+    def value(self, name: str) -> Any:
+        """Return the value of a field, None where it is not available."""
+        return self._of(name).value
+
+    def number(self, name: str) -> Any:
+        """Return the value of a field; NoValue where it is not available."""
+        value = self.value(name)
+        if value is None:
+            raise NoValue('not available')
+        return value
+
+    def instance(self) -> Any:
+        """Return which of several instruments it is of."""
+        return self._of('instance').raw_value
+
+    def _of(self, name: str) -> Any:
+        try:
+            return self._fields[name]
+        except KeyError:  # of a message of another length
+            raise NoValue('without the field') from None
 
 
 class N2kReader:
@@ -176,22 +209,10 @@ class N2kReader:
     def __init__(self, tally: Tally, clock: FrameClock, options: Mapping[str, Any]) -> None:
         self._tally = tally
         self._clock = clock
-        self._gear: float | None = options.get('gear')
-        self._transducer_m: float | None = options.get('transducer')
+        self._options = options
         self._packets = _Packets()
         self._frames = 0
         self._unwrapped = _Unwrapped()
-        self._readers: dict[int, Callable[[N2kFields], N2kValue | str]] = {
-            128259: _water,
-            129026: _ground,
-            129025: _position,
-            _GNSS: _gnss,
-            127250: self._heading,
-            130306: _wind,
-            128267: self._depth,
-            127245: _rudder,
-            127488: self._engine,
-        }
 
     def read(self, job: Job) -> Iterator[Reading]:
         """
@@ -199,49 +220,40 @@ class N2kReader:
         """
         for text in self._clock.notes:
             self._tally.note(text)
-        lines = Lines(job.source)
-        total = job.source.stat().st_size
+        lines = Lines(job.source, progress=job.progress)
         for line in lines:
             self._tally.records += 1
-            if self._tally.records % 1000 == 0 and job.progress is not None:
-                job.progress(lines.done_bytes, total)
-            if not line:
-                continue
-            frame = parse(line)
-            if frame is None:
+            frame = parse(line) if line else None
+            if frame is not None:
+                found = self._reading(frame, line)
+                if found is not None:
+                    yield found
+            elif line:
                 self._tally.reject('line', 'no frame', line)
-                continue
-            yield from self._frame(frame, line)
         if lines.damage:
             self._tally.note(f'The log could not be read to its end, {lines.damage}.')
 
-    def _frame(self, frame: N2kFrame, line: str) -> Iterator[Reading]:
+    def _reading(self, frame: N2kFrame, line: str) -> Reading | None:
         stamp_ns = self._stamp_ns(frame)
-        read = self._readers.get(frame.pgn)
+        read, name = _READERS.get(frame.pgn), f'PGN {frame.pgn}'
         if read is None:
-            self._tally.not_used[f'PGN {frame.pgn}'] += 1
-            return
+            self._tally.not_used[name] += 1
+            return None
         if stamp_ns is None:
             self._tally.reject('time', 'no time in the line', line)
-            return
+            return None
         data = self._packets.whole(frame)
         if data is None:
-            return
+            return None
         message = backend.decode(frame.pgn, data, units='si')
-        if message is None:
-            self._tally.reject(f'PGN {frame.pgn}', 'cannot be decoded', line)
-            return
-        fields = {field.id: field for field in message.fields}
         try:
-            found = read(fields)
-        except KeyError:  # of a message of another length
-            found = 'without the field'
-        if isinstance(found, str):
-            self._tally.reject(f'PGN {frame.pgn}', found, line)
-            return
-        channel, rank, a, b = found
-        origin = Origin(rank, f'PGN {frame.pgn} from {frame.sender}')
-        yield Reading(channel, origin, stamp_ns, a, b)
+            if message is None:
+                raise NoValue('cannot be decoded')
+            channel, rank, a, b = read(_Fields(message, self._options, self._tally.note))
+        except NoValue as reason:
+            self._tally.reject(name, reason.reason, line)
+            return None
+        return Reading(channel, Origin(rank, f'{name} from {frame.sender}'), stamp_ns, a, b)
 
     def _stamp_ns(self, frame: N2kFrame) -> int | None:
         self._frames += 1
@@ -254,93 +266,86 @@ class N2kReader:
             return frame.time_ns + self._clock.base_ns
         return self._clock.base_ns + self._unwrapped.ns(frame.time_ns, frame.cycle_ns)
 
-    def _heading(self, fields: N2kFields) -> N2kValue | str:
-        heading, reference = fields['heading'].value, fields['reference'].value
-        if heading is None:
-            return _EMPTY
-        if reference == 'True':
-            return Channel.HEADING, 0, _yaw(heading), 0.0
-        if reference != 'Magnetic':
-            return 'neither true nor magnetic'
-        deviation, variation = fields['deviation'].value, fields['variation'].value
-        if variation is not None:
-            return Channel.HEADING, 1, _yaw(heading + (deviation or 0.0) + variation), 0.0
-        self._tally.note(
-            'A heading is MAGNETIC, as its sensor states no variation: good for finding turns, '
-            'not for directions over ground.'
-        )
-        return Channel.HEADING, 2, _yaw(heading), 0.0
 
-    def _depth(self, fields: N2kFields) -> N2kValue | str:
-        depth, offset = fields['depth'].value, fields['offset'].value
-        if depth is None:
-            return _EMPTY
-        # negative: to the keel, whose depth is not stated
-        if offset is None or offset <= 0.0:
-            if self._transducer_m is None:
-                return 'depth of the transducer not stated'
-            offset = self._transducer_m
-        return Channel.DEPTH, 0, depth + offset, 0.0
-
-    def _engine(self, fields: N2kFields) -> N2kValue | str:
-        if self._gear is None:
-            return 'revolutions of the engine, and not of the shaft: give --gear RATIO'
-        rate_hz, place = fields['speed'].value, fields['instance'].raw_value
-        if rate_hz is None:
-            return _EMPTY
-        if not isinstance(place, int) or not 0 <= place < len(SHAFTS):
-            return 'no engine from 0 to 3'
-        return SHAFTS[place], 0, rate_hz * 2.0 * pi / self._gear, 0.0
+def _water(fields: _Fields) -> N2kValue:
+    return Channel.SPEED_THROUGH_WATER, 0, fields.number('speedWaterReferenced'), 0.0
 
 
-_EMPTY = 'not available'
+def _ground(fields: _Fields) -> N2kValue:
+    return Channel.SPEED_OVER_GROUND, 0, fields.number('sog'), 0.0
 
 
-def _yaw(compass: float) -> float:
-    return remainder(pi / 2.0 - compass, 2.0 * pi)
-
-
-def _water(fields: N2kFields) -> N2kValue | str:
-    speed = fields['speedWaterReferenced'].value
-    return _EMPTY if speed is None else (Channel.SPEED_THROUGH_WATER, 0, speed, 0.0)
-
-
-def _ground(fields: N2kFields) -> N2kValue | str:
-    speed = fields['sog'].value
-    return _EMPTY if speed is None else (Channel.SPEED_OVER_GROUND, 0, speed, 0.0)
-
-
-def _position(fields: N2kFields) -> N2kValue | str:
-    return _where(fields, 0)
-
-
-def _gnss(fields: N2kFields) -> N2kValue | str:
-    method = fields['method'].value
-    if method in (None, 'no GNSS', 'Estimated (DR) mode', 'Manual Input', 'Simulate mode'):
-        return f'no fix: {method}'
-    return _where(fields, 1)
-
-
-def _where(fields: N2kFields, rank: int) -> N2kValue | str:
-    latitude, longitude = fields['latitude'].value, fields['longitude'].value
-    if latitude is None or longitude is None:
-        return _EMPTY
+def _position(fields: _Fields) -> N2kValue:
+    latitude, longitude = fields.number('latitude'), fields.number('longitude')
     if abs(latitude) > 90.0 or abs(longitude) > 180.0:
-        return 'no latitude and longitude'
-    return Channel.POSITION_GEODETIC, rank, latitude, longitude
+        raise NoValue('no latitude and longitude')
+    return Channel.POSITION_GEODETIC, 0, latitude, longitude
 
 
-def _wind(fields: N2kFields) -> N2kValue | str:
-    speed, angle = fields['windSpeed'].value, fields['windAngle'].value
-    if fields['reference'].value != 'Apparent':
-        return f'wind that is not apparent: {fields["reference"].value}'
-    if speed is None or angle is None:
-        return _EMPTY
+def _gnss(fields: _Fields) -> N2kValue:
+    method = fields.value('method')
+    if method in (None, 'no GNSS', 'Estimated (DR) mode', 'Manual Input', 'Simulate mode'):
+        raise NoValue(f'no fix: {method}')
+    channel, _, latitude, longitude = _position(fields)
+    return channel, 1, latitude, longitude
+
+
+def _heading(fields: _Fields) -> N2kValue:
+    heading, reference, rank = fields.number('heading'), fields.value('reference'), 0
+    if reference == 'Magnetic':
+        deviation, variation = fields.value('deviation'), fields.value('variation')
+        if variation is None:
+            rank = 2
+            fields.note(
+                'A heading is MAGNETIC, as its sensor states no variation: good for finding '
+                'turns, not for directions over ground.'
+            )
+        else:
+            rank = 1
+            heading += (deviation or 0.0) + variation
+    elif reference != 'True':
+        raise NoValue('neither true nor magnetic')
+    return Channel.HEADING, rank, remainder(pi / 2.0 - heading, 2.0 * pi), 0.0
+
+
+def _wind(fields: _Fields) -> N2kValue:
+    if fields.value('reference') != 'Apparent':
+        raise NoValue(f'wind that is not apparent: {fields.value("reference")}')
+    speed, angle = fields.number('windSpeed'), fields.number('windAngle')
     return Channel.WIND_APPARENT, 0, -speed * cos(angle), speed * sin(angle)
 
 
-def _rudder(fields: N2kFields) -> N2kValue | str:
-    angle = fields['position'].value
-    if angle is None:
-        return _EMPTY
-    return Channel.RUDDER, int(fields['instance'].raw_value or 0), angle, 0.0
+def _depth(fields: _Fields) -> N2kValue:
+    depth, offset = fields.number('depth'), fields.value('offset')
+    if offset is None or offset <= 0.0:  # negative: to the keel, whose depth is not stated
+        offset = fields.options.get('transducer')
+        if offset is None:
+            raise NoValue('depth of the transducer not stated')
+    return Channel.DEPTH, 0, depth + offset, 0.0
+
+
+def _rudder(fields: _Fields) -> N2kValue:
+    return Channel.RUDDER, int(fields.instance() or 0), fields.number('position'), 0.0
+
+
+def _engine(fields: _Fields) -> N2kValue:
+    gear, place = fields.options.get('gear'), fields.instance()
+    if gear is None:
+        raise NoValue('revolutions of the engine, and not of the shaft: give --gear RATIO')
+    rate_hz = fields.number('speed')
+    if not isinstance(place, int) or not 0 <= place < len(SHAFTS):
+        raise NoValue('no engine from 0 to 3')
+    return SHAFTS[place], 0, rate_hz * 2.0 * pi / gear, 0.0
+
+
+_READERS: Mapping[int, Callable[[_Fields], N2kValue]] = {
+    128259: _water,
+    129026: _ground,
+    129025: _position,
+    _GNSS: _gnss,
+    127250: _heading,
+    130306: _wind,
+    128267: _depth,
+    127245: _rudder,
+    127488: _engine,
+}

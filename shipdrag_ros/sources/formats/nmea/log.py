@@ -6,34 +6,28 @@ A log of NMEA 0183 as sentences, and a count of what is none.
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Collection, Iterator
-from datetime import datetime
+from datetime import UTC
 from fractions import Fraction
-from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import IO, cast
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.reading import START, checksum_of
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
-from shipdrag_ros.sources.log import LIMIT_NS, Rejected
-from shipdrag_ros.sources.opened import check_unpacked, opened
+from shipdrag_ros.sources.log import LIMIT_NS, Rejected, iso_ns
+from shipdrag_ros.sources.opened import BROKEN, Lines, opened
 
 _UTF_16 = (b'\xff\xfe', b'\xfe\xff')
 _UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below
 # every byte is a character, so that checksums are those of the bytes
 _ENCODING = 'latin-1'
-_LINE = 4096  # a sentence has 82 characters; some with a prefix have more
+_LONGEST = 4096  # a sentence has 82 characters; some with a prefix have more
 _TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
 _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
 _EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
-_ISO = re.compile(
-    r'(?:\w{1,40}\s+)?\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?'
-    r'(Z|[+-]\d\d:?\d\d)?\]?[\s,;:]*'
-)
+_DATED = re.compile(r'(?:\w{1,40}\s+)?\[?(\d{4}-[^\]]+?)\]?[\s,;:]*')
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
 
 
@@ -71,7 +65,7 @@ class NmeaLog:
         try:
             with opened(self.path) as (_, file):
                 start = file.read(2)
-        except (OSError, EOFError, zlib.error) as error:
+        except BROKEN as error:
             reason = getattr(error, 'strerror', None) or str(error)
             raise ImportDataError(
                 f'{str(path)!r} cannot be read: {reason}; give a log of NMEA 0183'
@@ -89,7 +83,7 @@ class NmeaLog:
             try:
                 raw = file.read(limit_bytes + 1)
                 return None if len(raw) > limit_bytes else raw.decode()
-            except (EOFError, OSError, zlib.error, UnicodeDecodeError):
+            except (*BROKEN, UnicodeDecodeError):
                 return None
 
     def texts(self, progress: PartDone | None = None) -> Iterator[tuple[int, str, int | None]]:
@@ -101,15 +95,15 @@ class NmeaLog:
         progress
             Called with how many bytes are read, and of how many.
         """
-        total = self.path.stat().st_size
-        with opened(self.path) as (raw, file):
-            for line in self._lines(raw, file):
-                if progress is not None and self.lines % 1000 == 0:
-                    progress(raw.tell(), total)
-                if line[:1] == '$' and line.rfind('$') == 0 and '!' not in line:
-                    yield self.lines, line[1:].strip(), None
-                else:
-                    yield from self._of_line(self.lines, line)
+        lines = Lines(self.path, encoding=_ENCODING, longest=_LONGEST, progress=progress)
+        for line in lines:
+            if line[:1] == '$' and line.rfind('$') == 0 and '!' not in line:
+                yield lines.number, line[1:].strip(), None
+            elif line:
+                yield from self._of_line(lines.number, line.removeprefix(_UTF_8_MARK))
+        self.lines, self.damage = lines.number, lines.damage
+        for number in lines.too_long:
+            self.reject(f'longer than {_LONGEST} characters', number, '')
 
     def lines_of(self, places: Collection[int]) -> dict[int, tuple[int, str]]:
         """
@@ -125,37 +119,7 @@ class NmeaLog:
                     break
         return found
 
-    def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
-        """Yield lines ended by LF, CR or both; of a long one only its beginning."""
-        text = TextIOWrapper(cast(BufferedReader, file), encoding=_ENCODING)
-        self.lines = 0
-        size = 0
-        try:
-            while line := text.readline(_LINE):
-                self.lines += 1
-                rest = line
-                size += len(line)
-                while len(rest) == _LINE and not rest.endswith('\n'):
-                    rest = text.readline(_LINE)
-                    size += len(rest)
-                    if file is not raw:
-                        check_unpacked(self.path, size, raw.tell())
-                if file is not raw:
-                    check_unpacked(self.path, size, raw.tell())
-                if self.lines == 1:
-                    line = line.removeprefix(_UTF_8_MARK)
-                if len(line) >= _LINE - 1:
-                    self.reject(f'longer than {_LINE} characters', self.lines, line)
-                else:
-                    yield line.strip()
-        except (EOFError, OSError, zlib.error) as error:
-            self.damage = f'after line {self.lines}: {error}'
-        finally:
-            text.detach()  # whoever opened the file closes it
-
     def _of_line(self, number: int, line: str) -> Iterator[tuple[int, str, int | None]]:
-        if not line:
-            return
         # a lost line end leaves two sentences in a line
         prefix, *texts = START.split(line)
         if not texts:
@@ -189,15 +153,12 @@ def _receive_ns(prefix: str) -> int | None:
         receive_ns = _counted_ns(times[0][1], '')
     elif epoch := _EPOCH.fullmatch(prefix):
         receive_ns = _counted_ns(epoch[1], epoch[2] or '')
-    elif iso := _ISO.fullmatch(prefix):
-        try:
-            moment = datetime.fromisoformat(iso[1] + (iso[3] or 'Z'))
-        except ValueError:
-            raise ValueError('prefix not understood') from None
-        fraction = f'.{iso[2]}' if iso[2] else ''
-        receive_ns = int(moment.timestamp()) * SECOND_NS + _fraction_ns(fraction, SECOND_NS)
     else:
-        raise ValueError('prefix not understood')
+        dated = _DATED.fullmatch(prefix)
+        time_ns = None if dated is None else iso_ns(dated[1], UTC)
+        if time_ns is None:
+            raise ValueError('prefix not understood')
+        receive_ns = time_ns
     if not 0 <= receive_ns < LIMIT_NS:
         raise ValueError('no possible date before it')
     return receive_ns

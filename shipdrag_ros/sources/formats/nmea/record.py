@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.nmea.clock import GAP_NS, SentenceClock
-from shipdrag_ros.nmea.reading import Sentence, SentenceSource, SentenceTime, best
+from shipdrag_ros.nmea.reading import Sentence, SentenceSource, SentenceTime
 from shipdrag_ros.nmea.sentences import NoValue
 from shipdrag_ros.samples import INPUTS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.log import Rejected
+from shipdrag_ros.sources.stream import SourcedValues
 
 Refused = dict[str, dict[str, Rejected]]
 TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]
@@ -42,22 +43,14 @@ class _Times(NamedTuple):
     address: array[int]
 
 
-class _Samples(NamedTuple):
-    """Of each value: the place of its sentence, its source by number, and when it was received."""
-
-    place: array[int]
-    source: array[int]
-    receive_ns: array[int]
-    a: array[float]
-    b: array[float]
-
-
 class TakenSentences:
     """
     What the sentences of a log hold.
 
     Attributes
     ----------
+    values
+        What they measure, by the places of their texts.
     addresses
         Number of sentences by talker and kind.
     received
@@ -74,9 +67,9 @@ class TakenSentences:
         self.timed = False
         self.first: SentenceTime | None = None
         self.first_received_ns: int | None = None
-        self._sources: dict[tuple[Channel, SentenceSource], int] = {}
+        self.values: SourcedValues[SentenceSource] = SourcedValues()
+        self._received = array('q')  # of the values
         self._reasons: dict[tuple[str, str], int] = {}
-        self._samples = _Samples(array('q'), array('i'), array('q'), array('d'), array('d'))
         self._times = _Times(*(array('q') for _ in _Times._fields))
         self._rejected = array('q'), array('i')  # places and reasons by number
         self._without_time = array('q')
@@ -107,13 +100,9 @@ class TakenSentences:
             self._take_time(place, sentence, received)
         for channel, reason in refused:
             self._reject(channel.input, f'{talker}{kind}: {reason}', place)
-        places, sources, receipts, first, second = self._samples
         for channel, source, a, b in values:
-            places.append(place)
-            sources.append(self._sources.setdefault((channel, source), len(self._sources)))
-            receipts.append(received)
-            first.append(a)
-            second.append(b)
+            self.values.add(channel, source, place, a, b)
+            self._received.append(received)
         if len(self._rejected[0]) > before and len(self._texts) < _SHOWN * len(self._reasons):
             self._texts[place] = line, text
 
@@ -146,22 +135,6 @@ class TakenSentences:
         """Number of sentences."""
         return self.addresses.total()
 
-    def values(self) -> dict[Channel, Counter[SentenceSource]]:
-        """
-        Return the number of values by source, of each channel.
-        """
-        found: dict[Channel, Counter[SentenceSource]] = {}
-        counts = np.bincount(self._samples.source, minlength=len(self._sources)).tolist()
-        for (channel, source), number in zip(self._sources, counts, strict=True):
-            found.setdefault(channel, Counter())[source] = number
-        return found
-
-    def chosen(self) -> dict[Channel, SentenceSource]:
-        """
-        Return the one source of each channel.
-        """
-        return {channel: best(each) for channel, each in self.values().items()}
-
     def samples(self, clock: SentenceClock) -> Block:
         """
         Return the samples of the chosen sources, in the order of their sentences.
@@ -172,21 +145,17 @@ class TakenSentences:
             At the start of the log. What it cannot tell the time of is rejected.
         """
         moments = self._resolve(clock)
-        place, source, received, a, b = (np.array(each) for each in self._samples)
-        chosen = self.chosen()
-        use = np.array([chosen[c] == each for c, each in self._sources], np.bool_)[source]
-        use &= ~np.isin(place, self._without_time)
-        place, source, received = place[use], source[use], received[use]
-        code = np.array([channel for channel, _ in self._sources], np.uint8)[source]
+        which, code = self.values.taken()
+        place = np.array(self.values.at)
+        timed = ~np.isin(place[which], self._without_time)
+        which, code = which[timed], code[timed]
+        place, received = place[which], np.array(self._received)[which]
         stamps, reason = moments.stamps(place, code, received)
         for why in (_BEFORE, _GAP):
             for where, number in zip(place[reason == why], code[reason == why], strict=True):
                 self._reject(Channel(number).input, why, int(where))
         good = reason == ''
-        value = np.column_stack((a[use], b[use]))[good]
-        # arrival never goes back, so that a replay sees the sentences in their order
-        arrived = np.maximum.accumulate(stamps[good]) if good.any() else stamps[good]
-        return Block(code[good], stamps[good], arrived, value, np.full(value.shape, np.nan))
+        return self.values.block(which[good], code[good], stamps[good])
 
     def _resolve(self, clock: SentenceClock) -> _Moments:
         """Follow the clock through the sentences that state a time."""

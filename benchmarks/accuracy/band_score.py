@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Score of r(v) and its band, on coastdowns of world A or B.
+
+    python -m benchmarks.accuracy.band_score --world a --first 539 --count 40
+    python -m benchmarks.accuracy.band_score --world b --half odd --count 40 --seed 5
+
+Runs `shipdrag replay` on each run by itself, in this process, and holds the curve against the
+true one. By default only cases in which r(v) is what a coastdown shows: nothing hidden, or
+something that belongs to the hull. Of world A the cases before 539 are for choosing methods, of
+world B the even ones; the others are for scoring.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+os.environ.setdefault('OMP_NUM_THREADS', '1')
+
+import numpy as np
+
+from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
+from benchmarks.worlds.hidden import cases as cases_a
+from benchmarks.worlds.hidden_b import cases as cases_b
+from benchmarks.worlds.hidden_b.plans import plans_of
+from shipdrag_ros import cli
+
+OWN = (
+    'fouling',
+    'shallow_water',
+    'towed_cable',
+    'locked_propeller',
+    'windmilling_propeller',
+    'displacement',
+)
+"""What is part of r(v), and nothing else beside it."""
+NINE_TENTHS = 0.9
+WIDE = 1.96
+
+
+@dataclass(frozen=True)
+class World:
+    """
+    The cases of a world; each attribute but the first is a function of the number of a case.
+
+    Attributes
+    ----------
+    count
+        How many there are.
+    names
+        What is hidden.
+    condition, observe, stops_ns
+    first_speed
+        And of the run.
+    true_r
+        And of speeds and the run.
+    """
+
+    count: int
+    names: Callable[[int], tuple[str, ...]]
+    condition: Callable[[int], object]
+    observe: Callable[[int], Any]
+    stops_ns: Callable[[int], tuple[int, ...]]
+    first_speed: Callable[[int, int], float]
+    true_r: Callable[[int, np.ndarray, int], np.ndarray]
+
+    @classmethod
+    def a(cls) -> World:
+        """
+        Return the first world.
+        """
+        of = cases_a
+        return cls(
+            of.count(),
+            lambda number: of.reveal(number).names,
+            of.condition,
+            of.observe,
+            of.stops_ns,
+            of.first_speed,
+            of.true_r,
+        )
+
+    @classmethod
+    def b(cls, seed: int = cases_b.SEED) -> World:
+        """
+        Return the world of another hand.
+        """
+        of, plans = cases_b, plans_of(seed)
+        return cls(
+            len(plans),
+            lambda number: tuple(sorted(plans[number][0])),
+            partial(of.condition, seed=seed),
+            partial(of.observe, seed=seed),
+            partial(of.stops_ns, seed=seed),
+            partial(of.first_speed, seed=seed),
+            partial(of.true_r, seed=seed),
+        )
+
+
+@dataclass(frozen=True)
+class Score:
+    """
+    How the curve of a run compares with the true one.
+
+    Attributes
+    ----------
+    case, run, hidden, condition
+    rmse, rmse_below
+        Of the largest true r: over the curve, and below nine tenths of the first speed.
+    cover
+        Share of speeds at which the band of 95 % holds the truth.
+    chi2
+        Mean square of error over sigma.
+    sigma
+        Mean sigma, of the largest true r.
+    late_s
+        Start of the window after the stop.
+    cpu_s
+    """
+
+    case: int
+    run: int
+    hidden: str
+    condition: str
+    rmse: float
+    rmse_below: float
+    cover: float
+    chi2: float
+    sigma: float
+    late_s: float
+    cpu_s: float
+
+
+def replay(
+    ship: Path, bag: Path, window: tuple[float, float] | None, estimator: str = 'one'
+) -> dict[str, Any]:
+    """
+    Replay a bag with the public command.
+
+    Parameters
+    ----------
+    ship, bag
+    window
+        Given start and end, s from the start of the bag; None to find them.
+    estimator
+        The parameter of that name.
+    """
+    parameters = bag.parent / 'estimator.yaml'
+    parameters.write_text(f'estimator: {estimator}\n', encoding='utf-8')
+    asked = ['replay', str(bag), '--ship', str(ship), '--json', '--parameters', str(parameters)]
+    if window is not None:
+        asked += ['--window', *(f'{at:.3f}' for at in window)]
+    written, said = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(said):
+        try:
+            status = cli.main(asked)
+        except SystemExit as ended:
+            status = ended.code
+    if status:
+        raise RuntimeError(f'shipdrag replay ended with {status}: {said.getvalue().strip()}')
+    found: dict[str, Any] = json.loads(written.getvalue())
+    return found
+
+
+def score(
+    world: World, number: int, run: int, found: dict[str, Any], cpu_s: float
+) -> Score | None:
+    """
+    Return the score of a run, None where no coastdown was found after its stop.
+    """
+    stop = world.stops_ns(number)[run]
+    later = [each for each in found['coastdowns'] if each['end_ns'] > stop]
+    if not later:
+        return None
+    best = max(later, key=lambda each: each['end_ns'] - max(stop, each['start_ns']))
+    first = world.first_speed(number, run)
+    speed, r, sigma = (
+        np.array(best[name], np.float64) for name in ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2')
+    )
+    use = (speed > 0.0) & (speed <= first) & np.isfinite(r) & np.isfinite(sigma)
+    speed, r, sigma = speed[use], r[use], sigma[use]
+    if len(speed) < 3:
+        return None
+    true = world.true_r(number, speed, run)
+    largest = float(true.max())
+    error = r - true
+    below = speed < NINE_TENTHS * first
+    return Score(
+        number,
+        run,
+        ' + '.join(world.names(number)) or 'nothing',
+        str(world.condition(number)),
+        float(np.sqrt(np.mean(error**2))) / largest,
+        float(np.sqrt(np.mean(error[below] ** 2))) / largest if below.any() else float('nan'),
+        float(np.mean(np.abs(error) <= WIDE * sigma)),
+        float(np.mean((error / sigma) ** 2)),
+        float(np.mean(sigma)) / largest,
+        (best['start_ns'] - stop) * 1e-9,
+        cpu_s,
+    )
+
+
+def chosen(world: World, half: str, hidden: str, first: int, count: int) -> list[int]:
+    """
+    Return numbers of cases: of a half, and of those with what is wanted hidden.
+    """
+    remainder, divisor = HALVES[half]
+    numbers: list[int] = []
+    for number in range(first, world.count):
+        if len(numbers) == count:
+            break
+        if number % divisor != remainder:
+            continue
+        names = world.names(number)
+        own = not names or (len(names) == 1 and names[0] in OWN)
+        if {'own': own, 'nothing': not names, 'all': True}[hidden]:
+            numbers.append(number)
+    return numbers
+
+
+def scored(
+    world: World, numbers: Sequence[int], given: bool, estimator: str = 'one'
+) -> Iterator[tuple[int, int, Score | None, str]]:
+    """
+    Yield case, run, score, and the error where the command failed.
+    """
+    for number in numbers:
+        seen = world.observe(number)
+        with TemporaryDirectory() as folder:
+            ship, bags = write_bags(seen, Path(folder))
+            for run, bag in enumerate(bags):
+                series = seen.runs[run].values()
+                begins = min(int(each.receive_ns[0]) for each in series)
+                ends = max(int(each.stamp_ns[-1]) for each in series)
+                stop = world.stops_ns(number)[run]
+                window = ((stop - begins) * 1e-9, (ends - begins) * 1e-9)
+                start = time.process_time()
+                try:
+                    found = replay(ship, bag, window if given else None, estimator)
+                    cpu_s = time.process_time() - start
+                    yield number, run, score(world, number, run, found, cpu_s), ''
+                except RuntimeError as error:
+                    yield number, run, None, str(error)
+
+
+def summary(scores: Sequence[Score], runs: int) -> dict[str, float]:
+    """
+    Return the figures of some runs.
+    """
+    if not scores:
+        return {'runs': runs, 'with an estimate, %': 0.0}
+
+    def of(name: str) -> np.ndarray:
+        values = np.array([getattr(each, name) for each in scores])
+        return values[np.isfinite(values)]
+
+    return {
+        'runs': runs,
+        'with an estimate, %': 100.0 * len(scores) / runs,
+        'RMSE, % of the largest r': 100.0 * float(np.sqrt(np.mean(of('rmse') ** 2))),
+        'RMSE, median of runs': 100.0 * float(np.median(of('rmse'))),
+        'RMSE below 0.9 of the first speed': 100.0
+        * float(np.sqrt(np.mean(of('rmse_below') ** 2))),
+        'the same, median of runs': 100.0 * float(np.median(of('rmse_below'))),
+        'mean sigma, % of the largest r': 100.0 * float(np.mean(of('sigma'))),
+        'sigma, median of runs': 100.0 * float(np.median(of('sigma'))),
+        'cover of the 95 % band, %': 100.0 * float(np.mean(of('cover'))),
+        'runs with cover below 50 %, %': 100.0 * float(np.mean(of('cover') < 0.5)),
+        'chi^2, mean of runs': float(np.mean(of('chi2'))),
+        'chi^2, median of runs': float(np.median(of('chi2'))),
+        'CPU s a run, median': float(np.median(of('cpu_s'))),
+    }
+
+
+def table(rows: Sequence[tuple[int, int, Score | None, str]]) -> Iterator[str]:
+    """
+    Yield the lines of the report: all runs, and apart those with and without anything hidden.
+    """
+    clean = {
+        number for number, _, each, _ in rows if each is not None and each.hidden == 'nothing'
+    }
+    groups = {'all': rows}
+    for name, inside in (('nothing hidden', True), ('something hidden', False)):
+        part = [row for row in rows if (row[0] in clean) == inside]
+        if part and len(part) < len(rows):
+            groups[name] = part
+    columns = {
+        name: summary([each for _, _, each, _ in part if each is not None], len(part))
+        for name, part in groups.items()
+    }
+    yield '| | ' + ' | '.join(columns) + ' |'
+    yield '|---|' + '---|' * len(columns)
+    for name in columns['all']:
+        cells = [f'{column[name]:.3g}' if name in column else '-' for column in columns.values()]
+        yield f'| {name} | ' + ' | '.join(cells) + ' |'
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """
+    Replay, score and print.
+    """
+    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
+    parser.add_argument('--world', choices=('a', 'b'), default='b')
+    parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
+    parser.add_argument('--hidden', choices=('own', 'nothing', 'all'), default='own')
+    parser.add_argument('--first', type=int, default=0)
+    parser.add_argument('--count', type=int, default=40, help='how many cases')
+    parser.add_argument('--seed', type=int, default=cases_b.SEED, help='of world b')
+    parser.add_argument('--given', action='store_true', help='the time of the stop is given')
+    parser.add_argument('--estimator', default='one', help='the parameter of that name')
+    parser.add_argument('--each', action='store_true', help='print each run')
+    parser.add_argument('--out', type=Path, help='one line of JSON a run')
+    options = parser.parse_args(arguments)
+    world = World.a() if options.world == 'a' else World.b(options.seed)
+    numbers = chosen(world, options.half, options.hidden, options.first, options.count)
+    rows = []
+    for row in scored(world, numbers, options.given, options.estimator):
+        rows.append(row)
+        number, run, found, error = row
+        if options.each:
+            print(found or f'case {number} run {run}: {error or "no coastdown"}', flush=True)
+        if options.out is not None:
+            with options.out.open('a', encoding='utf-8') as file:
+                line = asdict(found) if found else {'case': number, 'run': run, 'error': error}
+                file.write(json.dumps(line) + '\n')
+    seed = cases_a.SEED if options.world == 'a' else options.seed
+    print(
+        f'{len(numbers)} cases of world {options.world} from {options.first} on, seed {seed}, '
+        f'half {options.half}'
+    )
+    for error in sorted({error for *_, error in rows if error})[:5]:
+        print(error)
+    for line in table(rows):
+        print(line)
+
+
+if __name__ == '__main__':
+    main()

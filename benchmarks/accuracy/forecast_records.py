@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Forecasts of every measured coast, beside what followed and beside rivals.
+
+    python -m benchmarks.accuracy.forecast_records --write
+
+Reads the folder that SHIPDRAG_DATA names. After a quarter, a third and a half of each coast the
+rest is foretold from the readings until then, and compared with speed and way at eighths of what
+was left. Rivals: the deceleration persists; the polynomial of S1 goes on; a fit of u' = -k u^2. A
+rival's band is as wide as holds 90 % of its errors on the other records. `--write` puts the tables
+into docs/forecast.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from benchmarks._tables import put, table
+from benchmarks.accuracy._known_coasts import COASTS, KnownCoast
+from benchmarks.accuracy.real_records import DATA, run_command
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.coastdown.running import too_vague
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.forecast.followed import Followed
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import coast_windows, replay
+from shipdrag_ros.samples import SECOND_NS, Float64
+from shipdrag_ros.ship import Ship
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / 'docs' / 'forecast.md'
+PARTS = (0.25, 1.0 / 3.0, 0.5)
+EIGHTHS = np.arange(1, 9) / 8.0
+OURS, RIVALS = 'forecast', ('persistence', 'polynomial', 'v^2')
+FINE = 401  # times of an integral of the speed
+LOWEST = 0.05  # of the speed at the stop, until which is foretold and compared
+SLOWEST = 1e-3  # Froude number at which a replay of a coast ends
+RECENT = 1.0 / 3.0  # of the readings so far, from which the deceleration persists
+Motion = Callable[[Float64], Float64]
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """
+    Speed and way of one method, at the times of a case, in parts of `Case.scale`.
+
+    Attributes
+    ----------
+    error : (2, m)
+        Foretold less what followed.
+    low, high : (2, m)
+        The band about what was foretold; of a rival found later.
+    reach : (m,)
+        What a rival's band is in proportion to: time since it was made, in parts of that before.
+    """
+
+    error: Float64
+    low: Float64
+    high: Float64
+    reach: Float64
+
+
+@dataclass(frozen=True)
+class Case:
+    """One forecast of one record by all methods; `part` of the coast was known."""
+
+    record: str
+    part: float
+    by: dict[str, Predicted]
+
+
+def inside(one: Predicted) -> Float64:
+    """Say of each figure whether its band holds what followed."""
+    return np.asarray((one.error >= -one.high) & (one.error <= one.low))
+
+
+def scores(one: Predicted) -> Float64:
+    """Return the interval score of each figure."""
+    out = np.maximum(one.error - one.low, 0.0) + np.maximum(-one.error - one.high, 0.0)
+    return np.asarray(one.low + one.high + 2.0 / 0.1 * out)
+
+
+def readings(
+    window: Window, stop_ns: int, track: tuple[Float64, Float64]
+) -> tuple[Float64, Float64]:
+    """Return times from the stop and the speeds that rivals fit; of places, as they are fitted."""
+    for series in (window.speed_through_water, window.speed_over_ground):
+        if len(series):
+            return (series.time_ns - stop_ns) / SECOND_NS, series.value
+    return track[0], np.gradient(track[1], track[0])
+
+
+def rivals(time_s: Float64, speed: Float64, order: int) -> Iterator[tuple[str, Motion]]:
+    """Yield each rival's speed against time; a ship that has stopped stays."""
+    recent = time_s >= time_s[-1] - RECENT * (time_s[-1] - time_s[0])
+    line = np.polynomial.Polynomial.fit(time_s[recent], speed[recent], 1)
+    whole = np.polynomial.Polynomial.fit(time_s, speed, max(order - 1, 1))
+    (first, tau), _ = curve_fit(
+        lambda t, u, tau: u / (1.0 + t / tau),
+        time_s,
+        speed,
+        p0=(speed[0], max(float(np.ptp(time_s)), 1.0)),
+        bounds=((0.0, 1e-3), (np.inf, np.inf)),
+    )
+    yield RIVALS[0], lambda t: np.maximum(line(t), 0.0)
+    yield RIVALS[1], lambda t: np.clip(whole(t), 0.0, 2.0 * float(speed.max()))
+    yield RIVALS[2], lambda t: np.asarray(first / (1.0 + t / tau))
+
+
+def case_of(
+    name: str, part: float, window: Window, followed: Followed, ship: Ship, parameters: Parameters
+) -> Case:
+    """Foretell from a part of a coast by all methods."""
+    stop_ns = window.start_ns
+    length_s = float(followed.time_s[-1])
+    known = window.part(stop_ns, stop_ns + round(part * length_s * SECOND_NS))
+    found = estimate(known, ship, parameters)
+    if why := too_vague(found, parameters):
+        raise ShipdragError(why)
+    stop_m_s = float(found.curve.speed_m_s[-1])
+    forecast = foretell(found, ship, speeds_m_s=(LOWEST * stop_m_s,))
+    made_s = (forecast.made_ns - stop_ns) / SECOND_NS
+    slow = np.flatnonzero(followed.speed_m_s <= LOWEST * stop_m_s)
+    end_s = float(followed.time_s[slow[0]]) if len(slow) else length_s
+    if end_s <= made_s:
+        raise ShipdragError('she has lost nearly all of her speed by then')
+    ahead = EIGHTHS * (end_s - made_s)
+    start_m = np.interp(made_s, followed.way_time_s, followed.way_m)
+    was = np.stack(
+        [
+            np.interp(made_s + ahead, followed.time_s, followed.speed_m_s),
+            np.interp(made_s + ahead, followed.way_time_s, followed.way_m) - start_m,
+        ]
+    )
+    scale = np.array([[stop_m_s], [stop_m_s * length_s]])
+    fine = np.linspace(0.0, ahead[-1], FINE)
+    table_of = forecast.in_time(fine).T[1:]
+    speed, low, high, way, way_low, way_high = (np.interp(ahead, fine, each) for each in table_of)
+    median = np.stack([speed, way])
+    by = {
+        OURS: Predicted(
+            (median - was) / scale,
+            (median - np.stack([low, way_low])) / scale,
+            (np.stack([high, way_high]) - median) / scale,
+            ahead / made_s,
+        )
+    }
+    track = found.tracks.get('position')
+    fitted = (np.empty(0), np.empty(0))
+    if track is not None:
+        fitted = (track.time_ns - stop_ns) / SECOND_NS, track.fitted
+    seen = readings(known, stop_ns, fitted)
+    published = (
+        's1_speed' if known.speed_through_water or known.speed_over_ground else 's1_position'
+    )
+    try:
+        order = estimate(known, ship, Parameters(estimator=published, froude_min=SLOWEST)).order
+    except ShipdragError:
+        order = None
+    current = found.current_m_s or 0.0 if forecast.over_ground else 0.0
+    for rival, motion in rivals(*seen, order or 3):
+        u = motion(made_s + fine)
+        x = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (u[1:] + u[:-1]))])
+        there = np.stack([np.interp(ahead, fine, u), np.interp(ahead, fine, x + current * fine)])
+        nothing = np.zeros_like(there)
+        by[rival] = Predicted((there - was) / scale, nothing, nothing, ahead / made_s)
+    return Case(name, part, by)
+
+
+def cases(coast: KnownCoast, out: Path, estimator: str) -> Iterator[Case | str]:
+    """Yield the forecasts of a record, or why there is none."""
+    record, span = coast.record, coast.coast_s
+    assert span is not None
+    (run,) = open_runs([out / f'{record.name}.mcap'])
+    given = Parameters.load(ROOT / 'benchmarks' / 'ships' / f'{record.parameters}.yaml')
+    given = replace(given, estimator=estimator)
+    try:
+        result = replay(run, parameters=given, window=span)
+        found = coast_windows(result)
+        if not found:
+            raise ShipdragError('; '.join(each.text for each in result.not_coastdowns))
+        ((whole, window),) = found
+        if whole.estimate is None:
+            raise ShipdragError(whole.failure or 'no estimate of the whole coast')
+        followed = Followed.of(window, whole.estimate)
+    except ShipdragError as error:
+        yield f'{record.name}: what followed is not known: {error}'
+        return
+    for part in PARTS:
+        try:
+            yield case_of(record.name, part, window, followed, result.ship, result.parameters)
+        except ShipdragError as error:
+            yield f'{record.name}, after {part:.0%}: {error}'
+
+
+def with_bands(every: list[Case]) -> list[Case]:
+    """Give each rival the band that holds 90 % of its errors on the other records."""
+    found = []
+    for case in every:
+        by = dict(case.by)
+        for rival in RIVALS:
+            others = [each for each in every if each.record != case.record]
+            relative = [np.abs(each.by[rival].error) / each.by[rival].reach for each in others]
+            weights = [1.0 / sum(o.record == each.record for o in others) for each in others]
+            widths = [
+                weighted_quantile(
+                    np.concatenate([each[k] for each in relative]),
+                    np.repeat(weights, relative[0].shape[1]),
+                )
+                for k in range(2)
+            ]
+            half = np.array(widths)[:, None] * by[rival].reach
+            by[rival] = Predicted(by[rival].error, half, half, by[rival].reach)
+        found.append(Case(case.record, case.part, by))
+    return found
+
+
+def weighted_quantile(values: Float64, weights: Float64) -> float:
+    """Return the value below which 90 % of the weight lies."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, 0.9 * total[-1])])
+
+
+def report(every: list[Case], problems: list[str]) -> str:
+    """Return the tables."""
+    names = list(dict.fromkeys(each.record for each in every))
+    methods = (OURS, *RIVALS)
+    rows, wins, shares = [], {'score': np.zeros(3), 'error': np.zeros(3)}, []
+    numbers: list[tuple[str, bool, bool]] = []
+    for name in names:
+        mine = [each for each in every if each.record == name]
+        held = {m: np.mean([inside(each.by[m]) for each in mine]) for m in methods}
+        score = {m: np.mean([scores(each.by[m]) for each in mine]) for m in methods}
+        error = {m: np.median([np.abs(each.by[m].error) for each in mine]) for m in methods}
+        shares.append(held[OURS])
+        numbers.append((name, score[OURS] < score[RIVALS[0]], error[OURS] < error[RIVALS[0]]))
+        wins['score'] += [score[OURS] < score[m] for m in RIVALS]
+        wins['error'] += [error[OURS] < error[m] for m in RIVALS]
+        rows.append(
+            [
+                name,
+                len(mine),
+                f'{held[OURS]:.0%}',
+                *(f'{100.0 * score[m]:.3g}' for m in methods),
+                *(f'{100.0 * error[m]:.2g}' for m in methods),
+            ]
+        )
+    parts = [
+        f'{part:.0%}: {np.mean([inside(one.by[OURS]) for one in every if one.part == part]):.0%}'
+        for part in PARTS
+    ]
+    share, spread = float(np.mean(shares)), float(np.std(shares) / np.sqrt(len(shares)))
+    head = ['record', 'forecasts', 'inside 90 %']
+    head += [f'score, {m}' for m in methods] + [f'error, {m}' for m in methods]
+    n = len(names)
+    # the families of the law were chosen on the first of each two records of the list
+    listed = [coast.record.name for coast in COASTS if coast.coast_s is not None]
+    halves = []
+    for half, which in ((listed[::2], 'odd'), (listed[1::2], 'even')):
+        of_half = [
+            (share, row) for share, row in zip(shares, numbers, strict=True) if row[0] in half
+        ]
+        held = float(np.mean([share for share, _ in of_half]))
+        better = [sum(row[k] for _, row in of_half) for k in (1, 2)]
+        halves.append(
+            f'{which} records ({len(of_half)}): {held:.0%} inside, better score than persistence '
+            f'in {better[0]}, less error in {better[1]}'
+        )
+    lines = [
+        *table(head, rows),
+        '',
+        f'{len(every)} forecasts of {n} records. Inside the band: {share:.0%} ± {2 * spread:.0%} '
+        '(mean over records, ± two standard errors). '
+        + ' '.join(
+            f'{words} than {rival} in {int(won)} of {n} records.'
+            for key, words in (('score', 'Better score'), ('error', 'Less error'))
+            for rival, won in zip(RIVALS, wins[key], strict=True)
+        ),
+        '',
+        f'By part of the coast that was known: {", ".join(parts)}.',
+        '',
+        f'By half of the list: {"; ".join(halves)}.',
+        '',
+        *(f'- Not foretold: {each}' for each in problems),
+    ]
+    return '\n'.join(lines)
+
+
+def main() -> None:
+    """
+    Print the tables, and write them into the page if asked.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--write', action='store_true', help='into docs/forecast.md')
+    parser.add_argument('--estimator', default='one', help='of the estimate that is used')
+    parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'forecast')
+    options = parser.parse_args()
+    if DATA not in os.environ:
+        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+        return
+    options.out.mkdir(parents=True, exist_ok=True)
+    every: list[Case] = []
+    problems: list[str] = []
+    for coast in COASTS:
+        if coast.coast_s is None:
+            continue
+        (options.out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
+        run_command(coast.record.import_command(), data=Path(os.environ[DATA]), out=options.out)
+        for each in cases(coast, options.out, options.estimator):
+            if isinstance(each, str):
+                problems.append(each)
+            else:
+                every.append(each)
+            print(each if isinstance(each, str) else (each.record, each.part), flush=True)
+    text = report(with_bands(every), problems)
+    print(text)
+    if options.write:
+        put(PAGE, {'records': text})
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What `shipdrag learn` makes of effects that the library lacks, on ships that share no code with it.
+
+    python -m benchmarks.accuracy.learn_strangers --show kelp_below
+    python -m benchmarks.accuracy.learn_strangers --ships 8 --runs 4
+    python -m benchmarks.accuracy.learn_strangers --table
+
+`--show` is the whole way with one stranger: diagnosed, learnt, the gap on a run that was kept,
+and a later run diagnosed by name. Without it every stranger is learnt on every ship, and ships
+without one; a run that was broken off goes on where it was. `--table` shows what is there, and
+both write docs/results/learn_strangers.txt.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+os.environ.setdefault('OMP_NUM_THREADS', '1')
+
+import numpy as np
+from scipy.stats import binomtest
+
+from benchmarks.accuracy.diagnosis_score import as_block
+from benchmarks.worlds.hidden_b.cases import EPOCH_NS
+from benchmarks.worlds.strangers import world
+from benchmarks.worlds.strangers.hidden import CURVES, PLAIN, STRANGERS
+from shipdrag_ros import cli
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.term import LearntTerm
+from shipdrag_ros.simulation import Action, Scenario, simulate_columns
+from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import declared
+
+OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
+RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
+NAME = 'stranger'
+GONE = 0.9  # of the gap
+Found = dict[str, Any]
+
+
+def verb(line: Sequence[str]) -> Found:
+    """
+    Run a verb in this process and return its JSON.
+    """
+    written, said = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(said):
+        status = cli.main([*line, '--json'])
+    if status:
+        raise RuntimeError(f'shipdrag {line[0]} ended with {status}: {said.getvalue()}')
+    found: Found = json.loads(written.getvalue())
+    return found
+
+
+def write_run(case: world.Case, run: int, folder: Path) -> str:
+    """
+    Write a run as a bag; return its path.
+    """
+    path = folder / f'run_{run}.mcap'
+    with BagWriter(path) as writer:
+        writer.attach('ship.yaml', case.ship_file)
+        writer.write_samples(as_block(case.recording(run)))
+    return str(path)
+
+
+def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
+    """
+    Return which part of what a stranger does to the speed, without noise, a term foretells.
+    """
+    t, log, ground, _ = case.shown(run)
+    ship, setting = Ship.from_yaml(case.ship_file, subject='ship'), case.settings[run]
+    scenario = Scenario(
+        speed_m_s=setting.speed_m_s,
+        lead_in_s=60.0,
+        duration_s=float(t[-1]),
+        heading_rad=setting.heading_rad,
+        depth_m=setting.depth_m,
+        day=(EPOCH_NS * 1e-9 + setting.clock_s) / 86400.0,
+    )
+    sizes = [q.value for q in term.parameters.values()]
+    acting = declared(term).action(Frame(ship, scenario, setting.first_rad), *sizes)
+    time_s = np.clip(t + 60.0, 0.0, scenario.length_s)
+    read = simulate_columns(ship, scenario, [Action(), acting], time_s)
+    change = np.concatenate(
+        [speed[1] - speed[0] for speed in (read.log_m_s, read.speed_through_water_m_s)]
+    )
+    gap = np.concatenate([log, ground])
+    return 1.0 - float(np.sqrt(np.mean((gap - change) ** 2) / np.mean(gap**2)))
+
+
+def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
+    """
+    Learn from some runs of a ship; foretell the one that was kept, and diagnose a later one.
+    """
+    case = world.case(stranger, ship)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        bags = [write_run(case, run, folder) for run in list(world.LEARNT)[:runs]]
+        file = folder / 'effects' / f'{NAME}.yaml'
+        file.parent.mkdir()
+        alone = verb(['diagnose', bags[0]])
+        if show:
+            _show('first run', alone)
+        start = time.process_time()
+        found = verb(['learn', *bags, '-o', str(file), '--name', NAME])
+        result: Found = {
+            'stranger': stranger,
+            'ship': ship,
+            'runs': runs,
+            'cpu_s': round(time.process_time() - start, 1),
+            'kind': None,
+            'reason': found['reason'],
+            'probability': {k: round(p, 3) for k, p in found['probability'].items() if p > 0.01},
+            'cut': 0.0,
+            'alone': [alone['verdict'], [each['name'] for each in alone['effects']]],
+            'later': None,
+        }
+        if found['learnt'] is None:
+            return result
+        term = LearntTerm.load(file)
+        result['kind'] = [term.form.channel, term.form.variable, term.form.shape]
+        result['parameters'] = {k: [q.value, q.sd] for k, q in term.parameters.items()}
+        result['evidence'] = found['learnt']['evidence']
+        if stranger:
+            result['cut'] = round(gap_cut(case, world.KEPT, term), 3)
+        if show:
+            print(file.read_text())
+            print(f'gap of a run that was kept: {result["cut"]:.0%} gone')
+        bag = write_run(case, world.LATER, folder)
+        later = verb(['diagnose', bag, '--effects', str(file.parent)])
+        result['later'] = [later['verdict'], [each['name'] for each in later['effects']]]
+        if show:
+            _show('later run', later)
+    return result
+
+
+def _show(what: str, found: Found) -> None:
+    names = ', '.join(each['name'] for each in found['effects'])
+    print(f'{what}: {found["verdict"]} {names}; where: {found["where"]}')
+
+
+def table(rows: Sequence[Found]) -> Iterator[str]:
+    """
+    Yield shares with their intervals of 95 %, and each case.
+    """
+    yield 'What `python benchmarks/learn_strangers.py` learnt; seeds: the ships of each stranger'
+    for runs in sorted({row['runs'] for row in rows}):
+        mine = [row for row in rows if row['runs'] == runs]
+        plain = [row for row in mine if row['stranger'] in PLAIN]
+        other = [row for row in mine if row['stranger'] and row['stranger'] not in PLAIN]
+        empty = [row for row in mine if not row['stranger']]
+        right = [tuple(row['kind'] or ()) == CURVES[row['stranger']] for row in plain]
+        wrong = [row['kind'] is not None and not ok for row, ok in zip(plain, right, strict=True)]
+        cut = [row['cut'] >= GONE for row in (*plain, *other)]
+        written = [row for row in (*plain, *other) if row['kind'] is not None]
+        yield f'\n{runs} runs, {len(mine)} cases'
+        yield _line('the twelve: form right', right)
+        yield _line('the twelve: another form', wrong)
+        yield _line('the others: a form written', [row['kind'] is not None for row in other])
+        yield _line('without a stranger: a form written', [r['kind'] is not None for r in empty])
+        yield _line('90 % of the gap of a run that was kept gone', cut)
+        yield _line(
+            'written, and named in a later run', [r['later'][1] == [NAME] for r in written]
+        )
+        alone = [row['alone'][0] == 'named' for row in (*plain, *other)]
+        yield _line('one run diagnosed alone: a name, which is wrong', alone)
+        yield f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}'
+        for row in sorted(mine, key=lambda row: (row['stranger'], row['ship'])):
+            kind = ' '.join(row['kind'] or ['-'])
+            likeliest = next(iter(row['probability'].items()), ('-', 0.0))
+            yield (
+                f'  {row["stranger"] or "(none)":18s} ship {row["ship"]} written: {kind:24s} gap '
+                f'gone {row["cut"]:5.2f}  likeliest {likeliest[0]} {likeliest[1]:.2f}  alone '
+                f'{" ".join([row["alone"][0], *row["alone"][1]])}  later {row["later"]}'
+            )
+
+
+def _line(what: str, hits: Sequence[bool]) -> str:
+    if not hits:
+        return f'{what:48s} no case'
+    low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
+    return f'{what:48s} {sum(hits):3d} of {len(hits):3d}  ({low:.2f} .. {high:.2f})'
+
+
+def main() -> None:
+    """
+    Learn on all cases that are not done, or show one.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--show', choices=list(STRANGERS))
+    parser.add_argument('--ships', type=int, default=1)
+    parser.add_argument('--runs', type=int, nargs='+', default=[4])
+    parser.add_argument('--only', nargs='+', choices=[*STRANGERS, 'none'])
+    parser.add_argument('--table', action='store_true')
+    options = parser.parse_args()
+    if options.show:
+        print(json.dumps(tried(options.show, 0, options.runs[0], show=True), indent=1))
+        return
+    OUT.parent.mkdir(exist_ok=True)
+    rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
+    if not options.table:
+        done = {(row['stranger'], row['ship'], row['runs']) for row in rows}
+        names = ['' if name == 'none' else name for name in options.only or ['none', *STRANGERS]]
+        for ship in range(options.ships):
+            for name in names:
+                for runs in options.runs:
+                    if (name, ship, runs) in done:
+                        continue
+                    rows.append(tried(name, ship, runs))
+                    with OUT.open('a') as file:
+                        print(json.dumps(rows[-1]), file=file)
+    text = '\n'.join(table(rows))
+    RESULTS.write_text(text + '\n')
+    print(text)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+S3's sensitivity analysis: its observations beside ours, its reduced model, what it does not say.
+
+    python -m benchmarks.figures s3_sensitivity
+
+Prints the tables; `--pictures` draws those of docs/s3_sensitivity.md.
+Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor. Times are of the
+processor, in this process; the batched call is the best of 5, the loop of 161 runs is made once.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks._tables import table as markdown
+from benchmarks.accuracy import _plain_mariner
+from benchmarks.accuracy._wrong_values import verdicts
+from shipdrag_ros.display import Table
+from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, save
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+    ManoeuvreMotion,
+    Side,
+    overshoots_rad,
+    turn,
+    zigzag,
+)
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
+from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.sensitivity.coast import coast_from
+from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
+from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
+from shipdrag_ros.studies.sensitivity.face import steering as steering_words
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm
+from shipdrag_ros.studies.sensitivity.steering import (
+    APPROACH_S,
+    Experiment,
+    Observations,
+    SteeringStudy,
+    experiment,
+    respond,
+    study,
+)
+
+DOCS = Path(__file__).resolve().parents[2] / 'docs'
+SHIP, PAPER, KEEP = mariner(), zigzag(15.0), 24
+RTOL = 1e-6
+ROUNDS = 5
+CONTROLS_S = (0.0, 0.1, 0.5)
+KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s
+SHIP_SPEED_M_S = 8.2
+
+
+@dataclass(frozen=True)
+class Speed:
+    """
+    Batched runs beside a loop of solve_ivp, [s] of the processor.
+
+    Attributes
+    ----------
+    batched, looped
+    runs
+    largest
+        Difference of a loss, over the largest loss.
+    same
+        Whether both keep the same derivatives.
+    """
+
+    batched: float
+    looped: float
+    runs: int
+    largest: float
+    same: bool
+
+
+def speed(found: SteeringStudy) -> Speed:
+    """
+    Do the same 161 runs both ways.
+    """
+    factors = [
+        (name, 1.0 + change) for name in FORM for change in CHANGES
+    ]  # the order of the table of losses
+    sets = [dict(SHIP.viscous)]
+    sets += [{**SHIP.viscous, name: factor * SHIP.viscous[name]} for name, factor in factors]
+    table = np.array([[one[name] for name in FORM] for one in sets])
+    times = []
+    for _ in range(ROUNDS):
+        begin = time.process_time()
+        motions = steer(SHIP, PAPER, table, control_s=0.0)
+        times.append(time.process_time() - begin)
+    time_s = motions.time_s
+    begin = time.process_time()
+    looped = [
+        _plain_mariner.zigzag(SHIP, one, PAPER.rudder_rad, time_s, rtol=RTOL) for one in sets
+    ]
+    elapsed = time.process_time() - begin
+    scale = np.array([1.0, 1.0, 1.0 / SHIP.length_m]) * SHIP.speed_m_s
+    differences = (np.array(looped[1:]) - looped[0]) / scale
+    losses = Losses(FORM, Norm.ROOT_MEAN_SQUARE.of(differences).reshape(len(FORM), -1))
+    error = np.max(np.abs(losses.table - found.losses.table)) / np.max(losses.table)
+    same = set(losses.select(KEEP).kept) == set(found.selection.kept)
+    return Speed(min(times), elapsed, len(sets), float(error), same)
+
+
+def checks() -> Table:
+    """
+    Show the figures of standard manoeuvres beside those known of the same values.
+    """
+    rows = []
+    for angle, (starboard, port) in KNOWN.items():
+        for first in Side:
+            manoeuvre = zigzag(angle, first=first)
+            cells = []
+            for control_s in CONTROLS_S:
+                motion = steer(SHIP, manoeuvre, control_s=control_s)[0]
+                over = np.degrees(overshoots_rad(motion, manoeuvre))
+                cells.append(f'{over[0]:.2f} / {over[1]:.2f}')
+            motion = steer(SHIP, manoeuvre, approach_s=APPROACH_S)[0]
+            over = np.degrees(overshoots_rad(motion, manoeuvre))
+            largest = f'{max(over[::2]):.2f} / {max(over[1::2]):.2f}'
+            known = f'{starboard} / {port}' if first is Side.STARBOARD else ''
+            rows.append((f'{manoeuvre.name}, to {first}', *cells, largest, known))
+    heads = [f'looks every {control_s:g} s' for control_s in CONTROLS_S[1:]]
+    return Table(
+        (
+            'first / second overshoot [deg]',
+            'at the very heading',
+            *heads,
+            f'largest to each side, 0.1 s, order after {APPROACH_S:g} s',
+            'known',
+        ),
+        tuple(rows),
+    )
+
+
+def _turned(motion: ManoeuvreMotion, heading_rad: float, value: Float64) -> float:
+    """Return what a turning ship has done when her heading has changed by so much."""
+    turned = np.abs(motion.heading_rad)
+    i = int(np.argmax(turned >= heading_rad))
+    return float(np.interp(heading_rad, turned[i - 1 : i + 1], np.abs(value[i - 1 : i + 1])))
+
+
+def circles() -> Table:
+    """
+    Show turning circles.
+    """
+    rows = []
+    for first in Side:
+        circle = turn(35.0, first=first)
+        motions = [steer(SHIP, circle, approach_s=each)[0] for each in (0.0, APPROACH_S)]
+        cells = [
+            f'{_turned(motion, 0.5 * np.pi, motion.position_m[:, 0]):.0f} / '
+            f'{_turned(motion, np.pi, motion.position_m[:, 1]):.0f}'
+            for motion in motions
+        ]
+        known = '566 / 1029' if first is Side.STARBOARD else ''
+        rows.append((f'turn:35 to {first}', *cells, known))
+    heads = (
+        'advance / tactical diameter [m]',
+        'order at once',
+        f'order after {APPROACH_S:g} s',
+        'known',
+    )
+    return Table(heads, tuple(rows))
+
+
+def observations() -> Table:
+    """
+    Show what the paper saw, for both norms and several helmsmen.
+    """
+    rows = []
+    for control_s in CONTROLS_S:
+        responses = respond(SHIP, PAPER, control_s=control_s)
+        kept = [set(responses.losses(norm).select(KEEP).kept) for norm in Norm]
+        for norm in Norm:
+            seen = Observations.of(responses.losses(norm))
+            rows.append(
+                (
+                    'at the very heading' if control_s == 0.0 else f'looks every {control_s:g} s',
+                    str(norm),
+                    f'{seen.unlike[0]:.1%}',
+                    f'{seen.unlike[1]:.1%}',
+                    f'{seen.growth:.2f}',
+                    'the same' if kept[0] == kept[1] else f'{len(kept[0] - kept[1])} differ',
+                )
+            )
+    heads = ('rudder reversed', 'norm', '+10 / -10 %', '+50 / -50 %', '50 / 10 %', 'kept by both')
+    return Table(heads, tuple(rows))
+
+
+def surge() -> list[tuple[str, Float64]]:
+    """
+    Return the surge speed after changes of Xu, the paper's figure 1.
+    """
+    i = FORM.index('Xu')
+    sets = np.tile(SHIP.values, (1 + len(CHANGES), 1))
+    sets[1:, i] *= 1.0 + np.array(CHANGES)
+    speeds = steer(SHIP, PAPER, sets, control_s=0.0).speeds[:, :, 0]
+    labels = ['as it is', *(f'Xu {change:+.0%}' for change in CHANGES)]
+    return list(zip(labels, speeds))
+
+
+def lines_of(table: Table) -> list[str]:
+    """
+    Return a table in Markdown.
+    """
+    return markdown(table.columns, table.rows)
+
+
+def tables(
+    found: SteeringStudy, shown: Experiment, coast: CoastStudy, timed: Speed, wrong: Table
+) -> Iterator[str]:
+    """
+    Yield the lines of the result file.
+    """
+    root = Observations.of(found.losses)
+    for heading, table in (
+        ('Losses, where the rudder is reversed', observations()),
+        ('Overshoots', checks()),
+        ('Circles', circles()),
+        (steering_words.LOSSES, steering_words.loss_table(found)),
+        ('25/25 of the full and of the reduced models', steering_words.check_table(found)),
+        (steering_words.DESIGN, steering_words.design_table(shown)),
+        (coasting_words.LOSSES, coasting_words.loss_table(coast)),
+        (coasting_words.MIMICS, coasting_words.mimic_table(coast)),
+        ('What diagnose says of one wrong value of the file, seeds 0 and 1', wrong),
+    ):
+        yield from ('', heading, '', *lines_of(table))
+    yield ''
+    yield f'50 % over 10 %: {root.growth:.2f}; kept {len(found.selection.kept)} of {len(FORM)}'
+    yield (
+        f'{timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a loop of scipy '
+        f'(RK45, rtol {RTOL:g}) {timed.looped:.1f} s; losses agree to {timed.largest:.0e}'
+    )
+    yield coasting_words.sentence(coast)
+    yield from (f'- {note}' for note in coasting_words.notes(coast))
+
+
+def _surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Figure:
+    """Draw the surge speed of one manoeuvre after several changes of a derivative."""
+    styles = (('#444444', '-'), (BLUE, '--'), (GREEN, '-.'), (VERMILION, ':'), (ORANGE, '--'))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.2), layout='constrained')
+        axis = figure.subplots()
+        for (label, speed), (color, style) in zip(speeds, styles):
+            axis.plot(time_s, speed, color=color, linestyle=style, label=label)
+        axis.set_xlabel('time after the first order [s]')
+        axis.set_ylabel('u [m/s]')
+        axis.legend(loc='upper right', ncols=len(speeds))
+    return figure
+
+
+def main() -> None:
+    """
+    Print the tables, and draw where that is asked for.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        '--pictures', action='store_true', help='draw those of docs/s3_sensitivity.md'
+    )
+    options = parser.parse_args()
+    text = files('shipdrag_ros').joinpath('data', 'vitus_bering.yaml').read_text('utf-8')
+    ship = Ship.from_yaml(text, subject='vitus_bering.yaml')
+    found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)
+    coast = study_coast(ship, coast_from(ship, SHIP_SPEED_M_S))
+    print(*tables(found, shown, coast, speed(found), verdicts(ship)), sep='\n')
+    if not options.pictures:
+        return
+    time_s = found.check.full.time_s
+    for name, figure in (
+        ('surge', _surge_picture(time_s, surge())),
+        ('ranking', sensitivity_pictures.ranking_picture(found)),
+        ('check', sensitivity_pictures.check_picture(found)),
+        ('design', sensitivity_pictures.design_picture(shown)),
+        ('particulars', sensitivity_pictures.particulars_picture(coast)),
+        ('mimics', sensitivity_pictures.mimic_picture(coast)),
+    ):
+        save(figure, DOCS / 'pictures' / f's3_{name}.png', pixels_per_inch=100)
+
+
+if __name__ == '__main__':
+    main()

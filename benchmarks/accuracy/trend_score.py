@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Trend on simulated fleets: cover of growth and level, cleanings found, false steps, cost.
+
+The world here is not the trend's model: fouling saturates or grows in bursts in port,
+seasons move the resistance, errors have long tails, some runs are junk. Beside the trend
+stand a straight line through all runs, the difference of means before and after, as
+ISO 19030 compares periods, and change points by `ruptures` where it is installed; all in
+one table.
+
+    python -m benchmarks.accuracy.trend_score --ships 40 --years 2.5 --seed 1
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shipdrag_ros.trend.change_points import search
+from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps
+
+WEEK = 7.0 / 365.25
+MONTH = 31.0 / 365.25
+
+
+@dataclass(frozen=True)
+class World:
+    """A ship's runs and the truth behind them."""
+
+    runs: Runs
+    level: np.ndarray
+    growth: float
+    cleaned: float | None
+
+
+def ship(rng: np.random.Generator, years: float, cleaning: float) -> World:
+    """Simulate weekly runs; `cleaning` is what a cleaning takes away, 0 for none."""
+    at = np.arange(0.0, years, WEEK) + rng.uniform(0.0, 0.5 * WEEK)
+    at = at[rng.uniform(size=len(at)) < 0.9]
+    if rng.uniform() < 0.5:
+        level = rng.uniform(0.15, 0.5) * (1.0 - np.exp(-at / rng.uniform(1.0, 4.0)))
+    else:  # bursts: months in warm ports
+        bursts = rng.gamma(1.0, 0.12 / 12.0, len(at)) * (rng.uniform(size=len(at)) < 0.3)
+        level = np.cumsum(bursts + 0.06 * WEEK)
+    growth = float(level[-1] - level[0]) / float(at[-1] - at[0])
+    when = None
+    if cleaning:
+        when = float(rng.uniform(0.2, 0.8) * years)
+        level = level - cleaning * (at >= when)
+    season = 0.004 * np.sin(2.0 * np.pi * (at + rng.uniform()))
+    sd = rng.uniform(0.006, 0.012, len(at))
+    error = sd * rng.normal(size=len(at)) + 0.0175 * np.sqrt(3 / 5) * rng.standard_t(5, len(at))
+    error += (rng.uniform(size=len(at)) < 0.02) * rng.normal(0.0, 0.2, len(at))
+    seen = Runs(at - at[0], level + season + error, sd, np.zeros((len(at), 0)))
+    return World(seen, level, growth, None if when is None else when - float(at[0]))
+
+
+def _is_jump(world: World, year: float) -> bool:
+    """Say whether the hull fouled by 2 % or more within a month around a step."""
+    near = np.abs(world.runs.years - year) < 0.5 * MONTH
+    return bool(near.any() and np.ptp(world.level[near]) > 0.02)
+
+
+def first_noticed(world: World) -> float | None:
+    """Return how many days after a cleaning it is first found and dated, week by week."""
+    assert world.cleaned is not None
+    years = world.runs.years
+    for last in np.flatnonzero(years > world.cleaned + WEEK)[::2]:
+        part = Runs(
+            *(
+                each[: last + 1]
+                for each in (years, world.runs.added, world.runs.sd, world.runs.covariates)
+            )
+        )
+        steps = search(part, Steps(), Growth()).steps
+        if any(abs(step.year - world.cleaned) < MONTH for step in steps):
+            return float(years[last] - world.cleaned) * 365.25
+    return None
+
+
+def steps_by_ruptures(runs: Runs) -> list[float] | None:
+    """Return the change points of the runs less a straight line, by PELT; None without it."""
+    try:
+        import ruptures
+    except ImportError:  # of peers.in; nothing else needs it
+        return None
+    rest = runs.added - np.polyval(np.polyfit(runs.years, runs.added, 1), runs.years)
+    step = np.diff(rest)
+    variance = float(np.median(np.abs(step)) / 0.6745) ** 2 / 2.0
+    penalty = 3.0 * variance * np.log(len(rest))
+    ends = ruptures.Pelt(model='l2', min_size=2, jump=1).fit(rest).predict(pen=penalty)[:-1]
+    return [float(0.5 * (runs.years[end - 1] + runs.years[end])) for end in ends]
+
+
+def growth_by_means(runs: Runs) -> float:
+    """Return the growth by the means of the first and the last three months."""
+    first, last = runs.years < 0.25, runs.years > runs.years[-1] - 0.25
+    rise = runs.added[last].mean() - runs.added[first].mean()
+    return float(rise / (runs.years[last].mean() - runs.years[first].mean()))
+
+
+@dataclass
+class Score:
+    """What is counted over ships of one kind."""
+
+    ships: int = 0
+    years: float = 0.0
+    inside: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
+    off: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    level: list[float] = field(default_factory=list)
+    false: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    bursts: int = 0
+    found: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    size: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def add(self, world: World, cleaning: float) -> None:
+        """Score one ship."""
+        runs, seen = world.runs, search(world.runs, Steps(), Growth())
+        self.ships += 1
+        self.years += float(runs.years[-1])
+        slope = seen.open.growth_per_year()
+        self._growth('trend', world, float(slope.value[0]), float(slope.sd[0]))
+        fit, covariance = np.polyfit(runs.years, runs.added, 1, cov=True)
+        self._growth('line', world, float(fit[0]), float(np.sqrt(covariance[0, 0])))
+        self._growth('means', world, growth_by_means(runs), None)
+        band = seen.open.level(runs.years)
+        self.level.append(float(np.mean(np.abs(band.value - world.level) < 1.96 * band.sd)))
+        for name, steps in (
+            ('trend', [step.year for step in seen.steps]),
+            ('ruptures', steps_by_ruptures(runs)),
+        ):
+            if steps is None:
+                continue
+            near = [world.cleaned and abs(year - world.cleaned) < MONTH for year in steps]
+            self.found[name] += any(near)
+            others = [year for year, right in zip(steps, near) if not right]
+            self.false[name] += sum(not _is_jump(world, year) for year in others)
+            if name == 'trend':
+                self.bursts += sum(_is_jump(world, year) for year in others)
+        if world.cleaned is not None:
+            known = HullState(runs, Steps(np.array([world.cleaned])), Growth())
+            self.size['trend'].append(float(known.changes().value[0]) + cleaning)
+            half = np.abs(runs.years - world.cleaned) < 0.25
+            after = runs.years >= world.cleaned
+            change = runs.added[half & after].mean() - runs.added[half & ~after].mean()
+            self.size['means'].append(float(change) + cleaning)
+
+    def _growth(self, name: str, world: World, value: float, sd: float | None) -> None:
+        self.off[name].append(value - world.growth)
+        if sd is not None:
+            self.inside[name].append(abs(value - world.growth) < 1.96 * sd)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return what was counted: what, then of the trend and of each peer; '-': says nothing."""
+        inside = {name: f'{np.mean(each):.0%}' for name, each in self.inside.items()}
+        off = {name: _rms(each) for name, each in self.off.items()}
+        false = {name: str(many) for name, many in self.false.items()}
+        rows = [
+            _row('growth inside its 95 % band', inside),
+            _row('growth, rms error a year', off),
+            _row('level inside its 95 % band', {'trend': f'{np.mean(self.level):.0%}'}),
+            _row(f'false steps in {self.years:.0f} ship-years', false),
+            _row('sudden growth found beside them', {'trend': str(self.bursts)}),
+        ]
+        if self.size:
+            found = {name: f'{many / self.ships:.0%}' for name, many in self.found.items()}
+            rows.append(_row('found and dated within a month', found))
+            size = {name: _rms(each) for name, each in self.size.items()}
+            rows.append(_row('size where its date is known, rms error', size))
+        return rows
+
+
+METHODS = {
+    'trend': 'trend',
+    'line': 'straight line',
+    'means': 'difference of means',
+    'ruptures': 'ruptures (PELT)',
+}
+
+
+def _row(what: str, values: dict[str, str]) -> tuple[str, ...]:
+    return (what, *(values.get(name, '-') for name in METHODS))
+
+
+def show(rows: list[tuple[str, ...]]) -> None:
+    """Print a table; a method that says nothing of something has a dash."""
+    for what, *values in rows:
+        print(f'{what:<50}' + ''.join(f'{value:>21}' for value in values))
+
+
+def _rms(errors: list[float]) -> str:
+    return f'{np.sqrt(np.mean(np.square(errors))):.1%}'
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--ships', type=int, default=40)
+    parser.add_argument('--years', type=float, default=2.5)
+    parser.add_argument('--cleaning', type=float, default=0.05)
+    parser.add_argument('--noticed', type=int, default=5, help='ships followed week by week')
+    parser.add_argument('--seed', type=int, default=1)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    noted: list[object] = []
+    show([(f'{options.ships} ships each, weekly runs, scatter 2 %', *METHODS.values())])
+    for cleaning in (0.0, options.cleaning):
+        score = Score()
+        for number in range(options.ships):
+            world = ship(rng, options.years, cleaning)
+            score.add(world, cleaning)
+            if cleaning and number < options.noticed:
+                noted.append(first_noticed(world))
+        what = f'one cleaning of {cleaning:.0%} that nobody noted:' if cleaning else 'no cleaning:'
+        show([(what,), *score.rows()])
+    if noted:
+        days = [day and round(day) for day in noted]
+        print(f'first noticed after (days, {options.noticed} ships): {days}')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,390 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cases of world B: what may be seen, and apart from it the truth.
+
+Cases of even number are for choosing methods, those of odd number for scoring alone: whoever
+tunes anything looks at the even ones only. Both halves hold the same mixture. Every case is made
+anew from its seed and number.
+
+Light air, small currents, small errors and the filter of the log are in every case; together they
+move r by less than one percent (`everyday`) and are no effect. What is hidden moves it by
+`LEAST` or more (`Truth.r_change`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.facts import Facts, draw_facts
+from benchmarks.worlds.hidden_b.hulls import Array, Hull, draw_hull
+from benchmarks.worlds.hidden_b.instruments import CONTEXT, FURTHER, MOTION, Recording, read
+from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
+from benchmarks.worlds.hidden_b.library import FREE, LIBRARY, SECOND
+from benchmarks.worlds.hidden_b.measure import moved, run_down_s
+from benchmarks.worlds.hidden_b.plans import Condition, plans_of
+from benchmarks.worlds.hidden_b.screws import Screw, draw_screw
+from benchmarks.worlds.hidden_b.setting import Faults, Setting
+from benchmarks.worlds.hidden_b.shipfile import Stated, draw_stated, ship_file
+from benchmarks.worlds.hidden_b.strangers import OUTSIDE
+from benchmarks.worlds.hidden_b.voyage import sail, steady_point
+from benchmarks.worlds.hidden_b.weather import Weather, draw_weather
+
+SEED = 77_001
+LEAST, MOST, EVERYDAY = 0.03, 0.45, 0.01
+RECIPROCAL, THIRD = 'reciprocal_run', 'third_run'
+TESTS = (RECIPROCAL, *CONTEXT, *FURTHER)
+EPOCH_NS = 1_780_272_000_000_000_000  # 1 June 2026
+
+
+@dataclass(frozen=True)
+class Observation:
+    """
+    What a diagnosis may see: the ship file, and the readings of each run.
+    """
+
+    ship_file: str
+    runs: tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """
+    What was hidden.
+
+    Attributes
+    ----------
+    kind
+        `none`, `one`, `pair` or `outside`.
+    shelf
+        0 where nothing of the library is hidden, 2 for its rarer effects, else 1.
+    names
+        In alphabetical order; `unknown` for what is outside of the library.
+    parameters
+        By name of effect and of parameter.
+    condition
+    what
+        Names of the effects themselves.
+    r_change
+        By how much each moves r, of its largest value; see `measure.moved`.
+    facts, lies
+        What the crew says, and which of it is false.
+    """
+
+    kind: str
+    shelf: int
+    names: tuple[str, ...]
+    parameters: dict[str, dict[str, float]]
+    condition: Condition
+    what: tuple[str, ...]
+    r_change: dict[str, float]
+    facts: Facts
+    lies: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Known:
+    """
+    What an oracle knows of a case beside what is seen; nothing of what is hidden.
+
+    Attributes
+    ----------
+    hull
+        Her lines; resistance and added mass are empty: the ship file states them.
+    screw
+        Propeller and engine as they usually are.
+    kit
+        Her instruments as their manuals have them: no scale and no offset of the log.
+    lead_s, coast_s, step_s
+        Length of the steady part and of the rest, and the time step of the simulation.
+    clock_s
+        Time of day at the stop, of each run.
+    """
+
+    hull: Hull
+    screw: Screw
+    kit: Kit
+    lead_s: float
+    coast_s: float
+    step_s: float
+    clock_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Case:
+    hull: Hull
+    screw: Screw
+    stated: Stated
+    kit: Kit
+    ship: str
+    hidden: tuple[Hidden, ...]
+    sizes: tuple[float, ...]
+    settings: tuple[Setting, ...]
+    everyday: float
+
+
+def count(seed: int = SEED) -> int:
+    """
+    Return the number of cases.
+    """
+    return len(plans_of(seed))
+
+
+def condition(number: int, seed: int = SEED) -> Condition:
+    """
+    Return what is given of a case.
+    """
+    return plans_of(seed)[number][1]
+
+
+def observe(number: int, *, added: tuple[str, ...] = (), seed: int = SEED) -> Observation:
+    """
+    Return what a diagnosis may see of a case.
+
+    Parameters
+    ----------
+    number
+        Of the case, from 0.
+    added
+        Of `TESTS`: what is measured besides; `THIRD`, a third run on another course, too. All
+        else keeps its last digit.
+    seed
+        Of the world.
+    """
+    case, given = _case(number, seed), condition(number, seed)
+    runs = 3 if THIRD in added else max(2, given.runs) if RECIPROCAL in added else given.runs
+    inputs = {*MOTION, *(CONTEXT if given.context else ()), *added} - {RECIPROCAL, THIRD}
+    ordered = tuple(name for name in (*MOTION, *CONTEXT, *FURTHER) if name in inputs)
+    readings = []
+    for setting in case.settings[:runs]:
+        track = sail(setting)
+        start = EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
+        readings.append(read(track, setting, case.kit, ordered, start))
+    return Observation(case.ship, tuple(readings))
+
+
+def stops_ns(number: int, seed: int = SEED) -> tuple[int, ...]:
+    """
+    Return when the engine was stopped, of each run.
+    """
+    return tuple(EPOCH_NS + round(s.clock_s * 1e9) for s in _case(number, seed).settings)
+
+
+def known(number: int, seed: int = SEED) -> Known:
+    """
+    Return what an oracle knows of a case.
+    """
+    case = _case(number, seed)
+    runs = case.settings
+    return Known(
+        hull=replace(case.hull, still_n=np.zeros_like(case.hull.still_n), n_r=0.0),
+        screw=case.screw,
+        kit=replace(case.kit, log_scale=0.0, log_offset_m_s=0.0),
+        lead_s=runs[0].lead_s,
+        coast_s=runs[0].coast_s,
+        step_s=runs[0].step_s,
+        clock_s=tuple(run.clock_s for run in runs),
+    )
+
+
+def reveal(number: int, seed: int = SEED) -> Truth:
+    """
+    Return what was hidden in a case.
+    """
+    names, given = plans_of(seed)[number]
+    case = _case(number, seed)
+    outside = bool(set(names) & set(OUTSIDE))
+    kind = 'outside' if outside else ('none', 'one', 'pair')[len(names)]
+    first = case.settings[0]
+    wind = float(np.hypot(*np.sum([first.weather.wind, *first.wind], axis=0)))
+    drive = first.screw.drive
+    facts, lies = draw_facts(np.random.default_rng([seed, number, 9]), names, drive, wind)
+    return Truth(
+        kind,
+        0 if outside or not names else 2 if set(names) & set(SECOND) else 1,
+        ('unknown',) if outside else tuple(sorted(names)),
+        {each.name: each.parameters for each in case.hidden},
+        given,
+        tuple(sorted(names)),
+        {each.name: size for each, size in zip(case.hidden, case.sizes, strict=True)},
+        facts,
+        lies,
+    )
+
+
+def true_r(number: int, speed_m_s: Array, run: int = 0, seed: int = SEED) -> Array:
+    """
+    Return the true r at speeds [m/s^2]: of hull, stopped propeller and what else goes with speed.
+
+    Wind, waves, current, helm and what comes and goes are no part of it.
+    """
+    setting = _case(number, seed).settings[run]
+    speed = np.asarray(speed_m_s, np.float64)
+    hull = setting.hull
+    still = np.interp(speed, hull.grid_m_s, setting.still_n())
+    grid = np.linspace(0.0, 1.2 * hull.speed_m_s, 160)
+    drag = setting.screw.drag_n(grid, _steady(setting))
+    return (still + np.interp(speed, grid, drag)) / setting.mass_kg
+
+
+def everyday(number: int, seed: int = SEED) -> float:
+    """
+    Return by how much the weather that is always there moves r.
+    """
+    return _case(number, seed).everyday
+
+
+def first_speed(number: int, run: int = 0, seed: int = SEED) -> float:
+    """
+    Return the steady speed of a run.
+    """
+    return _case(number, seed).settings[run].speed_m_s
+
+
+def _steady(setting: Setting) -> tuple[float, float]:
+    need = float(np.interp(setting.speed_m_s, setting.hull.grid_m_s, setting.still_n()))
+    return steady_point(setting, need)[1:]
+
+
+@lru_cache(maxsize=16)
+def _case(number: int, seed: int) -> _Case:
+    names, _ = plans_of(seed)[number]
+    rng = np.random.default_rng([seed, number, 0])
+    drives: tuple[str, ...] = ()
+    for name in names:
+        drives = LIBRARY[name][1] if name in LIBRARY and LIBRARY[name][1] else drives
+    if {'residual_thrust', 'locked_propeller'} & set(names):
+        drives = FREE
+    hull = draw_hull(rng, drives)
+    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
+    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
+    lead = rng.uniform(900.0, 2400.0) if hull.time_s > 100.0 else rng.uniform(500.0, 1200.0)
+    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    if {'radar_scale', 'gyro_ballistic'} & set(names):
+        kit = replace(kit, fix='radar', fix_every_s=3.0)
+    weather = draw_weather(rng, hull.time_s, hull.speed_m_s)
+    bases = _legs(rng, hull, screw, weather, lead, coast, (seed, number))
+    weather, kit, moves = calm(bases, kit)
+    bases = tuple(replace(base, weather=weather) for base in bases)
+    stated = draw_stated(rng)
+    steady = _steady(bases[0])
+    text = ship_file(hull, screw, steady, run_down_s(bases[0]), stated, number)
+    key = (seed, number, 1)
+    hidden, sizes = [], []
+    for place, name in enumerate(names):
+        effect, size = _sized(name, place, key, bases[0], kit, steady)
+        hidden.append(effect)
+        sizes.append(size)
+    settings = []
+    for run, base in enumerate(bases):
+        setting = fresh(base)
+        for effect in hidden:
+            if effect.scope != 'run' or run == 0:
+                effect.apply(setting)
+        settings.append(setting)
+    found = tuple(hidden), tuple(sizes), tuple(settings)
+    return _Case(hull, screw, stated, kit, text, *found, moves)
+
+
+def fresh(base: Setting) -> Setting:
+    """
+    Return a copy whose lists are its own.
+    """
+    lists = ('still', 'timed', 'wind', 'flow', 'helm', 'shear', 'waves')
+    return replace(base, **{name: list(getattr(base, name)) for name in lists})
+
+
+def _legs(
+    rng: np.random.Generator,
+    hull: Hull,
+    screw: object,
+    weather: Weather,
+    lead: float,
+    coast: float,
+    key: tuple[int, int],
+) -> tuple[Setting, ...]:
+    """Return three runs: a first, one back, one on another course."""
+    first = rng.uniform(-np.pi, np.pi)
+    headings = (first, first + np.pi + rng.normal(0, 0.03), first + rng.uniform(1.0, 2.1))
+    clock = rng.uniform(6.0, 14.0) * 3600.0
+    legs = []
+    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
+    lead = round(lead / step) * step
+    for run, heading in enumerate(headings):
+        speed = hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.8, 0.98))
+        legs.append(
+            Setting(
+                hull=hull,
+                screw=screw,  # type: ignore[arg-type]
+                weather=weather,
+                speed_m_s=speed,
+                heading_rad=heading,
+                first_rad=first,
+                lead_s=lead,
+                coast_s=coast,
+                step_s=step,
+                clock_s=clock,
+                seed=(*key, 2, run),
+                depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),
+            )
+        )
+        clock += lead + coast + rng.uniform(300.0, 900.0)
+    return tuple(legs)
+
+
+def calm(bases: tuple[Setting, ...], kit: Kit) -> tuple[Weather, Kit, float]:
+    """
+    Return weather and instruments, good enough to be no effect, and how they move r.
+    """
+    weather = bases[0].weather
+    still = replace(weather, wind=(0.0, 0.0), flow=(0.0, 0.0), tide=(0.0, 0.0, 0.0))
+    while True:
+        moves = 0.0
+        log = Faults(kit.log_scale, kit.log_offset_m_s, kit.log_filter_s)
+        for base in bases:
+            plain = replace(base, weather=still)
+            moves = max(moves, moved(replace(base, weather=weather, faults=log), plain, kit))
+        if moves < EVERYDAY:
+            return weather, kit, moves
+        less = 0.9 * EVERYDAY / moves
+        weather = replace(
+            weather,
+            wind=(weather.wind[0] * less, weather.wind[1] * less),
+            flow=(weather.flow[0] * less, weather.flow[1] * less),
+            tide=(weather.tide[0] * less, weather.tide[1] * less, weather.tide[2]),
+        )
+        kit = replace(
+            kit,
+            log_scale=kit.log_scale * less,
+            log_offset_m_s=kit.log_offset_m_s * less,
+            log_filter_s=kit.log_filter_s * less**0.5,
+        )
+
+
+def _sized(
+    name: str,
+    place: int,
+    key: tuple[int, ...],
+    base: Setting,
+    kit: Kit,
+    steady: tuple[float, float],
+) -> tuple[Hidden, float]:
+    """Return an effect that matters, and by how much it moves r."""
+    make = LIBRARY[name][0] if name in LIBRARY else OUTSIDE[name]
+    size, least, most = 1.0, 0.0, np.inf
+    for _ in range(14):
+        rng = np.random.default_rng([*key, place])
+        drawn = Draw(rng, base.hull, base.screw, size, base.coast_s, steady)
+        effect = make(drawn)
+        changed = fresh(base)
+        effect.apply(changed)
+        moves = moved(changed, base, kit)
+        if LEAST <= moves <= MOST:
+            break
+        least, most = (size, most) if moves < LEAST else (least, size)
+        within = least > 0.0 and np.isfinite(most)
+        size = float(np.sqrt(least * most)) if within else size * (1.35 if least else 0.7)
+    return effect, moves

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Instruments, after their manuals: filters, steps of the display, rates, gaps, zeros.
+
+Each reading has its stamp and its later arrival; stamps of a source ascend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.worlds.hidden_b.hulls import Array
+from benchmarks.worlds.hidden_b.kit import KNOT, Kit
+from benchmarks.worlds.hidden_b.setting import Faults, Setting
+from benchmarks.worlds.hidden_b.voyage import Track
+from benchmarks.worlds.hidden_b.weather import Sinusoids, band
+
+EARTH_M = 6_371_000.0
+MOTION = ('speed_through_water', 'position')
+CONTEXT = ('wind_apparent', 'depth', 'heading', 'shaft')
+FURTHER = ('speed_over_ground',)
+
+
+@dataclass(frozen=True)
+class Series:
+    """
+    Readings of one channel: stamps and arrivals [ns], values (n,) or (n, 2).
+    """
+
+    stamp_ns: NDArray[np.int64]
+    value: Array
+    receive_ns: NDArray[np.int64]
+
+
+Recording = Mapping[str, Series]
+
+
+def filtered(t: Array, value: Array, lag_s: float) -> Array:
+    """
+    Return what a first-order filter makes of values at even times.
+    """
+    if lag_s <= 0.0:
+        return value
+    keep = float(np.exp(-(t[1] - t[0]) / lag_s))
+    found, last = np.empty_like(value), value[0]
+    for i, now in enumerate(value):
+        last = keep * last + (1.0 - keep) * now
+        found[i] = last
+    return found
+
+
+def faulty_log(t: Array, water: Array, faults: Faults) -> Array:
+    """
+    Return what the log would read without noise.
+    """
+    read = filtered(t, np.interp(t - faults.late_s, t, water), faults.lag_s)
+    read = (1.0 + faults.scale) * read + faults.offset_m_s
+    if faults.swing is not None:
+        read = read * (1.0 + faults.swing(t))
+    return np.where(read < faults.dead_m_s, 0.0, read) if faults.dead_m_s > 0.0 else read
+
+
+def faulty_place(track: Track, kit: Kit, faults: Faults) -> Array:
+    """
+    Return the places that would be found without noise, from the place of the stop.
+    """
+    true = (1.0 + faults.radar_scale) * (track.place_m - _stop(track))
+    if faults.gyro is None or kit.fix != 'radar':
+        return true
+    error = faults.gyro(track.t)
+    found = np.zeros_like(true)
+    for mark in kit.marks_m:
+        to = np.array(mark) - true
+        c, s = np.cos(error), np.sin(error)
+        found += 0.5 * (np.array(mark) - np.stack([c * to[:, 0] - s * to[:, 1],
+                                                   s * to[:, 0] + c * to[:, 1]], 1))  # fmt: skip
+    return found
+
+
+def _stop(track: Track) -> Array:
+    return track.place_m[int(np.argmin(np.abs(track.t)))]
+
+
+def read(
+    track: Track, setting: Setting, kit: Kit, inputs: tuple[str, ...], start_ns: int
+) -> dict[str, Series]:
+    """
+    Return what the instruments say of a run.
+
+    Parameters
+    ----------
+    track, setting, kit
+    inputs
+        Of `MOTION`, `CONTEXT` and `FURTHER`; each has random numbers of its own.
+    start_ns
+        Of the first reading.
+    """
+    found: dict[str, Series] = {}
+    for name in inputs:
+        place = (*MOTION, *CONTEXT, *FURTHER).index(name)
+        found |= _READERS[name](track, setting, kit, setting.stream(20, place), start_ns)
+    return found
+
+
+def _series(
+    rng: np.random.Generator, kit: Kit, track: Track, every_s: float, start_ns: int
+) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Return times of readings [s], stamps and arrivals."""
+    t = np.arange(track.t[0] + rng.uniform(0.0, every_s), track.t[-1], every_s)
+    t = t + rng.uniform(-0.02, 0.02, len(t)) * min(every_s, 1.0)
+    kept = np.ones(len(t), np.bool_)
+    hours = (t[-1] - t[0]) / 3600.0
+    for _ in range(rng.poisson(kit.gaps_per_hour * hours)):
+        begin = rng.uniform(t[0], t[-1])
+        kept &= (t < begin) | (t > begin + rng.uniform(3.0, 25.0))
+    t = t[kept & (t >= track.t[0]) & (t <= track.t[-1])]
+    stamps = start_ns + np.round((t - track.t[0]) * 1e9).astype(np.int64)
+    late = rng.uniform(0.02, 0.15, len(t)) + rng.exponential(0.03, len(t))
+    arrivals = np.maximum.accumulate(stamps + np.round(late * 1e9).astype(np.int64))
+    return t, stamps, arrivals
+
+
+def _stepped(value: Array, step: float) -> Array:
+    return np.round(value / step) * step
+
+
+def _log(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    grid, day = track.t, setting.weather
+    fine = np.linspace(
+        grid[0], grid[-1], round((grid[-1] - grid[0]) / min(1.0, grid[1] - grid[0]))
+    )
+    orbit = day.orbital(kit.log_depth_m)
+    swell = Sinusoids(
+        orbit * np.sqrt(rng.dirichlet(np.full(8, 3.0))),
+        2 * np.pi / (day.swell_s * rng.uniform(0.85, 1.15, 8)),
+        rng.uniform(0, 2 * np.pi, 8),
+    )
+    water = np.interp(fine, grid, track.water_m_s)
+    gain = 1.0 + band(rng, kit.log_gain, 100.0, 2000.0, 10).at(fine)
+    raw = filtered(fine, water * gain + swell.at(fine), kit.log_filter_s)
+    noise = filtered(fine, rng.standard_normal(len(fine)), 0.3 * kit.log_filter_s)
+    raw = raw + kit.log_sd_m_s * noise / noise.std()
+    value = faulty_log(fine, (1.0 + kit.log_scale) * raw + kit.log_offset_m_s, setting.faults)
+    t, stamps, arrivals = _series(rng, kit, track, kit.log_every_s, start_ns)
+    found = _stepped(np.interp(t, fine, value), kit.log_step_m_s)
+    found[rng.random(len(t)) < kit.zeros] = 0.0
+    return {'speed_through_water': Series(stamps, found, arrivals)}
+
+
+def _position(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    t, stamps, arrivals = _series(rng, kit, track, kit.fix_every_s, start_ns)
+    true = faulty_place(track, kit, setting.faults)
+    place = np.stack([np.interp(t, track.t, true[:, k]) for k in (0, 1)], axis=1)
+    if kit.fix == 'radar':
+        place = _radar(place, t, kit, rng)
+    else:
+        for k in (0, 1):
+            place[:, k] += band(rng, kit.wander_m, 80.0, 900.0, 14).at(t)
+            place[:, k] += band(rng, 0.06 * kit.wander_m, 10.0, 80.0, 10).at(t)
+            place[:, k] += 0.05 * rng.standard_normal(len(t))
+        for _ in range(rng.poisson(2.0)):
+            place[t > rng.uniform(t[0], t[-1])] += kit.step_m * rng.standard_normal(2)
+    if kit.fix != 'geodetic':
+        return {'position': Series(stamps, _stepped(place, 0.01), arrivals)}
+    latitude, longitude = kit.origin_deg
+    north = np.degrees(place[:, 1] / EARTH_M)
+    east = np.degrees(place[:, 0] / (EARTH_M * np.cos(np.radians(latitude))))
+    degrees = np.stack([latitude + north, longitude + east], axis=1)
+    return {'position_geodetic': Series(stamps, _stepped(degrees, 1e-5 / 6.0), arrivals)}
+
+
+def _radar(place: Array, t: Array, kit: Kit, rng: np.random.Generator) -> Array:
+    """Find the place from ranges and bearings of two marks, each weighted by its errors."""
+    gyro = band(rng, 0.6 * kit.bearing_sd_rad, 100.0, 900.0, 10).at(t)
+    normal, right = np.zeros((len(t), 2, 2)), np.zeros((len(t), 2))
+    for mark in kit.marks_m:
+        to = np.array(mark) - place
+        away = np.hypot(to[:, 0], to[:, 1])
+        seen = _stepped(away + kit.range_sd_m * rng.standard_normal(len(t)), 1.852)
+        angle = np.arctan2(to[:, 1], to[:, 0]) + gyro
+        angle = angle + kit.bearing_sd_rad * rng.standard_normal(len(t))
+        c, s = np.cos(angle), np.sin(angle)
+        found = np.array(mark) - seen[:, None] * np.stack([c, s], 1)
+        radial, across = kit.range_sd_m**-2, (kit.bearing_sd_rad * np.maximum(away, 50.0)) ** -2
+        weight = radial * _outer(c, s) + across[:, None, None] * _outer(-s, c)
+        normal += weight
+        right += np.einsum('nij,nj->ni', weight, found)
+    return np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+
+
+def _outer(a: Array, b: Array) -> Array:
+    return np.stack([np.stack([a * a, a * b], 1), np.stack([a * b, b * b], 1)], 1)
+
+
+def _over_ground(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    velocity = np.gradient(faulty_place(track, kit, setting.faults), track.t, axis=0)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    lag, sd, step = (8.0, 0.08, 0.1 * KNOT) if kit.fix == 'radar' else (1.0, 0.03, 0.01)
+    lag = min(lag, 0.05 * setting.hull.time_s)
+    t, stamps, arrivals = _series(rng, kit, track, kit.fix_every_s, start_ns)
+    value = np.interp(t, track.t, filtered(track.t, speed, lag))
+    value = value + band(rng, sd, 5.0, 200.0, 20).at(t)
+    return {'speed_over_ground': Series(stamps, _stepped(np.abs(value), step), arrivals)}
+
+
+def _heading(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
+    value = np.interp(t, track.t, track.heading_rad)
+    value = value + np.radians(rng.normal(0.0, 0.4))
+    value = value + band(rng, np.radians(0.3), 100.0, 3000.0, 8).at(t)
+    if setting.faults.gyro is not None:
+        value = value + setting.faults.gyro(t)
+    value = _stepped(value, np.radians(0.1))
+    return {'heading': Series(stamps, (value + np.pi) % (2 * np.pi) - np.pi, arrivals)}
+
+
+def _shaft(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    found = {}
+    for k in range(setting.screw.shafts):
+        t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
+        end = '' if k == 0 else f'_{k + 1}'
+        value = np.interp(t, track.t, track.shafts_rad_s[:, k])
+        found[f'shaft{end}'] = Series(stamps, _stepped(value, kit.turn_step), arrivals)
+        if setting.screw.drive == 'cpp':
+            pitch = _stepped(np.interp(t, track.t, track.pitch), 0.01)
+            found[f'pitch{end}'] = Series(stamps, pitch, arrivals)
+    return found
+
+
+def _wind(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
+    c, s = np.cos(kit.wind_turn_rad), np.sin(kit.wind_turn_rad)
+    ahead, port = (np.interp(t, track.t, track.wind_m_s[:, k]) for k in (0, 1))
+    value = kit.wind_gain * np.stack([c * ahead - s * port, s * ahead + c * port], axis=1)
+    value = value + 0.2 * rng.standard_normal(value.shape)
+    return {'wind_apparent': Series(stamps, _stepped(value, 0.1), arrivals)}
+
+
+def _depth(
+    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
+) -> dict[str, Series]:
+    t, stamps, arrivals = _series(rng, kit, track, 2.0, start_ns)
+    bottom = setting.depth_m * (1.0 + band(rng, 0.02, 150.0, 2000.0, 8).at(t))
+    value = bottom + 0.1 * rng.standard_normal(len(t))
+    return {'depth': Series(stamps, _stepped(value, 0.1), arrivals)}
+
+
+_READERS = {
+    'speed_through_water': _log,
+    'position': _position,
+    'speed_over_ground': _over_ground,
+    'heading': _heading,
+    'shaft': _shaft,
+    'wind_apparent': _wind,
+    'depth': _depth,
+}

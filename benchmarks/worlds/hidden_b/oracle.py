@@ -1,0 +1,394 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What can be had in world B: a diagnosis that knows its physics.
+
+Each hypothesis is sailed by the generator's own laws and weighed by its Laplace evidence, under
+the covariance of all that is random and with the true shares of the kinds of cases. Of the ship
+it knows the lines, the propeller and the kind of instruments; her resistance and added mass as
+the ship file states them, with the stated errors. Sizes of effects have priors as wide as
+manuals would have them, not those that are drawn from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from benchmarks.worlds.hidden_b.cases import Known, Observation
+from benchmarks.worlds.hidden_b.effects import Hidden
+from benchmarks.worlds.hidden_b.hulls import Array, Hull
+from benchmarks.worlds.hidden_b.oracle_evidence import EDDIES, HELM, Terms, summed
+from benchmarks.worlds.hidden_b.oracle_noise import Scatter
+from benchmarks.worlds.hidden_b.oracle_priors import (
+    SIZES,
+    Names,
+    drawn,
+    free,
+    possible,
+    shares,
+    would_decide,
+)
+from benchmarks.worlds.hidden_b.oracle_rows import Run
+from benchmarks.worlds.hidden_b.oracle_sail import made, run_of, sailed, stated
+from benchmarks.worlds.hidden_b.oracle_shared import Change, shared
+from benchmarks.worlds.hidden_b.plans import PAIRS
+from benchmarks.worlds.hidden_b.setting import Setting
+from benchmarks.worlds.hidden_b.voyage import steady_point
+
+ALARM_BELOW = 0.1  # probability that nothing is hidden
+NAME_FROM = 0.9
+HELD = 0.99  # by the set of candidates
+LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
+_STEPS = 12
+_STARTS = 3  # where the first point may be on the wrong slope
+_WORTH_NATS = 15.0  # below the best: not looked at closely
+_SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
+_GUSTY = {'wind', 'waves'}  # what scatters more itself
+_HOPELESS = 3.0  # chi^2 over the best; more gusts will not mend that
+_DEEP = (0.0625, 0.0125)  # draught over depth where the water does not matter
+
+
+@dataclass(frozen=True)
+class Fit:
+    """
+    A hypothesis at its best.
+
+    Attributes
+    ----------
+    names, signs
+    z
+        Speeds and courses of the runs, then the sizes: standard normal numbers.
+    cost
+        Chi^2 with the prior.
+    evidence
+        Its logarithm, with the share of its kind.
+    """
+
+    names: Names
+    signs: tuple[float, ...]
+    z: Array
+    cost: float
+    evidence: float = -np.inf
+
+
+def diagnose(seen: Observation, known: Known) -> dict[str, Any]:
+    """
+    Answer in the form of `diagnose --json`.
+    """
+    return _Oracle(seen, known).answer()
+
+
+class _Oracle:
+    def __init__(self, seen: Observation, known: Known) -> None:
+        self.known, self.inputs = known, set(seen.runs[0])
+        self.stated = stated(seen.ship_file, known)
+        hull = self.stated.hull
+        self.runs = [Run(run, number, known, hull) for number, run in enumerate(seen.runs)]
+        self.scatters = [Scatter(run) for run in self.runs]
+        need = float(np.interp(hull.speed_m_s, hull.grid_m_s, hull.still_n))
+        first = run_of(known, hull, 0, hull.speed_m_s, 0.0)
+        self.steady = steady_point(first, need)[1:]
+        self.common = 2 * len(self.runs)
+        self._about(Fit((), (), np.zeros(self.common), np.inf))
+
+    # what would be seen
+
+    def _settings(
+        self, names: Names, signs: Sequence[float], z: Array, hull: Hull | None = None
+    ) -> list[Setting]:
+        hull = hull or self.stated.hull
+        effects = self._effects(names, signs, z)
+        settings: list[Setting] = []
+        for k, run in enumerate(self.runs):
+            speed = run.speed_m_s * float(np.clip(1.0 + _SPEED_SD * z[2 * k], 0.2, 3.0))
+            heading = run.heading_rad + _COURSE_SD * float(z[2 * k + 1])
+            setting = run_of(self.known, hull, k, speed, heading)
+            setting.first_rad = settings[0].heading_rad if k else heading
+            for effect in effects:
+                if effect.scope != 'run' or k == 0:
+                    effect.apply(setting)
+            settings.append(setting)
+        return settings
+
+    def _effects(self, names: Names, signs: Sequence[float], z: Array) -> list[Hidden]:
+        found, at = [], self.common
+        left = list(signs)
+        for name in names:
+            x = []
+            for size in SIZES[name]:
+                x.append(size.at(float(z[at]) if at < len(z) else 0.0, left.pop(0)))
+                at += 1
+            given = drawn(name, x)
+            found.append(made(name, given, self.stated.hull, self.known, self.steady))
+        return found
+
+    def _row(self, settings: list[Setting]) -> Array:
+        sail = [sailed(setting, self.known) for setting in settings]
+        return np.concatenate([run.predicted(each) for run, each in zip(self.runs, sail)])
+
+    def _shared(self, fit: Fit) -> Array:
+        """Return what is wrong alike in all runs, a column each, as it acts about a fit."""
+
+        def row(change: Change, hull: Hull) -> Array:
+            settings = self._settings(fit.names, fit.signs, fit.z, hull)
+            for each in settings:
+                change(each)
+            return self._row(settings)
+
+        return shared(row, self.stated)
+
+    def _about(self, fit: Fit) -> None:
+        """Linearize about a fit what is not fitted: what all runs share, speeds and courses."""
+        self.shared = self._shared(fit)
+        self.slopes = self._slopes(fit.names, fit.signs, fit.z, range(self.common))
+        covariance = summed(self._scatter(fit)[0], (EDDIES[1], HELM[1]))
+        self.factor = np.linalg.cholesky(covariance)
+
+    def _scatter(self, fit: Fit) -> tuple[list[Array], dict[str, Array]]:
+        """Return covariances, apart, of eddies and of helm, and columns of smooth unknowns."""
+        settings = self._settings(fit.names, fit.signs, fit.z)
+        parts = [
+            scatter.about(setting, sailed(setting, self.known))
+            for scatter, setting in zip(self.scatters, settings)
+        ]
+        found = [block_diag(*(part[k] for part in parts)) for k in range(3)]
+        found[0] += self.shared @ self.shared.T
+        smooth = {}
+        for kind in parts[0][3]:
+            # forces and air under the log are of one run, a gyro of all
+            blocks = [part[3][kind] * (k == 0 or kind == 'gyro') for k, part in enumerate(parts)]
+            smooth[kind] = np.concatenate(blocks)
+        return found, smooth
+
+    def _shoals(self, names: Names, settings: list[Setting]) -> Iterator[tuple[float, float]]:
+        """Yield by how much each echo sounder is off, in sd, and the sd."""
+        for run, setting in zip(self.runs, settings):
+            if run.shoal is not None:
+                shallow = 'shallow_water' in names
+                wanted = self.known.hull.draught_m / setting.depth_m if shallow else _DEEP[0]
+                sd = 0.03 * wanted if shallow else _DEEP[1]
+                yield (run.shoal - wanted) / sd, sd
+
+    # fits
+
+    def _residual(
+        self, names: Names, signs: Sequence[float], z: Array
+    ) -> tuple[Array, list[tuple[float, float]]]:
+        settings = self._settings(names, signs, z)
+        measured = np.concatenate([run.measured for run in self.runs])
+        return measured - self._row(settings), list(self._shoals(names, settings))
+
+    def _whitened(self, names: Names, signs: Sequence[float], z: Array) -> Array:
+        return self._white(self._whole(names, signs, z))
+
+    def _slopes(
+        self, names: Names, signs: Sequence[float], z: Array, which: Sequence[int]
+    ) -> Array:
+        """Return minus the slope of the residual (not whitened), echo sounders with it."""
+        columns, here = [], self._whole(names, signs, z)
+        for k in which:
+            step = np.zeros(len(z))
+            step[k] = 3e-4 if k < self.common else 0.01
+            columns.append((here - self._whole(names, signs, z + step)) / step[k])
+        return np.stack(columns, axis=1) if columns else np.zeros((len(here), 0))
+
+    def _whole(self, names: Names, signs: Sequence[float], z: Array) -> Array:
+        off, shoals = self._residual(names, signs, z)
+        return np.concatenate([off, [each for each, _ in shoals]])
+
+    def _white(self, columns: Array) -> Array:
+        n = len(self.factor)
+        white = solve_triangular(self.factor, columns[:n], lower=True, check_finite=False)
+        return np.concatenate([white, columns[n:]])
+
+    def _begun(self, names: Names, starts: Mapping[str, Fit]) -> list[Fit]:
+        """Return where to begin with a hypothesis: the best of a few points for each sign."""
+        sizes = [size for name in names for size in SIZES[name]]
+        varied = free(names)
+        if len(names) == 1:
+            points = {0: 1, 1: 5, 2: 4}.get(len(varied), 0)
+            grid = np.array(list(product(*[np.linspace(-1.3, 1.3, points)] * len(varied))))
+            if not points:
+                grid = np.random.default_rng(0).uniform(-1.4, 1.4, (40, len(varied)))
+        else:
+            bests = np.concatenate([starts[name].z[self.common :] for name in names])
+            spread = np.random.default_rng(0).uniform(-1.4, 1.4, (8, len(sizes)))
+            grid = np.concatenate([[bests], spread])[:, varied]
+        nuisance = self._white(self.slopes)
+        precision = nuisance.T @ nuisance + np.eye(self.common)
+        begun = []
+        for signs in product(*[(1.0, -1.0) if size.sign else (1.0,) for size in sizes]):
+            tried = []
+            for point in grid:
+                z = np.zeros(self.common + len(sizes))
+                z[self.common + np.array(varied, int)] = point
+                white = self._whitened(names, signs, z)
+                z[: self.common] = np.linalg.solve(precision, nuisance.T @ white)
+                white = white - nuisance @ z[: self.common]
+                tried.append(Fit(names, signs, z, float(white @ white + z @ z)))
+            tried.sort(key=lambda fit: fit.cost)
+            begun += tried[: _STARTS if len(varied) > 2 else 1]
+        return begun
+
+    def _climbed(self, fit: Fit, floor: float = np.inf) -> Fit:
+        """
+        Climb by Levenberg-Marquardt; what stays far above the floor is left.
+
+        The slopes of speed and course stay those of the plain run.
+        """
+        names, signs, z = fit.names, fit.signs, fit.z
+        which = [self.common + k for k in free(names)]
+        used = [*range(self.common), *which]
+        white = self._whitened(names, signs, z)
+        cost, damping = float(white @ white + z @ z), 1e-3
+        plain = self._white(self.slopes)
+        slopes = np.concatenate([plain, self._white(self._slopes(names, signs, z, which))], 1)
+        for done in range(_STEPS):
+            precision = slopes.T @ slopes + np.eye(len(used))
+            turn = precision + damping * np.diag(np.diag(precision))
+            step = np.linalg.solve(turn, slopes.T @ white - z[used])
+            after = z.copy()
+            after[used] += np.clip(step, -1.5, 1.5)
+            after_white = self._whitened(names, signs, after)
+            after_cost = float(after_white @ after_white + after @ after)
+            if not after_cost < cost:
+                damping = max(10.0 * damping, 0.01)
+                if damping > 1e2:
+                    break
+                continue
+            gained, cost, z, white = cost - after_cost, after_cost, after, after_white
+            damping *= 0.1
+            # what more runs cost in any case is no hope of gaining more; far off, slopes mislead
+            above = cost - floor
+            hopeless = above > 4.0 * _WORTH_NATS and gained < 0.2 * above
+            if gained < 0.3 or (done > 1 and hopeless):
+                break
+            slopes[:, self.common :] = self._white(self._slopes(names, signs, z, which))
+        return Fit(names, signs, z, cost)
+
+    # evidence
+
+    def _terms(self, fit: Fit) -> Terms:
+        """Return what the evidence of a fit is made of."""
+        around = self._scatter(fit) if set(fit.names) & _GUSTY else self.around
+        off, shoals = self._residual(fit.names, fit.signs, fit.z)
+        sizes = range(self.common, len(fit.z))
+        slopes = self._slopes(fit.names, fit.signs, fit.z, sizes)
+        slopes = np.concatenate([self.slopes, slopes], axis=1)
+        whole = np.concatenate([off, [each for each, _ in shoals]]) + slopes @ fit.z
+        halves = sum(size.sign for name in fit.names for size in SIZES[name])
+        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0]))) + halves * np.log(2.0)
+        return Terms(*around, whole, slopes, less - float(np.log(shares()[fit.names])))
+
+    def answer(self) -> dict[str, Any]:
+        """Weigh all, and say what they come to."""
+        nothing = self._climbed(Fit((), (), np.zeros(self.common), np.inf))
+        begun = [fit for name in possible(self.known) for fit in self._begun((name,), {})]
+        fits = [nothing, *self._all_climbed(begun, nothing.cost)]
+        starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
+        near = min(fits, key=lambda fit: fit.cost)
+        self._about(near)
+        close = [fit for fit in fits[1:] if fit.cost < near.cost + 4.0 * _WORTH_NATS]
+        nothing = self._climbed(nothing)
+        fits = [nothing, *self._all_climbed(close, nothing.cost)]
+        weighed = self._worth(fits)
+        best, terms = max(weighed, key=lambda each: each[0].evidence)
+        pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
+        if max(terms.beside(self.weather).values()) < best.evidence:  # a name alone may do
+            pairs = [pair for pair in pairs if set(best.names) & set(pair)]
+        begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+        if begun:
+            fits += self._all_climbed(begun, min(fit.cost for fit in fits))
+            weighed = self._worth(fits)
+        return self._verdict(weighed)
+
+    def _all_climbed(self, begun: Sequence[Fit], floor: float) -> list[Fit]:
+        """Climb from the best on, so that the hopeless are known; one fit of each sign."""
+        found: dict[tuple[Names, tuple[float, ...]], Fit] = {}
+        for each in sorted(begun, key=lambda fit: fit.cost):
+            fit = self._climbed(each, floor)
+            if set(fit.names) & _GUSTY and fit.cost < _HOPELESS * floor:
+                fit = self._in_its_own_weather(fit)
+            kind = fit.names, fit.signs
+            found[kind] = min(found.get(kind, fit), fit, key=lambda fit: fit.cost)
+            floor = min(floor, fit.cost)
+        return list(found.values())
+
+    def _in_its_own_weather(self, fit: Fit) -> Fit:
+        """Climb again, under the scatter that goes with what was found."""
+        plain = self.factor
+        self.factor = np.linalg.cholesky(summed(self._scatter(fit)[0], (EDDIES[1], HELM[1])))
+        fit = self._climbed(fit)
+        wider = float(np.sum(np.log(np.diag(self.factor) / np.diag(plain))))
+        self.factor = plain
+        return replace(fit, cost=fit.cost + 2.0 * wider)
+
+    def _worth(self, fits: Sequence[Fit]) -> list[tuple[Fit, Terms]]:
+        """Weigh what is near the best, and nothing hidden in any case."""
+        near = min(fits, key=lambda fit: fit.cost)
+        calm = [fit for fit in fits if not set(fit.names) & _GUSTY]
+        self.around = self._scatter(min(calm, key=lambda fit: fit.cost))
+        self.weather = self._terms(near).weather()
+        least, found = near.cost + 2.0 * _WORTH_NATS, []
+        for fit in fits:
+            if not fit.names or fit.cost < least:
+                terms = self._terms(fit)
+                found.append((replace(fit, evidence=terms.evidence(self.weather)), terms))
+        return found
+
+    def _verdict(self, weighed: Sequence[tuple[Fit, Terms]]) -> dict[str, Any]:
+        by_names: dict[Names, list[Fit]] = {}
+        for fit, _ in weighed:
+            by_names.setdefault(fit.names, []).append(fit)
+        logs = {
+            names: float(np.logaddexp.reduce([fit.evidence for fit in fits]))
+            for names, fits in by_names.items()
+        }
+        terms = {id(fit): each for fit, each in weighed}
+        odds = np.log(shares()[('unknown',)] / shares()[()])
+        kinds = terms[id(by_names[()][0])].beside(self.weather)
+        logs[('unknown',)] = odds + float(
+            np.logaddexp.reduce(list(kinds.values())) - np.log(len(kinds))
+        )
+        top = np.logaddexp.reduce(list(logs.values()))
+        chances = {names: float(np.exp(log - top)) for names, log in logs.items()}
+        listed = sorted(((p, names) for names, p in chances.items()), reverse=True)
+        held = np.cumsum([p for p, _ in listed])
+        listed = listed[: int(np.searchsorted(held, HELD)) + 1]
+        names = (each for each in by_names if each)
+        named = max(((chances[each], each) for each in names), default=(0.0, ()))
+        best = max(by_names[named[1]], key=lambda fit: fit.evidence)
+        beside = terms[id(best)].beside(self.weather)
+        lacks = max(beside.values()) > best.evidence + LACK_NATS
+        verdict, effects = 'one_of', []
+        if chances[()] >= ALARM_BELOW:
+            verdict = 'none'
+        elif chances[('unknown',)] > 0.5 or lacks:
+            verdict = 'unknown'
+            if listed[0][1] != ('unknown',):
+                listed = [(NAME_FROM, ('unknown',)), (1.0 - NAME_FROM, listed[0][1])]
+        elif named[0] >= NAME_FROM:
+            verdict, effects = 'named', self._stated(named[0], best)
+        return {
+            'verdict': verdict,
+            'effects': effects,
+            'candidates': [{'names': list(names), 'probability': p} for p, names in listed],
+            'would_decide': would_decide(
+                [set(names) for _, names in listed], len(self.runs), self.inputs
+            ),
+        }
+
+    def _stated(self, chance: float, fit: Fit) -> list[dict[str, Any]]:
+        return [
+            {
+                'name': effect.name,
+                'probability': chance,
+                'parameters': {name: {'value': v} for name, v in effect.parameters.items()},
+            }
+            for effect in self._effects(fit.names, fit.signs, fit.z)
+        ]

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ways to stop, and manoeuvres that are no coastdown: what the ship is ordered and when."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from benchmarks.worlds.propulsion.drive import (
+    CLUTCHED,
+    DIRECT,
+    ELECTRIC,
+    GEARBOX,
+    Drive,
+    Hold,
+    Mode,
+)
+from benchmarks.worlds.propulsion.hull import HULLS, Hull
+from benchmarks.worlds.propulsion.motion import Float64, Orders, Surroundings
+from benchmarks.worlds.propulsion.sea import SEAS, Sea
+
+PRE_ROLL_S = 900  # before anything is read
+
+
+@dataclass(frozen=True)
+class Case:
+    """
+    One record: a kind of stop or manoeuvre, a ship, a sea, a seed.
+    """
+
+    kind: str
+    hull: str
+    sea: str
+    seed: int
+
+    @property
+    def random(self) -> np.random.Generator:
+        """What decides everything else of it."""
+        name = f'{self.kind}|{self.hull}|{self.sea}'.encode()
+        return np.random.default_rng([self.seed, zlib.crc32(name)])
+
+    @cached_property
+    def ship(self) -> Hull:
+        """The hull, with lightly or heavily loaded propellers of high or low pitch."""
+        hull = HULLS[self.hull]
+        random = np.random.default_rng([self.seed, zlib.crc32(self.hull.encode())])
+        return replace(
+            hull,
+            disc_m2=hull.disc_m2 * float(random.uniform(0.65, 1.5)),
+            pitch_ratio=hull.pitch_ratio * float(random.uniform(0.85, 1.15)),
+        )
+
+    @property
+    def weather(self) -> Sea:
+        """The sea."""
+        return SEAS[self.sea]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """
+    What a case does.
+
+    Attributes
+    ----------
+    at
+        When the first thing happens [s], PRE_ROLL_S included.
+    spoilt_at
+        When a glide is spoilt; beyond the record where it is not.
+    pitch_heard
+        Whether the pitch of a controllable propeller is on a topic.
+    """
+
+    drive: Drive
+    hold: Hold
+    shafts: int
+    speed_m_s: float
+    orders: Orders
+    at: int
+    spoilt_at: int
+    pitch_heard: bool
+
+
+@dataclass
+class _Draft:
+    """Orders in the making."""
+
+    hull: Hull
+    random: np.random.Generator
+    at: int
+    seconds: int
+    drive: Drive
+    hold: Hold
+    shafts: int
+    spoilt_at: int
+    pitch_heard: bool = False
+
+    def __post_init__(self) -> None:
+        shape = (self.shafts, self.seconds)
+        self.mode = np.full(shape, int(Mode.AHEAD))
+        self.level = np.ones(shape)
+        self.pitch = np.ones(shape)
+        self.turn = np.zeros(self.seconds)
+
+    def ramp(self, start: int, length: int, goal: float) -> None:
+        """Bring the revs from what they are to a goal."""
+        begin = self.level[0, start - 1]
+        self.level[:, start : start + length] = np.linspace(begin, goal, length)
+        self.level[:, start + length :] = goal
+
+
+def _off(draft: _Draft) -> None:
+    draft.mode[:, draft.at :] = Mode.OFF
+
+
+def _braked(draft: _Draft) -> None:
+    wait = draft.at + int(draft.random.integers(2, 12))
+    draft.mode[:, draft.at : wait] = Mode.OFF
+    draft.mode[:, wait:] = Mode.BRAKE
+
+
+def _zero_pitch(draft: _Draft) -> None:
+    draft.hold = Hold.REVS
+    draft.mode[:, draft.at :] = Mode.KEPT
+    draft.pitch[:, draft.at :] = 0.0
+    # revs are brought down after the pitch, as a combinator does
+    draft.ramp(draft.at + 5, 20, float(draft.random.uniform(0.35, 1.0)))
+
+
+def _staggered(draft: _Draft) -> None:
+    when = draft.at
+    for shaft in range(draft.shafts):
+        draft.mode[shaft, when:] = Mode.OFF
+        when += int(np.exp(draft.random.uniform(np.log(4.0), np.log(180.0))))
+
+
+def _slow(draft: _Draft) -> None:
+    draft.ramp(draft.at, 60, 0.3)
+    draft.mode[:, draft.at + 60 :] = Mode.OFF
+
+
+def _regenerating(draft: _Draft) -> None:
+    draft.mode[:, draft.at :] = Mode.REGENERATE
+
+
+STOPS: dict[str, Callable[[_Draft], None]] = {
+    'direct drive, fuel cut': _off,
+    'declutched': _off,
+    'declutched, shaft locked': _braked,
+    'pitch to zero, pitch heard': _zero_pitch,
+    'pitch to zero, not heard': _zero_pitch,
+    'shafts one by one': _staggered,
+    'slow run-down': _slow,
+    'electric, regenerating': _regenerating,
+}
+
+
+def _slow_down(fraction: float) -> Callable[[_Draft], None]:
+    def act(draft: _Draft) -> None:
+        draft.ramp(draft.at, int(draft.random.integers(5, 90)), fraction)
+
+    return act
+
+
+def _turn(degrees: float) -> Callable[[_Draft], None]:
+    def act(draft: _Draft) -> None:
+        draft.hold = Hold.POWER
+        rate = draft.random.uniform(0.12, 0.35) * 6.0 / draft.hull.length_m
+        rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
+        length = int(np.radians(degrees) / rate)
+        side = draft.random.choice([-1.0, 1.0])
+        shape = np.ones(length)
+        edge = min(15, length // 3)
+        shape[:edge] = np.linspace(0.0, 1.0, edge)
+        shape[-edge:] = shape[:edge][::-1]
+        shape *= np.radians(degrees) / shape.sum()
+        draft.turn[draft.at : draft.at + length] = side * shape
+
+    return act
+
+
+def _crash_stop(draft: _Draft) -> None:
+    wait = draft.at + int(draft.random.integers(5, 90))
+    if draft.pitch_heard:
+        draft.pitch[:, draft.at :] = -0.6
+        draft.hold = Hold.REVS
+        return
+    draft.mode[:, draft.at : wait] = Mode.OFF
+    draft.mode[:, wait:] = Mode.ASTERN
+
+
+def _kick(mode: Mode) -> Callable[[_Draft], None]:
+    def act(draft: _Draft) -> None:
+        long = 1.0 if draft.hull.length_m > 50 else 0.5
+        draft.spoilt_at = draft.at + int(long * draft.random.uniform(200, 600))
+        end = draft.spoilt_at + int(draft.random.uniform(20, 60))
+        draft.mode[:, draft.at :] = Mode.OFF
+        draft.mode[:, draft.spoilt_at : end] = mode
+        draft.level[:, draft.spoilt_at : end] = draft.random.uniform(0.4, 0.7)
+        if mode is Mode.AHEAD:
+            draft.hold = Hold.REVS
+
+    return act
+
+
+def _one_of_two(draft: _Draft) -> None:
+    draft.mode[0, draft.at :] = Mode.OFF
+
+
+def _nothing(draft: _Draft) -> None:
+    pass
+
+
+def _harbour(draft: _Draft) -> None:
+    draft.hold = Hold.REVS
+    when = draft.at
+    for level in (0.75, 0.55, 0.4, 0.28):
+        draft.ramp(when, int(draft.random.integers(10, 40)), level)
+        when += int(draft.random.uniform(150, 500))
+    draft.mode[:, when:] = Mode.OFF
+
+
+OTHERS: dict[str, Callable[[_Draft], None]] = {
+    'slow-down to 80 %': _slow_down(0.8),
+    'slow-down to 60 %': _slow_down(0.6),
+    'slow-down to 50 %': _slow_down(0.5),
+    'slow-down to 30 %': _slow_down(0.3),
+    'turn of 35 deg': _turn(35.0),
+    'turn of 60 deg': _turn(60.0),
+    'turn of 90 deg': _turn(90.0),
+    'crash stop': _crash_stop,
+    'kick ahead in a glide': _kick(Mode.AHEAD),
+    'kick astern in a glide': _kick(Mode.ASTERN),
+    'one shaft of two': _one_of_two,
+    'shallow water': _nothing,
+    'current changes': _nothing,
+    'harbour in steps': _harbour,
+}
+STEADY = 'steady'
+_DRIVES = {
+    'direct drive, fuel cut': DIRECT,
+    'declutched, shaft locked': CLUTCHED,
+    'pitch to zero, pitch heard': CLUTCHED,
+    'pitch to zero, not heard': CLUTCHED,
+    'electric, regenerating': ELECTRIC,
+}
+
+
+def plan(case: Case, random: np.random.Generator, hours: float = 8.0) -> Plan:
+    """
+    Draw what a case does.
+    """
+    hull = case.ship
+    lead = int(random.uniform(720, 2100))
+    after = 3000 if hull.length_m > 50 else 1800
+    draft = _Draft(
+        hull=hull,
+        random=random,
+        at=PRE_ROLL_S + lead,
+        seconds=PRE_ROLL_S + (int(hours * 3600) if case.kind == STEADY else lead + after),
+        drive=_drive(case, random),
+        hold=Hold(int(random.integers(3))),
+        shafts=_shafts(case, hull, random),
+        spoilt_at=1 << 40,
+        pitch_heard=case.kind == 'pitch to zero, pitch heard'
+        or (case.kind == 'crash stop' and hull.name == 'ferry'),
+    )
+    {**STOPS, **OTHERS, STEADY: _nothing}[case.kind](draft)
+    return Plan(
+        draft.drive,
+        draft.hold,
+        draft.shafts,
+        hull.service_m_s * float(random.uniform(0.65, 1.0)),
+        Orders(draft.mode, draft.level, draft.pitch, draft.turn),
+        draft.at,
+        draft.spoilt_at,
+        draft.pitch_heard,
+    )
+
+
+def _drive(case: Case, random: np.random.Generator) -> Drive:
+    if case.kind in _DRIVES:
+        return _DRIVES[case.kind]
+    small = GEARBOX if case.hull == 'workboat' else CLUTCHED
+    if case.kind in STOPS:
+        return small
+    return DIRECT if case.hull == 'tanker' else small
+
+
+def _shafts(case: Case, hull: Hull, random: np.random.Generator) -> int:
+    if case.kind == 'shafts one by one':
+        return 4 if hull.name == 'workboat' else 2
+    return 2 if case.kind == 'one shaft of two' else hull.shafts
+
+
+def disturbed(
+    case: Case, around: Surroundings, at: int, course: float, random: np.random.Generator
+) -> Surroundings:
+    """
+    Add what a passage through shallow water or a tidal stream does.
+    """
+    n = len(around.drag_factor)
+    second = np.arange(n)
+
+    def step(start: float, length: float) -> Float64:
+        return np.clip((second - start) / length, 0.0, 1.0)
+
+    if case.kind == 'shallow water':
+        there = step(at, random.uniform(60, 400)) - step(at + random.uniform(900, 1500), 200)
+        return replace(around, drag_factor=1.0 + random.uniform(0.2, 0.6) * there)
+    if case.kind == 'current changes':
+        size = random.uniform(0.3, 1.0) * random.choice([-1.0, 1.0])
+        way = course + random.uniform(-0.6, 0.6)
+        change = size * step(at, random.uniform(60, 600))
+        along = np.outer([np.cos(way), np.sin(way)], change)
+        return replace(around, current=around.current + along)
+    return around

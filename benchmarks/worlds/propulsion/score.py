@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the program makes of one case, against the truth."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.worlds.propulsion.cases import Case
+from benchmarks.worlds.propulsion.motion import ROW_S
+from benchmarks.worlds.propulsion.world import Truth, World, build, inputs, seconds
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import in_arrival_order
+
+HELD_SHARE = 0.8
+SPANS = bool(os.environ.get('SPANS'))  # spans alone, without an estimate: a tenth of the time
+DRIVEN_S = 10.0
+INPUTS: dict[str, tuple[str, ...]] = {
+    'log': ('log',),
+    'track': ('track',),
+    'both': ('log', 'track', 'heading'),
+}
+SUITES = {
+    **INPUTS,
+    **{f'{name} + shaft': (*instruments, 'shaft') for name, instruments in INPUTS.items()},
+}
+WITH_HEADING = {
+    'log + heading': ('log', 'heading'),
+    'log + heading + shaft': ('log', 'heading', 'shaft'),
+}
+FEWER = (
+    ('log', 'log + shaft'),
+    ('track', 'track + shaft'),
+    ('both', 'both + shaft'),
+    ('log', 'both'),
+    ('track', 'both'),
+    ('log + shaft', 'both + shaft'),
+    ('track + shaft', 'both + shaft'),
+)
+"""Pairs of suites, the second of which has an input more."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """
+    One case under one suite of inputs.
+
+    Attributes
+    ----------
+    long
+        Whether the glide lasts 10 min from half of the service speed or more.
+    found
+        Exactly one reported coastdown in the glide, with an estimate, that holds 80 % of
+        it and at most 10 s of driven propeller.
+    why
+        What it lacks where it is not found.
+    dated_s, delay_s
+        Reported start, and first report, less the true end of drive; NaN without.
+    wrong
+        Reported coastdowns that hold more than 10 s of drive.
+    idle
+        Reported coastdowns that hold less, but of which half is no glide: an engine that
+        is on the shaft and does not push, a ship at rest.
+    wrong_live
+        Onsets announced of which either is true at the time when they were.
+    rms, cover
+        Of r against the truth over the valid range: relative to r's maximum; share within
+        2 sigma. NaN without.
+    refused
+        Coastdowns reported without an estimate.
+    withdrawn
+        Coastdowns taken back when they ended; they count as not reported.
+    said
+        What the program says of candidates that it dismissed.
+    """
+
+    case: Case
+    suite: str
+    glide_s: float
+    long: bool
+    found: bool
+    why: str
+    dated_s: float
+    delay_s: float
+    wrong: int
+    idle: int
+    wrong_live: int
+    rms: float
+    cover: float
+    refused: int
+    withdrawn: int
+    record_s: float
+    said: str
+
+
+def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
+    """
+    Make a case and give it to the program under each suite.
+    """
+    world = build(case, hours)
+    return [_one(world, name, instruments) for name, instruments in suites.items()]
+
+
+def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
+    parameters = Parameters(update_s=60.0)
+    monitor = (
+        Monitor(world.ship, parameters, estimate=None, final=lambda window, _, __: window)
+        if SPANS
+        else Monitor(world.ship, parameters)
+    )
+    events = [
+        *monitor.update(in_arrival_order(inputs(world, instruments))),
+        *monitor.finish(),
+    ]
+    ended = _named(events, 'EndedCoastdown')
+    # a version of the program that takes nothing back says nothing of it
+    standing = [event for event in ended if not getattr(event, 'withdrawn', False)]
+    kept = [event for event in standing if event.estimate is not None]
+    spans = [(seconds(event.start_ns), seconds(event.end_ns)) for event in kept]
+    onsets = [
+        (seconds(event.start_ns), seconds(event.detected_ns)) for event in _named(events, 'Onset')
+    ]
+    truth = world.truth
+    why, best = _lacks(truth, spans)
+    glide = truth.glide or (np.nan, np.nan)
+    rms = cover = np.nan
+    dated = delay = np.nan
+    if best is not None:
+        dated = spans[best][0] - glide[0]
+        delay = kept[best].onset_detected_ns
+        delay = np.nan if delay is None else seconds(delay) - glide[0]
+        if not SPANS:
+            rms, cover = _error(truth, kept[best].estimate)
+    return Row(
+        world.case,
+        suite,
+        glide[1] - glide[0],
+        truth.glide is not None
+        and glide[1] - glide[0] >= 600.0
+        and truth.first_speed_m_s >= 0.5 * world.case.ship.service_m_s,
+        truth.glide is not None and not why,
+        why,
+        dated,
+        delay,
+        sum(_driven_s(truth, span) > DRIVEN_S for span in spans),
+        sum(_is_idle(truth, span) for span in spans),
+        sum(_driven_s(truth, span) > DRIVEN_S or _is_idle(truth, span) for span in onsets),
+        rms,
+        cover,
+        len(standing) - len(kept),
+        len(ended) - len(standing),
+        truth.seconds,
+        _said(truth, events),
+    )
+
+
+def _named(events: list[Any], name: str) -> list[Any]:
+    """Events by the name of their class: older versions have fewer."""
+    return [event for event in events if type(event).__name__ == name]
+
+
+def _said(truth: Truth, events: list[Any]) -> str:
+    """Why the program dismissed what overlaps the glide, in its own words."""
+    begin, end = truth.glide or (0.0, truth.seconds)
+    return '; '.join(
+        f'{event.reason.value}: {event.text}'
+        for event in _named(events, 'NotCoastdown')
+        if seconds(event.end_ns) > begin and seconds(event.start_ns) < end
+    )
+
+
+def _driven_s(truth: Truth, span: tuple[float, float]) -> float:
+    return float(truth.driven[_rows(span)].sum() * ROW_S)
+
+
+def _rows(span: tuple[float, float]) -> slice:
+    return slice(max(round(span[0] / ROW_S), 0), max(round(span[1] / ROW_S), 0))
+
+
+def _is_idle(truth: Truth, span: tuple[float, float]) -> bool:
+    gliding = truth.gliding[_rows(span)].sum() * ROW_S
+    return _driven_s(truth, span) <= DRIVEN_S and gliding < 0.5 * (span[1] - span[0])
+
+
+def _lacks(truth: Truth, spans: list[tuple[float, float]]) -> tuple[str, int | None]:
+    """What is missing for a glide to count as found; which report is of it."""
+    if truth.glide is None:
+        return '', None
+    begin, end = truth.glide
+    shared = [min(end, b) - max(begin, a) for a, b in spans]
+    there = [k for k, overlap in enumerate(shared) if overlap > 10.0]
+    if not there:
+        return 'none', None
+    best = max(there, key=lambda k: shared[k])
+    if len(there) > 1:
+        return 'several', best
+    if _driven_s(truth, spans[best]) > DRIVEN_S:
+        return 'driven', best
+    if shared[best] < HELD_SHARE * (end - begin):
+        return 'short', best
+    return '', best
+
+
+def _error(truth: Truth, estimate: Estimate) -> tuple[float, float]:
+    curve = estimate.valid_curve
+    if len(truth.speed) < 5 or not len(curve):
+        return np.nan, np.nan
+    inside = (curve.speed_m_s >= truth.speed[0]) & (curve.speed_m_s <= truth.speed[-1])
+    if not inside.any():
+        return np.nan, np.nan
+    true = np.interp(curve.speed_m_s[inside], truth.speed, truth.retardation)
+    off = curve.resistance_m_s2[inside] - true
+    rms = float(np.sqrt(np.mean(off**2)) / true.max())
+    return rms, float(np.mean(np.abs(off) <= 2.0 * curve.sigma_m_s2[inside]))

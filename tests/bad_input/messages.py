@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bad messages on the way into the monitor: values, stamps, arrivals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shipdrag_ros.messages import EncodedMessage, encode, types
+from shipdrag_ros.samples import Block, Channel, Float64
+from tests.bad_input.case import SECOND_NS, Case, coastdown, steady, write, write_messages
+
+# of the log alone at 1 Hz: the engine stops at 600
+_SOME = slice(100, 110)
+_COAST = slice(900, 910)
+
+
+def _value(places: slice, value: float) -> Callable[[Block], Block]:
+    def change(block: Block) -> Block:
+        values: Float64 = block.value.copy()
+        values[places, 0] = value
+        return replace(block, value=values)
+
+    return change
+
+
+def _stamp(places: slice, shift_s: float) -> Callable[[Block], Block]:
+    def change(block: Block) -> Block:
+        stamps = block.stamp_ns.copy()
+        stamps[places] += round(shift_s * SECOND_NS)
+        return replace(block, stamp_ns=stamps)
+
+    return change
+
+
+def _order(places: Callable[[int], np.ndarray]) -> Callable[[Block], Block]:  # type: ignore[type-arg]
+    """Let stamps and values come in another order; arrivals stay."""
+
+    def change(block: Block) -> Block:
+        chosen = block[places(len(block))]
+        receive_ns = np.maximum.accumulate(chosen.receive_ns)
+        return replace(chosen, receive_ns=receive_ns)
+
+    return change
+
+
+def _twice(n: int) -> np.ndarray:  # type: ignore[type-arg]
+    return np.sort(np.r_[np.arange(n), np.arange(100, 110)])
+
+
+def _swapped(n: int) -> np.ndarray:  # type: ignore[type-arg]
+    order = np.arange(n)
+    order[100:120] = order[100:120].reshape(-1, 2)[:, ::-1].ravel()
+    return order
+
+
+def _without(places: slice) -> Callable[[int], np.ndarray]:  # type: ignore[type-arg]
+    return lambda n: np.delete(np.arange(n), places)
+
+
+def _set_back(block: Block) -> Block:
+    later = np.arange(len(block)) >= 300
+    return replace(block, stamp_ns=block.stamp_ns - later * 3600 * SECOND_NS)
+
+
+def _recorder_set_back(block: Block) -> Block:
+    later = np.arange(len(block)) >= 300
+    shift_ns = later * 3600 * SECOND_NS
+    return replace(
+        block, stamp_ns=block.stamp_ns - shift_ns, receive_ns=block.receive_ns - shift_ns
+    )
+
+
+def _no_fix(message: EncodedMessage, *, status: int, latitude: float) -> EncodedMessage:
+    fix = types.make(
+        types.NAV_SAT_FIX,
+        header=types.header(message.publish_ns, 'gps'),
+        status=types.make('sensor_msgs/msg/NavSatStatus', status=status, service=1),
+        latitude=latitude,
+        longitude=5.0,
+        altitude=0.0,
+        position_covariance=np.zeros(9),
+        position_covariance_type=0,
+    )
+    return replace(
+        message, type=types.NAV_SAT_FIX, payload=types.serialize(types.NAV_SAT_FIX, fix)
+    )
+
+
+def _zero_rotation(message: EncodedMessage) -> EncodedMessage:
+    zero = types.make('geometry_msgs/msg/Quaternion', x=0.0, y=0.0, z=0.0, w=0.0)
+    sent = types.make(
+        types.QUATERNION, header=types.header(message.publish_ns, 'base_link'), quaternion=zero
+    )
+    return replace(message, payload=types.serialize(types.QUATERNION, sent))
+
+
+def _other_joint(message: EncodedMessage) -> EncodedMessage:
+    sent = types.make(
+        types.JOINT_STATE,
+        header=types.header(message.publish_ns, ''),
+        name=['engine'],
+        position=np.zeros(0),
+        velocity=np.array([8.0]),
+        effort=np.zeros(0),
+    )
+    return replace(message, payload=types.serialize(types.JOINT_STATE, sent))
+
+
+def _all_inputs(kind: str, change: Callable[[Block], Block], *says: str) -> Case:
+    return Case(
+        'Messages',
+        kind,
+        lambda folder: ['replay', str(write(folder / 'bag.mcap', change(steady())))],
+        0,
+        says,
+    )
+
+
+def _behind(block: Block) -> Block:
+    log = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)[_SOME]
+    stamps = block.stamp_ns.copy()
+    stamps[log] -= 8 * SECOND_NS
+    return replace(block, stamp_ns=stamps)
+
+
+def _samples(kind: str, change: Callable[[Block], Block], *says: str, whole: bool = False) -> Case:
+    """Steady sailing, or a whole coastdown where it matters that it is found."""
+
+    def line(folder: Path) -> list[str]:
+        block = coastdown() if whole else coastdown()[:600]
+        path = write(folder / 'bag.mcap', change(block))
+        return ['replay', str(path)]
+
+    return Case('Messages', kind, line, 0, says)
+
+
+def _messages(
+    kind: str, topic: str, change: Callable[[EncodedMessage], EncodedMessage], *says: str
+) -> Case:
+    def line(folder: Path) -> list[str]:
+        changed = [
+            change(message) if message.topic == topic else message for message in encode(steady())
+        ]
+        return ['replay', str(write_messages(folder / 'bag.mcap', changed))]
+
+    return Case('Messages', kind, line, 0, says)
+
+
+def _log_a_year_behind(block: Block) -> Block:
+    year = np.where(block.channel == Channel.SPEED_THROUGH_WATER, 365 * 86400 * SECOND_NS, 0)
+    return replace(block, stamp_ns=block.stamp_ns - year)
+
+
+def _epochs(block: Block) -> Block:
+    year = np.where(block.channel == Channel.POSITION, 0, 365 * 86400 * SECOND_NS)
+    return replace(block, stamp_ns=block.stamp_ns - year)
+
+
+CASES = (
+    _samples('NaN in a coastdown', _value(_COAST, np.nan), 'Coastdown 1', '10 nan', whole=True),
+    _samples('infinite values', _value(_SOME, np.inf), '10 infinite'),
+    _samples('absurd speeds, 500 m/s', _value(_SOME, 500.0), '10 absurd'),
+    _samples('a log that hangs for 300 s', _value(slice(100, 400), 8.0), '293 frozen'),
+    _samples(
+        'a log that hangs all the time',
+        _value(slice(None), 8.0),
+        'Warning: speed_through_water: 479 of 600 messages not used; 479 frozen',
+        'check the sensor',
+    ),
+    _samples('messages sent twice', _order(_twice), '10 duplicate'),
+    _samples('messages out of order', _order(_swapped), '10 out_of_order'),
+    _samples('stamps an hour ahead', _stamp(_SOME, 3600.0), '10 future'),
+    _samples(
+        'a clock ahead by 5 s all the time',
+        _stamp(slice(None), 5.0),
+        '600 of 600 messages not used; 600 future',
+        'set the clocks of sensor and recorder alike',
+    ),
+    _samples(
+        'the clock of the recorder set back: the order is by log time',
+        _recorder_set_back,
+        '600   600',
+    ),
+    _samples(
+        'the clock of the sensor alone set back',
+        _set_back,
+        'everything before was dropped: speed_through_water: the stamp went back by 3597.000 s',
+        '2 late',
+    ),
+    _samples(
+        'a gap of 90 s in a coastdown',
+        _order(_without(slice(900, 990))),
+        'the data stopped',
+        whole=True,
+    ),
+    _messages(
+        'GNSS without a fix',
+        '/position',
+        lambda m: _no_fix(m, status=-1, latitude=60.0),
+        'position: 302 of 302 messages not used; 302 nan',
+        'check the sensor',
+    ),
+    _messages(
+        'a latitude of 600 degrees',
+        '/position',
+        lambda m: _no_fix(m, status=0, latitude=600.0),
+        'position: 302 of 302 messages not used; 302 absurd',
+        'check the unit',
+    ),
+    _messages(
+        'a rotation of zeros',
+        '/heading',
+        _zero_rotation,
+        'heading: 302 of 302 messages not used; 302 nan',
+        'check the sensor',
+    ),
+    _messages(
+        'a joint of another name',
+        '/shaft',
+        _other_joint,
+        'shaft: 302 of 302 messages not used; 302 no_joint',
+        'name it in the driver',
+    ),
+    _all_inputs(
+        'a position stamped a year after the rest',
+        _epochs,
+        'speed_through_water: 301 of 302 messages not used; 301 late',
+        'set the clocks of the sensors alike',
+    ),
+    _all_inputs('some stamps 8 s behind', _behind, 'out_of_order'),
+    _all_inputs(
+        'a log that lags by a year',
+        _log_a_year_behind,
+        'speed_through_water: 301 of 302 messages not used; 301 late',
+        'set the clocks of the sensors alike',
+    ),
+)
