@@ -33,6 +33,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LN_A,
     LN_U,
     LOG,
+    LONGER,
     LOW,
     OPEN,
     P0,
@@ -72,8 +73,9 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     LOG_LIES,
     TRACK_LIES,
     FIT,
-) = range(11)
-OUTS = 11  # and of even power, mean speed, P(it says nothing true), log predictive density
+    P_STEADY,
+) = range(12)
+OUTS = 12  # and of even power, mean speed, P(it says nothing true), log predictive density
 _TURNING_RAD_S = 0.5  # a shaft below it drives no ship
 
 
@@ -147,10 +149,11 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             for k in range(len(w)):
                 w[k] = 0
             x[LN_U] = math.log(speed)
-            p[LN_U, LN_U] = 0.1**2
+            p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             p[WAY, WAY] = 1e4
+            p[LONGER, LONGER] = (n.LOG_LAG_SD_S / n.LOG_LAG_S) ** 2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
@@ -158,9 +161,9 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
             if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], 0.1**2
+                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
                 # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.095**2
+                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
             else:
                 w[COUNT], w[GLIDED] = 1, 1
                 all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
@@ -203,6 +206,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
+    out[P_STEADY] = 0.0
     for k in range(FIT):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
@@ -213,6 +217,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         if regime == DRIVEN:
             out[P_DRIVEN] += share
             out[P_EVEN] += share
+            out[P_STEADY] += share
         elif regime == LEVEL:
             if not pushes(all_, i, now_s):  # a glide, until the water has slowed her to that level
                 out[P_GLIDING] += share
@@ -254,7 +259,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
             return
         thin(all_, setting)
         _sum_up(bank, setting)
-        bank.out[P_EVEN] = 1.0
+        bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
     _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
     used = bank.noise.used
@@ -267,5 +272,5 @@ def step(bank: Bank, setting: BankSetting) -> None:
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
     thin(all_, setting)
     _sum_up(bank, setting)
-    listen(bank.noise, setting, said, bank.out[P_EVEN])
+    listen(bank.noise, setting, said, bank.out[P_STEADY])
     bank.out[FIT] = before

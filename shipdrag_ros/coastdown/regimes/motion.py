@@ -34,6 +34,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LN_A,
     LN_U,
     LOG,
+    LONGER,
     LOW,
     N_FIX,
     N_GROUND,
@@ -73,7 +74,7 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
-_LAG_SD = float(n.LOG_LAG_SD_S) / _LAG_S  # of the lag
+_PUSHES = 1.7  # advance at which 5 % of the thrust is left, over that of service
 _ROOT = math.sqrt(2.0 * math.pi)
 
 
@@ -100,6 +101,13 @@ def _advance(part: float, free: float) -> tuple[float, float]:
     return 0.5 * (free + root), 2.0 * part * part * (1.0 - free) / root
 
 
+@compiled(inline=True, uncounted=True)
+def _thrust_left(f: Float64, now_s: float) -> float:
+    """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
+    left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
+    return left * left
+
+
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes: more than 5 % of the thrust is there."""
@@ -110,7 +118,7 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
     target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
     free = f[FREE] if w[KIND] == 1 else 0.0
     rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
-    return bool(rho * n.NO_THRUST_SEEN > 1.0)
+    return bool(rho * _PUSHES > 1.0)
 
 
 @compiled(inline=True, uncounted=True)
@@ -132,7 +140,7 @@ def _force(
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
         left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
     elif regime == GLIDE:
-        left = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+        left = 1.0 - _thrust_left(f, now_s)
     if regime in (TURN, GLIDE_TURN):
         drag = math.exp(min(x[OPEN], 3.0))
         left, by_open = left + drag, -a * drag
@@ -214,7 +222,7 @@ def predict(
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
-            p[OPEN, OPEN] += n.TURNS_SD**2 * dt / (60.0 * pace)
+            p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         # the wind that she meets falls less than her own way
@@ -222,7 +230,6 @@ def predict(
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
-        p[LAG, LAG] += (1.0 - keep_f * keep_f) * (_LAG_SD * x[LAG]) ** 2
         x[WAY] += dt * (u + x[CURRENT])
         x[LAG] = keep_f * x[LAG] - u * change
         x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
@@ -336,7 +343,7 @@ def _driving(
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
     f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
-    if several and not settled:  # one of them may turn as before
+    if not settled:  # on its way, or one of several that turns as before
         density = 0.5 * (density + (1.0 if nu < 1.1 else 0.0))
     return density
 
@@ -357,7 +364,7 @@ def _running_down(
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
         f[FREE] += 0.5 * (nu / falls - f[FREE])
-    any_ = 1.0 if kind == HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
+    any_ = 1.0 if kind >= HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
     return part * density + (1.0 - part) * any_
 
 
@@ -376,10 +383,10 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         return _normal(nu - at, wide) if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD[0] else 0.0
     if kind == STANDS or np.isnan(revs):
         stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
-        if kind == STANDS:
-            return stands
+        last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         f[REVS] = nu
-        return 0.5 * stands + 0.5
+        # or anything below its last: it runs down
+        return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
     f[REVS] = nu
     return 0.9 * _off(nu, revs) + 0.1
 
@@ -406,12 +413,12 @@ def _shaft(
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
     else:
         kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
-        left = 1.0 - age_s / f[RAMP_S] if regime == GLIDE else 0.0
-        if regime == GLIDE and kind != HELD and age_s < step_s:
+        left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
+        if regime == GLIDE and kind < HELD and age_s < step_s:
             # it stopped within the bin, of which the revs are a mean
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0:
-            part = 0.5 if several or kind == HELD else 0.8
+            part = 0.5 if several or kind >= HELD else 0.8
             density = _running_down(f, kind, nu, u_part, left, part)
         else:
             density = _dragged(f, kind, nu, u_part)
@@ -424,7 +431,7 @@ def _shaft(
 def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> None:
     """End a run-down where a shaft shows that the thrust is gone."""
     f, w = bank.number[i], bank.whole[i]
-    if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] == HELD:
+    if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] >= HELD:
         return
     if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0:
         f[SINCE] = min(f[SINCE], gone_s - 0.1)
@@ -465,8 +472,8 @@ def weigh(
         expected = u - lag * slowing
         sd = noise[N_LOG]
         if which == LOG:
-            h[WANDER] = h[LAG] = 1.0
-            expected += x[WANDER] + x[LAG]
+            h[WANDER], h[LAG], h[LONGER] = 1.0, 1.0 + x[LONGER], x[LAG]
+            expected += x[WANDER] + x[LAG] * h[LAG]
         else:
             h[CURRENT] = 1.0
             expected += x[CURRENT]

@@ -17,9 +17,10 @@ SWITCHES = 12  # that a history remembers
 
 # the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
 # of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m], what the filter of the log lags behind [m/s]
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG = range(9)
-STATES = 9
+# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], and how much
+# longer the log's own is, over that
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER = range(10)
+STATES = 10
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
@@ -35,7 +36,7 @@ COLUMNS = 14
 REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
 WHOLE = 5
 NOBODY, THE_LOG, THE_TRACK = range(3)
-WINDMILLS, STANDS, HELD = range(3)  # a screw in a glide
+WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)

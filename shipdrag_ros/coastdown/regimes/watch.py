@@ -40,7 +40,7 @@ _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _EVEN = 0.95
 _DOUBTED = 0.5
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
-_RAN_DOWN_S = 15.0  # a run-down that is worth a word
+_RAN_DOWN_S = 30.0  # a run-down that is worth a word
 _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
 
