@@ -49,6 +49,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     STATES,
     STAYS,
     STAYS_WAY,
+    SWITCHES,
     THE_LOG,
     THE_TRACK,
     WAY,
@@ -203,6 +204,29 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
+def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
+    """
+    Write down when the screw of a lower level ceases to push, and when it pushes again.
+
+    Between both she glides, and the way to the level was a run-down.
+    """
+    f, w = bank.number[i], bank.whole[i]
+    if w[REGIME] != LEVEL or w[COUNT] == 0:
+        return
+    last = w[COUNT] - 1
+    pushed = bank.what[i, last] == LEVEL
+    if pushed == pushes(bank, i, now_s):
+        return
+    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+        bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
+        w[GLIDED] = 1
+    elif not pushed and w[COUNT] < SWITCHES:
+        bank.at[i, last + 1], bank.what[i, last + 1] = now_s, LEVEL
+        bank.ramp[i, last + 1] = 0.0
+        w[COUNT] += 1
+
+
+@compiled(uncounted=True)
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
@@ -240,7 +264,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
 
 
 _SETTING = BankSetting(
-    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0, 0.0
+    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)), 0.0, 0.0, 0, 0.0, 0.0
 )  # its types are all that counts
 
 
@@ -270,6 +294,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
+        _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
     thin(all_, setting)
     _sum_up(bank, setting)
     listen(bank.noise, setting, said, bank.out[P_STEADY])

@@ -140,7 +140,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     for k in range(len(n.RUN_DOWN_S)):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
-            part = chance * n.RUN_DOWN_SHARE[k] * n.DRAGGED_SHARE[kind]
+            part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
@@ -202,6 +202,8 @@ def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 _glide(bank, j, setting.hull)
                 bank.number[j, REVS] = np.nan
                 bank.whole[j, KIND] = STANDS
+                bank.mean[j, LN_A] += n.DRAGGED[STANDS]
+                bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
             _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
 
 
