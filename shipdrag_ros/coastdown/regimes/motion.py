@@ -74,7 +74,6 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
-_PUSHES = 1.7  # advance at which 5 % of the thrust is left, over that of service
 _ROOT = math.sqrt(2.0 * math.pi)
 
 
@@ -110,7 +109,7 @@ def _thrust_left(f: Float64, now_s: float) -> float:
 
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
-    """Say whether the screw of a history pushes: more than 5 % of the thrust is there."""
+    """Say whether the screw of a history pushes."""
     f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
     if w[REGIME] != LEVEL:
         return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
@@ -118,7 +117,7 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
     target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
     free = f[FREE] if w[KIND] == 1 else 0.0
     rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
-    return bool(rho * _PUSHES > 1.0)
+    return bool(rho * n.NO_THRUST > 1.0)
 
 
 @compiled(inline=True, uncounted=True)
@@ -428,6 +427,18 @@ def _shaft(
 
 
 @compiled(uncounted=True)
+def _stop_seen(bank: Histories, i: int, nu: float, now_s: float, step_s: float) -> None:
+    """Date a stop within its bin by the revs, whose mean is the lower the sooner it came."""
+    f, w = bank.number[i], bank.whole[i]
+    first_s = now_s - 0.5 * step_s
+    if w[REGIME] != GLIDE or w[KIND] >= HELD or w[COUNT] == 0 or f[SINCE] != first_s:
+        return
+    later = step_s * min(max(1.0 - 2.5 * (1.0 - nu), 0.0), 1.0)
+    f[SINCE] += later
+    bank.at[i, w[COUNT] - 1] = f[SINCE]
+
+
+@compiled(uncounted=True)
 def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> None:
     """End a run-down where a shaft shows that the thrust is gone."""
     f, w = bank.number[i], bank.whole[i]
@@ -489,7 +500,12 @@ def weigh(
                 h[j] = 0.0
             h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
             expected = x[WAY] - half * (u + x[CURRENT])
-            gained += _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
+            said_so = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
+            gained += said_so
+            if said_so < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
+                for k in range(STATES):
+                    p[WAY, k] = p[k, WAY] = 0.0
+                p[WAY, WAY] = 1e4
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way
@@ -504,6 +520,7 @@ def weigh(
         several = setting.shafts > 1
         gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, setting.step_s, several)
         _thrust_seen(bank, i, said[GONE], now_s - 1.5 * setting.step_s)
+        _stop_seen(bank, i, said[HIGH], now_s, setting.step_s)
     f[WEIGHT] += gained
     if regime in (DRIVEN, TURN):
         # at balance neither is seen, only the filter's own errors

@@ -127,8 +127,8 @@ GLIDES_FIRST = _number('GLIDES_FIRST', 0.3, '1', 'of a window that is given: it 
 
 # shapes of switches
 RUN_DOWN_S = _grid('RUN_DOWN_S', (3.0, 10.0, 24.0, 60.0), 's', 'fuel cut, pitch, controlled')
-RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.55, 0.2, 0.18, 0.07), '1', 'short by default')
-RUN_DOWN_FILE_SD = _number('RUN_DOWN_FILE_SD', 0.7, 'ln', 'of what a ship file says of it')
+RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.55, 0.22, 0.18, 0.05), '1', 'short by default')
+RUN_DOWN_FILE_SD = _number('RUN_DOWN_FILE_SD', 0.5, 'ln', 'of what a ship file says of it')
 LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a telegraph')
 LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
 LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')

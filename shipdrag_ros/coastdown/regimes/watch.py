@@ -40,7 +40,7 @@ _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _EVEN = 0.95
 _DOUBTED = 0.5
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
-_RAN_DOWN_S = 30.0  # a run-down that is worth a word
+_RAN_DOWN_S = 40.0  # a run-down that is worth a word
 _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
 
@@ -73,6 +73,8 @@ class Dated(NamedTuple):
         the glide.
     ended_by
         What followed; None where she glides on.
+    seen
+        Whether a shaft shows the stop.
     """
 
     stop_s: float
@@ -81,11 +83,15 @@ class Dated(NamedTuple):
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
+    seen: bool
 
     @property
     def start_s(self) -> float:
         """Where the coastdown starts: at the stop, or at the end of a run-down that is cut."""
-        return self.begin_s if self.ran_down else self.stop_s
+        if self.ran_down:
+            return self.begin_s
+        # the revs fall evenly: an abrupt stop after a third of that costs as much speed
+        return self.stop_s + (0.0 if self.seen else (self.begin_s - self.stop_s) / 3.0)
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
@@ -235,6 +241,7 @@ class RegimeFilter:
             glide.begin_sd_s,
             not self._setting.shafts and glide.begin_s - glide.stop_s > _RAN_DOWN_S * pace,
             self._ended_by(glide),
+            self._setting.shafts > 0,
         )
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
