@@ -154,7 +154,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             p[WAY, WAY] = 1e4
-            p[LONGER, LONGER] = (n.LOG_LAG_SD_S / n.LOG_LAG_S) ** 2
+            p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0

@@ -36,6 +36,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOG,
     LONGER,
     LOW,
+    MEAN_LAG,
+    MEAN_U,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -179,7 +181,7 @@ def predict(
     keep_c = math.exp(-dt / (n.CURRENT_S * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
-    slowing = 0.0
+    slowing = mean_u = mean_lag = 0.0
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
@@ -230,14 +232,18 @@ def predict(
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
-        x[LAG] = keep_f * x[LAG] - u * change
+        lagged = keep_f * x[LAG] - u * change
+        mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
+        x[LAG] = lagged
         x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
+        mean_u += 0.5 * (u + math.exp(x[LN_U])) / _PARTS
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
         x[CURRENT] *= keep_c
         slowing = net
     x[WAY] -= advance
+    f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
     return slowing
 
 
@@ -479,15 +485,15 @@ def weigh(
         for j in range(STATES):
             h[j] = 0.0
         h[LN_U] = u
-        lag = half + (0.0 if which == LOG else pace * _GROUND_LAG_S)
-        expected = u - lag * slowing
+        expected = u + f[MEAN_U]
         sd = noise[N_LOG]
         if which == LOG:
-            h[WANDER], h[LAG], h[LONGER] = 1.0, 1.0 + x[LONGER], x[LAG]
-            expected += x[WANDER] + x[LAG] * h[LAG]
+            longer, lags = math.exp(min(max(x[LONGER], -3.0), 3.0)), x[LAG] + f[MEAN_LAG]
+            h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
+            expected += x[WANDER] + longer * lags
         else:
             h[CURRENT] = 1.0
-            expected += x[CURRENT]
+            expected += x[CURRENT] - pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):

@@ -53,8 +53,8 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
-LOG_LAG_S = _number('LOG_LAG_S', 5.0, 's', 'middle of the filters of logs')
-LOG_LAG_SD_S = _number('LOG_LAG_SD_S', 3.0, 's', 'how a log bears a sudden change')
+LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
+LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
 # the hull
