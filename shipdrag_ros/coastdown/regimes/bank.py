@@ -264,7 +264,12 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
 
 
 _SETTING = BankSetting(
-    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)), 0.0, 0.0, 0, 0.0, 0.0
+    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)),
+    0.0,
+    0.0,
+    0,
+    0.0,
+    0.0,
 )  # its types are all that counts
 
 

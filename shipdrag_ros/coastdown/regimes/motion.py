@@ -457,6 +457,48 @@ def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> Non
 
 
 @compiled(uncounted=True)
+def _by_way(
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
+) -> float:
+    """Update a history by the way between fixes; return its log density."""
+    x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
+    bad, half, h = float(n.BAD_DENSITY), 0.5 * setting.step_s, work[STATES]
+    if bank.whole[i, LIAR] == THE_TRACK:
+        wide = math.hypot(2.5 * noise[N_FIX], noise[N_WALK] * math.sqrt(setting.step_s))
+        return _untrue(f, STAYS_WAY, advance, wide, bad / setting.step_s)
+    u = math.exp(x[LN_U])
+    for j in range(STATES):
+        h[j] = 0.0
+    h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
+    expected = x[WAY] - half * (u + x[CURRENT])
+    gained = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull.first - 1.0)
+    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
+        for k in range(STATES):
+            p[WAY, k] = p[k, WAY] = 0.0
+        p[WAY, WAY] = 1e4
+    return gained
+
+
+@compiled(uncounted=True)
+def _by_shafts(
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float
+) -> float:
+    """Return the log density of the revs, and date the stop and the end of thrust by them."""
+    f, step_s = bank.number[i], setting.step_s
+    now_s = (bank.clock[0] - 0.5) * step_s
+    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
+    gained = n.SHAFT_TEMPER * shown
+    young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
+    if young and bank.whole[i, KIND] < HELD:
+        # no slow error hides that the revs have not changed
+        unchanged = math.log(_off(said[HIGH], 1.0) + n.SHAFT_LIES)
+        gained += (1.0 - n.SHAFT_TEMPER) * min(shown - unchanged, 0.0)
+    _thrust_seen(bank, i, said[GONE], now_s - 1.5 * step_s)
+    _stop_seen(bank, i, said[HIGH], now_s, step_s)
+    return float(gained)
+
+
+@compiled(uncounted=True)
 def weigh(
     bank: Histories, i: int, setting: BankSetting, noise: Float64, said: Float64, slowing: float,
     log_first: float, work: Float64,
@@ -467,12 +509,9 @@ def weigh(
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[STATES]
-    half = 0.5 * setting.step_s
-    pace = setting.pace
     gained = 0.0
     bad = float(n.BAD_DENSITY)
     least = setting.hull.first - 1.0  # at rest
-    now_s = (bank.clock[0] - 0.5) * setting.step_s
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
@@ -493,25 +532,11 @@ def weigh(
             expected += x[WANDER] + longer * lags
         else:
             h[CURRENT] = 1.0
-            expected += x[CURRENT] - pace * _GROUND_LAG_S * slowing
+            expected += x[CURRENT] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
-        if liar == THE_TRACK:
-            wide = math.hypot(2.5 * noise[N_FIX], noise[N_WALK] * math.sqrt(setting.step_s))
-            gained += _untrue(f, STAYS_WAY, said[ADVANCE], wide, bad / setting.step_s)
-        else:
-            u = math.exp(x[LN_U])
-            for j in range(STATES):
-                h[j] = 0.0
-            h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
-            expected = x[WAY] - half * (u + x[CURRENT])
-            said_so = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
-            gained += said_so
-            if said_so < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
-                for k in range(STATES):
-                    p[WAY, k] = p[k, WAY] = 0.0
-                p[WAY, WAY] = 1e4
+        gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way
@@ -523,10 +548,7 @@ def weigh(
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
     if not np.isnan(said[HIGH]):
-        several = setting.shafts > 1
-        gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, setting.step_s, several)
-        _thrust_seen(bank, i, said[GONE], now_s - 1.5 * setting.step_s)
-        _stop_seen(bank, i, said[HIGH], now_s, setting.step_s)
+        gained += _by_shafts(bank, i, setting, said, log_first)
     f[WEIGHT] += gained
     if regime in (DRIVEN, TURN):
         # at balance neither is seen, only the filter's own errors

@@ -73,7 +73,10 @@ DRAGGED = _grid(
 DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.68, 0.2, 0.1, 0.02), '1', 'of these')
 DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35, 0.45, 0.2), 'ln', 'of each')
 DRAGGED_EXPONENT = _grid(
-    'DRAGGED_EXPONENT', (-0.1, 0.0, -0.9, -0.1), '1', 'a screw that turns without pitch drags as u does'
+    'DRAGGED_EXPONENT',
+    (-0.1, 0.0, -0.9, -0.1),
+    '1',
+    'a screw that turns without pitch drags as u does',
 )
 DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')
 WIND_SD = _number('WIND_SD', 0.06, 'of the first resistance', 'a force that stays as she slows')
@@ -114,7 +117,7 @@ MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` o
 MANOEUVRING_S = _number('MANOEUVRING_S', 1800.0, 's', 'manoeuvres come in groups')
 OF_MANOEUVRES = _grid('OF_MANOEUVRES', (0.3, 0.5, 0.2), '1', 'stop, level, turn')
 AFTER_KICK = _number('AFTER_KICK', 0.6, '1', 'of switches after one from a glide: stops')
-BRAKED = _number('BRAKED', 0.1, '1', 'of stops: at once astern')
+BRAKED = _number('BRAKED', 0.2, '1', 'of stops: at once astern')
 GLIDE_LEVEL = _number('GLIDE_LEVEL', 4.0, '1/h', 'gliding to a level')
 GLIDE_BRAKE = _number('GLIDE_BRAKE', 0.5, '1/h', 'gliding to braked')
 GLIDE_TURN = _number('GLIDE_TURN', 0.5, '1/h', 'gliding to turning without thrust')
