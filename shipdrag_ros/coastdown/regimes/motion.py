@@ -106,7 +106,7 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 def _thrust_left(f: Float64, now_s: float) -> float:
     """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
     left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
-    return left * left
+    return float(left * left)
 
 
 @compiled(uncounted=True)
