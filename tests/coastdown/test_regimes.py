@@ -58,7 +58,7 @@ def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s, seed) -
     block = record(sensors=sensors, seed=seed)
     (ended,) = [each for each in of(EndedCoastdown, events_of(ship, block)) if not each.withdrawn]
     # the thrust falls as exp(-t / 8 s): a twentieth is left after 24 s
-    assert abs(ended.start_ns - START_NS - 900 * S) < within_s * S
+    assert abs(ended.start_ns - START_NS - 912 * S) < within_s * S
     assert ended.end_ns > START_NS + 1700 * S
     assert ended.estimate is not None
 

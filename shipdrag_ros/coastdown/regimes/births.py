@@ -39,6 +39,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     ROOM,
     SINCE,
     STATES,
+    STAYS,
+    STAYS_WAY,
     SWITCHES,
     THE_LOG,
     THE_TRACK,
@@ -142,7 +144,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 continue
             x, p = bank.mean[j], bank.spread[j]
             bank.whole[j, KIND] = kind
-            bank.number[j, REVS] = np.nan
+            bank.number[j, REVS] = bank.number[j, FREE] = np.nan
             bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
             x[POWER] += n.DRAGGED_EXPONENT[kind]
@@ -207,6 +209,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
         bank.used[0] = j + 1
         bank.number[j, WEIGHT] += math.log(chance)
         bank.whole[j, LIAR] = liar
+        bank.number[j, STAYS] = bank.number[j, STAYS_WAY] = np.nan
 
 
 @compiled(uncounted=True)

@@ -15,12 +15,14 @@ from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     BEFORE,
     BRAKE,
+    COUNT,
     CURRENT,
     DRIVEN,
     FIRST_A,
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GONE,
     GROUND,
     GUST,
     HELD,
@@ -53,6 +55,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     SINCE,
     STANDS,
     STATES,
+    STAYS,
+    STAYS_WAY,
     THE_LOG,
     THE_TRACK,
     TURN,
@@ -94,6 +98,19 @@ def _advance(part: float, free: float) -> tuple[float, float]:
         return part, part
     root = math.sqrt(free * free + 4.0 * part * part * (1.0 - free))
     return 0.5 * (free + root), 2.0 * part * part * (1.0 - free) / root
+
+
+@compiled(uncounted=True)
+def pushes(bank: Histories, i: int, now_s: float) -> bool:
+    """Say whether the screw of a history pushes: more than 5 % of the thrust is there."""
+    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
+    if w[REGIME] != LEVEL:
+        return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+    free = f[FREE] if w[KIND] == 1 else 0.0
+    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
+    return bool(rho * n.NO_THRUST_SEEN > 1.0)
 
 
 @compiled(inline=True, uncounted=True)
@@ -259,6 +276,17 @@ def _normal(off: float, sd: float) -> float:
 
 
 @compiled(inline=True, uncounted=True)
+def _untrue(f: Float64, column: int, value: float, wide: float, bad: float) -> float:
+    """Return the log density of a reading that says nothing true: it stays, or is anything."""
+    off = value - f[column]
+    stays = 0.0 if np.isnan(off) else n.STUCK * _normal(off, wide)
+    density = stays + (1.0 - n.STUCK) * bad
+    share = stays / density
+    f[column] = value if share < 0.1 else f[column] + 0.1 * share * off
+    return math.log(density)
+
+
+@compiled(inline=True, uncounted=True)
 def _off(nu: float, expected: float) -> float:
     """Return the density of revs where they are known but for their own error."""
     return _normal(nu - expected, math.hypot(n.SHAFT_SD[0], n.SHAFT_SD[1] * expected))
@@ -314,15 +342,30 @@ def _driving(
 
 
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float, left: float, several: bool) -> float:
+def _running_down(
+    f: Float64, kind: int, nu: float, u_part: float, left: float, part: float
+) -> float:
     """
-    Return the density of the revs of a screw that does not drive; `left` is thrust not yet gone.
+    Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
+
+    The error of what is expected is paid for once, as that of a level.
     """
-    if left > 0.0:
-        falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
-        any_ = 1.0 if kind == HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
-        share = 0.5 if several or kind == HELD else 0.8
-        return share * _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) + (1.0 - share) * any_
+    falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
+    if np.isnan(f[FREE]):
+        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
+        f[FREE] = nu / falls
+    else:
+        density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
+        f[FREE] += 0.5 * (nu / falls - f[FREE])
+    any_ = 1.0 if kind == HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
+    return part * density + (1.0 - part) * any_
+
+
+@compiled(uncounted=True)
+def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
+    """
+    Return the density of the revs of a screw that does not drive.
+    """
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
@@ -343,7 +386,13 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, left: float, sever
 
 @compiled(uncounted=True)
 def _shaft(
-    bank: Histories, i: int, said: Float64, log_first: float, now_s: float, several: bool
+    bank: Histories,
+    i: int,
+    said: Float64,
+    log_first: float,
+    now_s: float,
+    step_s: float,
+    several: bool,
 ) -> float:
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
@@ -356,11 +405,31 @@ def _shaft(
         if several and regime != LEVEL:  # they turn alike
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
     else:
-        left = 1.0 - (now_s - f[SINCE]) / f[RAMP_S] if regime == GLIDE else 0.0
-        density = _dragged(f, bank.whole[i, KIND], nu, u_part, left, several)
+        kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
+        left = 1.0 - age_s / f[RAMP_S] if regime == GLIDE else 0.0
+        if regime == GLIDE and kind != HELD and age_s < step_s:
+            # it stopped within the bin, of which the revs are a mean
+            density = 1.2 if nu < 1.05 else 0.0
+        elif left > 0.0:
+            part = 0.5 if several or kind == HELD else 0.8
+            density = _running_down(f, kind, nu, u_part, left, part)
+        else:
+            density = _dragged(f, kind, nu, u_part)
         if regime == BRAKE:  # astern, where no sign is read
             density = 0.9 * density + 0.1
     return math.log(density + n.SHAFT_LIES)
+
+
+@compiled(uncounted=True)
+def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> None:
+    """End a run-down where a shaft shows that the thrust is gone."""
+    f, w = bank.number[i], bank.whole[i]
+    if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] == HELD:
+        return
+    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0:
+        f[SINCE] = min(f[SINCE], gone_s - 0.1)
+        f[RAMP_S] = gone_s - f[SINCE]
+        bank.at[i, w[COUNT] - 1], bank.ramp[i, w[COUNT] - 1] = f[SINCE], f[RAMP_S]
 
 
 @compiled(uncounted=True)
@@ -384,7 +453,9 @@ def weigh(
         if np.isnan(said[which]):
             continue
         if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
-            gained += math.log(bad)
+            wide = 1.5 * math.hypot(noise[N_LOG], noise[N_WANDER])
+            wide = wide if which == LOG else noise[N_GROUND]
+            gained += _untrue(f, STAYS, said[which], wide, bad)
             continue
         u = math.exp(x[LN_U])
         for j in range(STATES):
@@ -403,7 +474,8 @@ def weigh(
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
         if liar == THE_TRACK:
-            gained += math.log(bad)
+            wide = math.hypot(2.5 * noise[N_FIX], noise[N_WALK] * math.sqrt(setting.step_s))
+            gained += _untrue(f, STAYS_WAY, said[ADVANCE], wide, bad / setting.step_s)
         else:
             u = math.exp(x[LN_U])
             for j in range(STATES):
@@ -421,7 +493,8 @@ def weigh(
         gained += n.SHAFT_TEMPER * math.log(density + 1e-9)
     if not np.isnan(said[HIGH]):
         several = setting.shafts > 1
-        gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, several)
+        gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, setting.step_s, several)
+        _thrust_seen(bank, i, said[GONE], now_s - 1.5 * setting.step_s)
     f[WEIGHT] += gained
     if regime in (DRIVEN, TURN):
         # at balance neither is seen, only the filter's own errors

@@ -59,7 +59,7 @@ GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
 # the hull
 RESISTANCE = _grid(
-    'RESISTANCE', (0.30, 0.28), 'ln', 'over friction by length and volume: mean, sd; waves, wind'
+    'RESISTANCE', (0.20, 0.28), 'ln', 'over the curve by length and volume: mean, sd; wind, sea'
 )
 RESISTANCE_FILE = _grid(
     'RESISTANCE_FILE', (0.15, 0.20), 'ln', 'over the baseline of the ship file: mean, sd'
@@ -75,10 +75,12 @@ DRAGGED_EXPONENT = _grid(
 DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')
 WIND_SD = _number('WIND_SD', 0.06, 'of the first resistance', 'a force that stays as she slows')
 KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
-EXPONENT = _grid('EXPONENT', (0.45, 0.6), '1', 'over that of friction: mean, sd; waves have 4')
+WAVES = _number('WAVES', 0.28, 'Froude', 'where waves slow a hull as much as friction does')
+EXPONENT = _grid('EXPONENT', (0.0, 0.35), '1', 'over that of the curve: mean, sd')
 EXPONENT_FILE = _grid('EXPONENT_FILE', (0.1, 0.3), '1', 'over that of the baseline: mean, sd')
 EXPONENT_WALK = _number('EXPONENT_WALK', 0.4, '1', 'per root of ln u: no law is one power')
 NO_THRUST = _number('NO_THRUST', 1.8, '1', 'advance without thrust over that of service')
+NO_THRUST_SEEN = _number('NO_THRUST_SEEN', 1.5, '1', 'the same where 5 % of it is left')
 
 # what disturbs her
 GUST = _grid('GUST', (0.03, 0.08, 0.2), 'of the resistance', 'sd: wind of 13 %, wave groups')
@@ -97,6 +99,8 @@ BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
+STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
+SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 
 # switches, each an hour
 STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')

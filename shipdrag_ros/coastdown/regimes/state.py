@@ -25,9 +25,11 @@ DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
-# expected, or held; revs over speed of a free screw; prior of ln a, exponent, and their variances
+# expected, or held; revs over speed of a free screw, or over those of a run-down; prior of ln a,
+# exponent, and their variances; where an instrument that says nothing true stays, and its fixes
 WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
-COLUMNS = 12
+STAYS, STAYS_WAY = 12, 13
+COLUMNS = 14
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
 # number of switches, whether she has glided
 REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
@@ -38,7 +40,8 @@ WINDMILLS, STANDS, HELD = range(3)  # a screw in a glide
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
-SAID = 10
+GONE = 10  # when revs over speed fell through those without thrust [s since the start]
+SAID = 11
 
 # noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
 # speed over ground and fixes, their walk, sd of the rate of turn
