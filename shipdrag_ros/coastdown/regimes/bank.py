@@ -33,6 +33,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LN_A,
     LN_U,
     LOG,
+    LONGER,
     LOW,
     OPEN,
     P0,
@@ -48,6 +49,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     STATES,
     STAYS,
     STAYS_WAY,
+    SWITCHES,
     THE_LOG,
     THE_TRACK,
     WAY,
@@ -72,8 +74,9 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     LOG_LIES,
     TRACK_LIES,
     FIT,
-) = range(11)
-OUTS = 11  # and of even power, mean speed, P(it says nothing true), log predictive density
+    P_STEADY,
+) = range(12)
+OUTS = 12  # and of even power, mean speed, P(it says nothing true), log predictive density
 _TURNING_RAD_S = 0.5  # a shaft below it drives no ship
 
 
@@ -147,10 +150,11 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             for k in range(len(w)):
                 w[k] = 0
             x[LN_U] = math.log(speed)
-            p[LN_U, LN_U] = 0.1**2
+            p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             p[WAY, WAY] = 1e4
+            p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
@@ -158,9 +162,9 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
             if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], 0.1**2
+                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
                 # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.095**2
+                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
             else:
                 w[COUNT], w[GLIDED] = 1, 1
                 all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
@@ -200,9 +204,33 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
+def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
+    """
+    Write down when the screw of a lower level ceases to push, and when it pushes again.
+
+    Between both she glides, and the way to the level was a run-down.
+    """
+    f, w = bank.number[i], bank.whole[i]
+    if w[REGIME] != LEVEL or w[COUNT] == 0:
+        return
+    last = w[COUNT] - 1
+    pushed = bank.what[i, last] == LEVEL
+    if pushed == pushes(bank, i, now_s):
+        return
+    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+        bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
+        w[GLIDED] = 1
+    elif not pushed and w[COUNT] < SWITCHES:
+        bank.at[i, last + 1], bank.what[i, last + 1] = now_s, LEVEL
+        bank.ramp[i, last + 1] = 0.0
+        w[COUNT] += 1
+
+
+@compiled(uncounted=True)
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
+    out[P_STEADY] = 0.0
     for k in range(FIT):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
@@ -213,6 +241,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         if regime == DRIVEN:
             out[P_DRIVEN] += share
             out[P_EVEN] += share
+            out[P_STEADY] += share
         elif regime == LEVEL:
             if not pushes(all_, i, now_s):  # a glide, until the water has slowed her to that level
                 out[P_GLIDING] += share
@@ -235,7 +264,12 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
 
 
 _SETTING = BankSetting(
-    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0, 0.0
+    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)),
+    0.0,
+    0.0,
+    0,
+    0.0,
+    0.0,
 )  # its types are all that counts
 
 
@@ -254,7 +288,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
             return
         thin(all_, setting)
         _sum_up(bank, setting)
-        bank.out[P_EVEN] = 1.0
+        bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
     _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
     used = bank.noise.used
@@ -265,7 +299,8 @@ def step(bank: Bank, setting: BankSetting) -> None:
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
+        _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
     thin(all_, setting)
     _sum_up(bank, setting)
-    listen(bank.noise, setting, said, bank.out[P_EVEN])
+    listen(bank.noise, setting, said, bank.out[P_STEADY])
     bank.out[FIT] = before

@@ -37,6 +37,8 @@ class HullPrior(NamedTuple):
         Of the hull.
     sails
         ln of the speed at which she is likely to sail.
+    run_down : (run-downs,)
+        Share of each run-down.
     """
 
     first: float
@@ -48,6 +50,7 @@ class HullPrior(NamedTuple):
     exponent_var: float
     length_m: float
     sails: float
+    run_down: Float64
 
     @classmethod
     def of(cls, ship: Ship) -> HullPrior:
@@ -72,7 +75,19 @@ class HullPrior(NamedTuple):
             float(exponent[1] ** 2),
             ship.length_m,
             math.log(float(ship.speed(float(n.SAILS[0])))),
+            _run_down(ship),
         )
+
+
+def _run_down(ship: Ship) -> Float64:
+    """Return the shares of the run-downs; what the ship file says of them counts twice."""
+    known = ship.propulsion
+    if known is None or not known.run_down_s > 0.0:
+        return n.RUN_DOWN_SHARE.copy()
+    off = np.log(n.RUN_DOWN_S / (3.0 * known.run_down_s))
+    sd = math.hypot(float(n.RUN_DOWN_FILE_SD), known.sd / known.run_down_s)
+    share = n.RUN_DOWN_SHARE * np.exp(-0.5 * (off / sd) ** 2)
+    return np.asarray(share / share.sum())
 
 
 def _moving(ship: Ship, speed: Float64) -> Float64:

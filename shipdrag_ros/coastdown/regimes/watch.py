@@ -31,7 +31,7 @@ _LATE = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _EVEN = 0.95
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
-_RAN_DOWN_S = 15.0  # a run-down that is worth a word
+_RAN_DOWN_S = 40.0  # a run-down that is worth a word
 
 _ENDED = {
     LEVEL: EndedBy.ENGINE,
