@@ -153,8 +153,12 @@ class RegimeFilter:
     def _dated(self, glide: SmoothedGlide) -> Dated:
         zero = self._first * self._width
         slow_s = glide.begin_s - glide.stop_s
+        begin_s = glide.begin_s
+        if not self._setting.shafts and slow_s <= _RAN_DOWN_S * self._setting.pace:
+            # revs fall evenly: an abrupt stop after a third of that costs as much speed
+            begin_s = glide.stop_s + slow_s / 3.0
         return Dated(
-            zero + glide.begin_s,
+            zero + begin_s,
             zero + glide.end_s,
             glide.begin_sd_s,
             slow_s if slow_s > _RAN_DOWN_S * self._setting.pace else 0.0,
