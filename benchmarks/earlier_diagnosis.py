@@ -34,7 +34,7 @@ from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.diagnosis.carried import carried
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import SeenRun
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of

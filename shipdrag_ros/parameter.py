@@ -15,6 +15,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.fields import declare, number
 
@@ -134,6 +135,15 @@ class Prior:
                 raise ValueError('a choice is not fitted')
             case _:
                 return a + b * z
+
+    def at_each(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """
+        Return the value at each z, as `at`; of a size, which is never uniform.
+        """
+        if self.shape in (Shape.LOG_NORMAL, Shape.EITHER_SIGN):
+            return np.asarray(self.first * np.exp(self.second * z), np.float64)
+        origin = 0.0 if self.shape is Shape.HALF_NORMAL else self.first
+        return np.asarray(origin + self.second * z, np.float64)
 
     def inverse(self, value: float) -> float:
         """

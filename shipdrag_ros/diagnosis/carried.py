@@ -19,7 +19,7 @@ from functools import cached_property
 
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, check
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.seen_runs import CarriedEffect, SeenRun, WeighedEarlier
+from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier
 from shipdrag_ros.inference.decision import UNKNOWN, marginals
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.posterior.compare import ComparedHypotheses

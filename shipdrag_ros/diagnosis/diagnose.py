@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
@@ -19,8 +19,8 @@ from shipdrag_ros.diagnosis.result import (
     Advice,
     DiagnosisResult,
     EffectEstimate,
+    SeenRun,
 )
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
@@ -38,6 +38,7 @@ from shipdrag_ros.simulation.effects import LIBRARY
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
+_APART_M_S = 0.15  # slowly: six times what is usual of water
 _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
@@ -156,7 +157,7 @@ def diagnose(
         held_out_after=held_out(seen, comparing, best) if judged.missing else None,
         baseline=baseline,
         best=judged.best,
-        notes=(*case.notes, *_without_a_baseline(stated)),
+        notes=(*case.notes, *_apart(seen, comparing), *_without_a_baseline(stated)),
         traces=traces(seen, comparing, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
@@ -166,6 +167,18 @@ def diagnose(
         earlier=() if case.earlier is None else case.earlier.judged(found),
         limits=limits_of(found, comparing, judged.decision.effects),
     )
+
+
+def _apart(seen: Sequence[Observation], comparing: Comparing) -> Iterator[str]:
+    """Say where log and way over ground differ by more than water makes them."""
+    for j, run in enumerate(seen):
+        water_m_s = comparing.water_m_s(j)
+        if _has_both(run) and water_m_s > _APART_M_S:
+            yield (
+                f'{run.name}: log and way over ground wander apart by {water_m_s:.2f} m/s (one '
+                'standard deviation) as water seldom makes them; one of them is wrong, and as '
+                'much of the coastdown as is like it passes for noise'
+            )
 
 
 def _without_a_baseline(stated: bool) -> tuple[str, ...]:
@@ -316,13 +329,6 @@ def _observed(
         f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
         for run in seen
         if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
-    ]
-    notes += [
-        f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
-        'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
-        'and as much of the coastdown as is like it passes for noise'
-        for run in seen
-        if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
 

@@ -8,8 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, words
-from shipdrag_ros.diagnosis.result import WeighedFact
-from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
+from shipdrag_ros.diagnosis.result import SeenRun, WeighedEarlier, WeighedFact
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 

@@ -7,8 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import EarlierError
 from shipdrag_ros.parameter import Parameter

@@ -9,7 +9,7 @@ from os import PathLike
 from typing import Any, NoReturn
 
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import SeenRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.plain_file import read_small_text

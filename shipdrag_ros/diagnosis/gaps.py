@@ -242,7 +242,7 @@ def _compared(
     ]
     if run.across is not None:
         a, across = len(run.across), run.across.rows
-        noise = np.linalg.inv(run.across.whitener)
+        noise = np.linalg.inv(run.across_whitener)
         found.append(
             Compared(
                 'position_across',

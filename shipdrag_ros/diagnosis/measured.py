@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Rows of measurements along one direction, whitened.
+Rows of measurements along one direction, and the noise of places to port of it.
 
 The noise is that of the steady record before the stop, colour included: what a
 coastdown leaves over a fit would hold the very effect that is sought.
@@ -8,13 +8,14 @@ coastdown leaves over a fit would hold the very effect that is sought.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shipdrag_ros.inference.learning import learn, of_steady
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
-from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.inference.settings import noise_of
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
@@ -33,18 +34,11 @@ class Measured:
         `POSITION` rows are distances along the direction [m].
     variance : (n,)
         Of the white noise of each.
-    whitener : (n, n)
-        Inverse Cholesky factor of the noise covariance.
-    water_m_s
-        Slow motion of the water that the whitener takes for noise: by how much
-        log and way over ground wander apart in the steady record.
     """
 
     at: Int64
     rows: Rows
     variance: Float64
-    whitener: Float64
-    water_m_s: float
 
     def __len__(self) -> int:
         return len(self.at)
@@ -68,13 +62,35 @@ class CondensedRows:
     variance: Float64
 
 
-@dataclass(frozen=True)
-class SteadyNoise:
+def measured(parts: Sequence[CondensedRows], times: Float64) -> Measured:
     """
-    Whitens rows by the noise of their steady part.
+    Put parts in the order of time.
 
-    Attributes
+    Parameters
     ----------
+    parts
+        Of one direction.
+    times : (m,)
+        Of all rows of the observation, ascending [s].
+    """
+    time = np.concatenate([part.time_s for part in parts])
+    order = np.argsort(time, kind='stable')
+    kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
+    value = np.concatenate([part.value for part in parts])[order]
+    variance = np.concatenate([part.variance for part in parts])[order]
+    rows = Rows(time[order], kind.astype(np.int64), value)
+    return Measured(np.searchsorted(times, time[order]), rows, variance)
+
+
+def whitener_of(
+    found: Measured, ship: Ship, speed_m_s: float, lead_in_s: float, margin_s: float
+) -> Float64:
+    """
+    Return the inverse Cholesky factor (n, n) of the noise of rows, by that of their steady part.
+
+    Parameters
+    ----------
+    found
     ship
     speed_m_s
         In the lead-in, roughly.
@@ -83,55 +99,24 @@ class SteadyNoise:
     margin_s
         Before the stop, that is not learnt from.
     """
-
-    ship: Ship
-    speed_m_s: float
-    lead_in_s: float
-    margin_s: float
-
-    def measured(self, parts: list[CondensedRows], times: Float64) -> Measured:
-        """
-        Put parts in the order of time, and learn their disturbances.
-
-        Parameters
-        ----------
-        parts
-            Of one direction.
-        times : (m,)
-            Of all rows of the observation, ascending [s].
-        """
-        time = np.concatenate([part.time_s for part in parts])
-        order = np.argsort(time, kind='stable')
-        kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
-        value = np.concatenate([part.value for part in parts])[order]
-        variance = np.concatenate([part.variance for part in parts])[order]
-        time = time[order]
-        rows = Rows(time, kind.astype(np.int64), value)
-        steady = time < self.lead_in_s - self.margin_s
-        damping, inertia = damping_of(self.ship, np.array([self.speed_m_s]))
-        seen = of_steady(
-            Rows(time[steady], rows.kind[steady], value[steady]),
-            variance[steady],
-            float(damping[0]),
-            float(inertia[0]),
-        )
-        # the engine damps the steady record; behind the stop the hull does
-        learnt = learn(seen, self.speed_m_s).typical
-        # the ship slows down about as v0 / (1 + t / t0)
-        after = np.maximum(time - self.lead_in_s, 0.0)
-        speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
-        whitener = np.eye(len(time))
-        white = Noise(variance, WHITE, *damping_of(self.ship, speed))
-        noise = noise_of(learnt, 0, rows, white, int(np.searchsorted(time, self.lead_in_s)))
-        whiten(rows, whitener, noise)
-        return Measured(
-            np.searchsorted(times, time),
-            rows,
-            variance,
-            np.ascontiguousarray(whitener.T),
-            # without a log it is not separated from a gust
-            noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
-        )
+    rows, time = found.rows, found.rows.time_s
+    steady = time < lead_in_s - margin_s
+    damping, inertia = damping_of(ship, np.array([speed_m_s]))
+    seen = of_steady(
+        Rows(time[steady], rows.kind[steady], rows.value[steady]),
+        found.variance[steady],
+        float(damping[0]),
+        float(inertia[0]),
+    )
+    # the engine damps the steady record; behind the stop the hull does
+    learnt = learn(seen, speed_m_s).typical
+    # the ship slows down about as v0 / (1 + t / t0)
+    after = np.maximum(time - lead_in_s, 0.0)
+    speed = speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
+    whitener = np.eye(len(time))
+    white = Noise(found.variance, WHITE, *damping_of(ship, speed))
+    whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
+    return np.ascontiguousarray(whitener.T)
 
 
 def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:

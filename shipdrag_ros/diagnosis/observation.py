@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from shipdrag_ros.diagnosis.context import Context, Stop
-from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, SteadyNoise
+from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, measured, whitener_of
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
@@ -39,7 +39,6 @@ _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
 _KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
-_DISCREPANCY_M_S = 0.15  # of the water, slowly: six times what is usual
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,8 @@ class Observation:
     along, across
         Measured along the heading and to port of it; across there are only
         positions, None without.
+    across_whitener : (n, n)
+        Inverse Cholesky factor of the noise of `across`.
     context
         What is measured besides.
     ship
@@ -85,6 +86,7 @@ class Observation:
     speed_m_s: float
     along: Measured
     across: Measured | None
+    across_whitener: Float64
     context: Context
     ship: Ship
     stop_moved_s: float = 0.0
@@ -93,11 +95,6 @@ class Observation:
     def duration_s(self) -> float:
         """Length of the coastdown."""
         return float(self.time_s[-1]) - self.lead_in_s
-
-    @property
-    def log_ground_discrepancy(self) -> bool:
-        """Whether log and way over ground wander apart as water seldom makes them."""
-        return self.along.water_m_s > _DISCREPANCY_M_S
 
     @classmethod
     def of(
@@ -168,7 +165,7 @@ class Observation:
         shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
         margin_s = ONSET_SD_S if run_down.stop_sd_s > _KNOWN_S else 0.0
-        noise = SteadyNoise(ship, speed, lead_in_s, margin_s)
+        to_port = measured(across, times) if across else None
         return cls(
             name,
             lead_in_s,
@@ -178,8 +175,11 @@ class Observation:
             heading_rad,
             heading_sd,
             speed,
-            noise.measured(parts, times),
-            noise.measured(across, times) if across else None,
+            measured(parts, times),
+            to_port,
+            np.zeros((0, 0))
+            if to_port is None
+            else whitener_of(to_port, ship, speed, lead_in_s, margin_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
             stop_moved_s,

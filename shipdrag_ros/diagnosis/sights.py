@@ -84,7 +84,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     value, blocks = [run.context.value], [run.context.whitener]
     if across is not None:
         value.insert(0, across.rows.value)
-        blocks.insert(0, across.whitener)
+        blocks.insert(0, run.across_whitener)
     stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
     return RunSight(
         model,

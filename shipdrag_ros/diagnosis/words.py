@@ -14,8 +14,7 @@ from shipdrag_ros.diagnosis import (
     EffectEstimate,
     Verdict,
 )
-from shipdrag_ros.diagnosis.result import Limit
-from shipdrag_ros.diagnosis.seen_runs import WeighedEarlier
+from shipdrag_ros.diagnosis.result import Limit, WeighedEarlier
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
 from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter

@@ -24,7 +24,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
-from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
+from shipdrag_ros.diagnosis.joined import with_whole_glides
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window

@@ -74,7 +74,7 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
         sd = max(each.sd, 1e-12)
         low = float(ndtr(-each.z / sd)) if each.prior.shape is Shape.HALF_NORMAL else 0.0
         z = each.z + sd * ndtri(low + part * (1.0 - low))
-        values += [abs(each.prior.at(one)) for one in z.tolist()]
+        values += np.abs(each.prior.at_each(z)).tolist()
         weights += [each.weight] * _POINTS
     order = np.argsort(values)
     reached = np.cumsum(np.array(weights)[order])

@@ -18,10 +18,8 @@ from shipdrag_ros.diagnosis import (
     diagnose_sailing,
 )
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
-from shipdrag_ros.diagnosis.result import WeighedFact
-from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
-from shipdrag_ros.diagnosis.together import with_log_track
-from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
+from shipdrag_ros.diagnosis.joined import with_log_track, with_whole_glides
+from shipdrag_ros.diagnosis.result import SeenRun, WeighedEarlier, WeighedFact
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate

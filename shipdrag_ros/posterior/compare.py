@@ -24,11 +24,12 @@ from shipdrag_ros.inference.gaussian import products_of, substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
 from shipdrag_ros.posterior.hypotheses import (
     IN_GROUND,
@@ -41,6 +42,7 @@ from shipdrag_ros.posterior.hypotheses import (
     RunTable,
     ShipRuns,
     half,
+    spectrum,
 )
 from shipdrag_ros.posterior.laplace import of_family
 from shipdrag_ros.samples import Float64, Int64
@@ -56,8 +58,7 @@ _STARTS = 2  # of each way that are fitted
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
-_LIKELY = 0.03  # probability of names that may leave something smooth
-_TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
+_LIKELY = 0.03  # share of names, of all that have one, that may leave something smooth
 _RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _EXACT = 1e16  # precision of what does not act
@@ -264,12 +265,15 @@ class Comparing:
         in_force = (IN_SPEED, IN_TIME) if runs.runs[0].model.law.stated else (IN_TIME,)
         self.smooth = (*in_force, IN_LOG, IN_GROUND) if both else in_force
         longest = max(float(run.model.rows.time_s[-1]) for run in runs.runs)
+        odds = math.fsum(effect.odds for effect in self.effects)
+        self.share = priors.MISSING_ODDS / odds if odds else 1.0
         self.ways: dict[str, list[EffectWay]] = {
-            effect.name: list(ways_of(effect, ship, longest, len(runs.runs)))
+            effect.name: list(ways_of(effect, ship, longest, len(runs.runs), self.share))
             for effect in self.effects
         }
         for way in kept:
-            self.ways[way.effect.name].append(way)
+            log_odds = way.log_odds + math.log(self.share)
+            self.ways[way.effect.name].append(replace(way, log_odds=log_odds))
 
     def compare(self) -> ComparedHypotheses:
         """
@@ -355,6 +359,10 @@ class Comparing:
         result: Float64 = np.sqrt(np.sum(np.linalg.inv(whitener) ** 2, axis=1))
         return result
 
+    def water_m_s(self, j: int) -> float:
+        """Return the usual size of the slow motion of the water in a run."""
+        return GaussMarkovNoise(*self.noise[j].typical.slow[0].tolist()).water_m_s
+
     @property
     def as_stated(self) -> Fitted:
         """The ship as her file states her, and how the runs began."""
@@ -391,7 +399,7 @@ class Comparing:
         responses = [self._traces(j, self.nothing, hypotheses) for j in range(len(self.runs.runs))]
         _, information = self._given_way(self.nothing, responses)
         amounts = np.array([_amount(way) for way in ways])
-        log_odds = np.array([math.log(way.effect.odds) for way in ways])
+        log_odds = np.array([math.log(self.share * way.effect.odds) for way in ways])
         known = Sensitivity(information, amounts[:, 0], amounts[:, 1], log_odds)
         never = {name for group in inseparable for name in group}
         found = {}
@@ -628,7 +636,7 @@ class Comparing:
             for i in range(len(smooth)):
                 mean, precision = means[0].copy(), precisions[0].copy()
                 first = p + len(taught) + i * len(smooth[0])
-                precision[first : first + len(smooth[0])] = _TYPICAL_SMOOTH**-2.0
+                precision[first : first + len(smooth[0])] = spectrum(*priors.SMOOTH_USUAL)
                 means.append(mean)
                 precisions.append(precision)
             seen = Seen(
@@ -746,6 +754,18 @@ class Comparing:
         for i in half(fit.hypothesis, 0):
             sd = np.sqrt(np.maximum(variances[..., i], 1e-300))
             logs = logs + math.log(2.0) + log_ndtr((fit.at[first + i] + own[..., i]) / sd)
+        for places in fit.hypothesis.about_zero:
+            # the density of z is that of a normal times z^2: its moments are of the normal
+            z, variance = fit.at[first + places] + own[..., places], variances[..., places]
+            square = z**2 + variance
+            sum_ = np.maximum(square.sum(axis=-1, keepdims=True), 1e-300)
+            logs = logs + np.log(sum_[..., 0] * families.precision[:, first + places[0]])
+            logs -= math.log(len(places))
+            moved = 2.0 * variance * z / sum_
+            fourth = z**4 + 6.0 * z**2 * variance + 3.0 * variance**2
+            of_square = (fourth + square * (sum_ - square)) / sum_
+            own[..., places] += moved
+            variances[..., places] = of_square - (z + moved) ** 2
         total = np.logaddexp.reduce(logs, axis=1)
         weight = np.exp(logs - np.where(np.isfinite(total), total, 0.0)[:, None])
         mean = np.einsum('sf,sfq->sq', weight, own)
@@ -817,8 +837,9 @@ class Comparing:
         """Return likely names with something smooth besides, linear where the names are best."""
         found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
         tried = []
+        least = _LIKELY * (1.0 - found.probability.get(UNKNOWN, 0.0))
         for names, probability in found.probability.items():
-            if names in (NONE, UNKNOWN) or probability < _LIKELY:
+            if names in (NONE, UNKNOWN) or probability < least:
                 continue
             base = found.best[names]
             for where in self.smooth:

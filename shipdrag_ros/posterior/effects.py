@@ -76,6 +76,21 @@ class EffectWay:
         return self.effect.name, self.fixed, signs, self.run, self.kept
 
     @property
+    def about_zero(self) -> list[int]:
+        """
+        Places of what may be 0, where the effect is not missing: so that its square counts.
+
+        Notes
+        -----
+        Moment priors, Johnson and Rossell (2010), *Journal of the Royal Statistical Society* B
+        72, 143-170: with a density that is highest at 0, data that show nothing hardly speak
+        against an effect.
+        """
+        zero = (Shape.NORMAL, Shape.HALF_NORMAL)
+        found = [i for i, q in enumerate(self.unknowns) if q.prior.shape in zero]
+        return [] if self.stated or self.kept else found
+
+    @property
     def components(self) -> list[int]:
         """Places of components, which may have either sign: where one is small, so are all."""
         found = [i for i, q in enumerate(self.unknowns) if q.prior.shape is Shape.NORMAL]
@@ -141,7 +156,9 @@ def kept_way(effect: Effect, sizes: Sequence[Prior], ship: Ship) -> EffectWay:
     return EffectWay(effect, unknowns, (), start, math.log(effect.odds), kept=True)
 
 
-def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator[EffectWay]:
+def ways_of(
+    effect: Effect, ship: Ship, longest_s: float, runs: int, share: float = 1.0
+) -> Iterator[EffectWay]:
     """
     Yield all ways and starts of an effect.
 
@@ -154,8 +171,11 @@ def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator
         Length of the longest run: a uniform prior is that of a time.
     runs
         Number of runs.
+    share
+        Of the odds of each effect, so that those of all are `priors.MISSING_ODDS`.
     """
-    yield from _alike(effect, effect.parameters_of(ship), longest_s, runs)
+    for way in _alike(effect, effect.parameters_of(ship), longest_s, runs):
+        yield replace(way, log_odds=way.log_odds + math.log(share))
     if effect.nameless_at:
         fixed = tuple(effect.nameless_at.items())
         left = [q for q in effect.parameters_of(ship) if q.name not in effect.nameless_at]

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,8 @@ from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 """Where something smooth without a name may be."""
-_FORMS, _SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
+_FORMS = 4  # splines over a run, of the error of a formula
+_SMOOTH = 16  # waves over a run, of something smooth: up to 7 1/2 of their periods
 _FROZEN = 1e16  # precision of what is as it is stated
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
@@ -109,6 +111,11 @@ class RunSight:
         """What the error of a formula is made of, (4, n)."""
         return bsplines(self.over_run, _FORMS)
 
+    @cached_property
+    def form_bumps_across(self) -> Float64:
+        """The same at the places to port, (4, a)."""
+        return bsplines(np.linspace(0.0, 1.0, self.across), _FORMS)
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -166,6 +173,16 @@ class Explanation:
             own = z[place : place + len(way.unknowns)].tolist()
             place += len(way.unknowns)
             found.append(way.action(frame, own) if way.acts_in(run) else _NOTHING)
+        return found
+
+    @property
+    def about_zero(self) -> list[Int64]:
+        """Places of unknowns whose square counts, of each effect that has any."""
+        found, place = [], 0
+        for way in self.ways:
+            if way.about_zero:
+                found.append(place + np.array(way.about_zero))
+            place += len(way.unknowns)
         return found
 
     @property
@@ -241,7 +258,7 @@ class ShipRuns:
 
     runs: tuple[RunSight, ...]
 
-    @property
+    @cached_property
     def coefficients(self) -> int:
         """How many coefficients of forces there are."""
         return self.runs[0].model.coefficients
@@ -311,39 +328,61 @@ class ShipRuns:
         """
         Return the families of a hypothesis; means count from some unknowns (p,).
         """
-        width, size = self.width(hypothesis), self.size
-        q = len(hypothesis.unknowns)
         name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
+        components, place = [], self.size
+        for way in hypothesis.ways:
+            if way.components:
+                components.append(tuple(place + i for i in way.components))
+            place += len(way.unknowns)
+        behind = place + _FORMS * len(hypothesis.forms)
+        key = name, hypothesis.frozen, tuple(components), behind, self.width(hypothesis)
+        if key not in self._families:
+            self._families[key] = self._families_of(*key)
+        found = self._families[key]
+        return found._replace(mean=found.mean - now)
+
+    @cached_property
+    def _families(self) -> dict[object, PriorFamilies]:
+        """Families of hypotheses that were asked for; their means are absolute."""
+        return {}
+
+    def _families_of(
+        self,
+        name: str,
+        frozen: bool,
+        components: Sequence[Sequence[int]],
+        behind: int,
+        width: int,
+    ) -> PriorFamilies:
+        """Return families: of the hull, of something smooth behind a place, of components."""
         families = self.runs[0].model.families
         # without a baseline the hull is something smooth in any case
         hulls = [each for each in families if each.name == name] or list(families)
         total = math.fsum(each.chance for each in hulls)
-        sizes = priors.SMOOTH_SIZES if width > size + q + _FORMS * len(hypothesis.forms) else (1,)
-        components = []
-        place = size
-        for way in hypothesis.ways:
-            if way.components:
-                components.append([place + i for i in way.components])
-            place += len(way.unknowns)
+        smooth = [np.ones(width - behind)]
+        if width > behind:
+            smooth = [
+                np.tile(spectrum(size, part), (width - behind) // _SMOOTH)
+                for size, part in product(priors.SMOOTH_SIZES, priors.SMOOTH_PARTS)
+            ]
+        k = self.coefficients
         means, precisions, chances = [], [], []
         for number, hull in enumerate(hulls):
             base_mean, base_precision = self._base(name, number)
-            for amount in sizes:
-                for which in range(2 ** len(components)):
-                    mean, precision = np.zeros(width), np.ones(width)
-                    mean[:size], precision[:size] = base_mean, base_precision
-                    k = self.coefficients
-                    mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
-                    if hypothesis.frozen:
-                        precision[self._stated] = _FROZEN
-                    precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
-                    for i, each in enumerate(components):
-                        if which >> i & 1:
-                            precision[each] = priors.SMALL_COMPONENTS**-2.0
-                    means.append(mean)
-                    precisions.append(precision)
-                    chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
-        return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
+            for waves_of, which in product(smooth, product((False, True), repeat=len(components))):
+                mean, precision = np.zeros(width), np.ones(width)
+                mean[: self.size], precision[: self.size] = base_mean, base_precision
+                mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
+                if frozen:
+                    precision[self._stated] = _FROZEN
+                precision[behind:] = waves_of
+                for each, small in zip(components, which, strict=True):
+                    if small:
+                        precision[list(each)] = priors.SMALL_COMPONENTS**-2.0
+                means.append(mean)
+                precisions.append(precision)
+                chances.append(hull.chance / total / len(smooth) / 2 ** len(components))
+        return PriorFamilies(np.array(means), np.array(precisions), np.log(chances))
 
     @cached_property
     def _stated(self) -> Int64:
@@ -466,8 +505,7 @@ class ShipRuns:
             along[to : to + _FORMS] = run.form_bumps * trace
             if a:
                 trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
-                even = bsplines(np.linspace(0.0, 1.0, a), _FORMS)
-                rest[to : to + _FORMS, :a] = even * trace
+                rest[to : to + _FORMS, :a] = run.form_bumps_across * trace
         along[first + q + extra :] = smooth
         # forms and what is smooth stand at some unknowns too
         beyond = at[self.size + q :]
@@ -504,12 +542,12 @@ class ShipRuns:
         found = np.zeros((_SMOOTH, len(rows.time_s)))
         if where == IN_LOG:
             by_log = rows.kind == LOG
-            found[:, by_log] = u_0 * bsplines(run.over_run, _SMOOTH)[:, by_log]
+            found[:, by_log] = u_0 * waves(run.over_run)[:, by_log]
             return found
         ground, position = rows.kind == OVER_GROUND, rows.kind == POSITION
-        found[:, ground] = u_0 * bsplines(run.over_run, _SMOOTH)[:, ground]
+        found[:, ground] = u_0 * waves(run.over_run)[:, ground]
         time = np.linspace(rows.time_s[0], rows.time_s[-1], 400)
-        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), _SMOOTH)
+        bumps = waves(np.clip(time / rows.time_s[-1], 0.0, 1.0))
         way = np.cumsum(bumps, axis=1) * (time[1] - time[0])
         for i in range(_SMOOTH):
             found[i, position] = u_0 * np.interp(rows.time_s[position], time, way[i])
@@ -558,7 +596,7 @@ def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64) -> Float6
     known, columns = motion.shapes_at(forces, u[:1])
     r_0 = float(known[0, 0] + own[:k] @ columns[0, :, 0])
     left = np.exp(-damping * step)
-    force = -r_0 * bsplines(time / end, _SMOOTH) / inertia
+    force = -r_0 * waves(time / end) / inertia
     speed = np.zeros_like(force)
     for i in range(1, len(time)):
         speed[:, i] = left[i] * speed[:, i - 1] + 0.5 * step * (
@@ -583,6 +621,29 @@ def bsplines(x: Float64, count: int) -> Float64:
     knots = np.concatenate([np.zeros(3), inner, np.ones(3)])
     table = BSpline.design_matrix(np.clip(x, 0.0, 1.0), knots, 3).toarray()
     return np.ascontiguousarray(table.T)
+
+
+def waves(x: Float64) -> Float64:
+    """
+    Return cosines over 0 .. 1, (16, n).
+    """
+    result: Float64 = np.cos(np.outer(np.arange(_SMOOTH), math.pi * x))
+    return result
+
+
+def spectrum(size: float, part: float) -> Float64:
+    """
+    Return the precision (16,) of waves of something of one size, alike over a part of a run.
+
+    Notes
+    -----
+    Spectrum of a Matern process of order 3/2, Rasmussen and Williams (2006), *Gaussian Processes
+    for Machine Learning*, (4.15).
+    """
+    power = (1.0 + (math.pi * part * np.arange(_SMOOTH)) ** 2 / 3.0) ** -2.0
+    power[0] *= 0.5
+    result: Float64 = power.sum() / (size**2 * power)
+    return result
 
 
 def half(hypothesis: Explanation, size: int) -> list[int]:

@@ -164,10 +164,17 @@ FREE_SHAFT = Declared(
 )
 SHELTERED_M_S = 5.0
 """Below it a current is weaker, with the square of the speed: slow craft are tried in basins."""
+MISSING_ODDS = 0.5
+"""Prior odds that one effect of the library is missing, over nothing, whichever it is and however
+many the library has: with pairs and what has no name, nothing is missing in 6 of 10 ships."""
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15)
 """Points of its size in time, relative to r or to the speed, all alike."""
+SMOOTH_PARTS = (0.06, 0.2)
+"""Points of the part of a run over which it is alike, all alike."""
+SMOOTH_USUAL = (0.05, 0.1)
+"""Size and part with which the noise is learnt."""
 SMALL_COMPONENTS = 0.25
 """Size of the components of a weak current or wind, which is as probable as a usual one."""
 # what a hull may differ by: probabilities, and points of what a size is averaged over

@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, words
 from shipdrag_ros.diagnosis.carried import Carried, carried
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
-from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.result import SeenRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameter import Parameter, Prior

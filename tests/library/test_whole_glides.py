@@ -178,7 +178,7 @@ def test_the_fleet_sees_the_whole_glide_as_the_verb_does(tmp_path: Path) -> None
     assert row['verdict'] != 'none'  # nothing is missing in the coastdown alone
     said = ' '.join(result.bag['warnings'])
     assert 'no instrument shows what' in said
-    assert 'all of each glide is held against the model' in said
+    assert 'all of each glide is compared with the model' in said
 
 
 def test_the_fleet_says_of_a_glide_that_gives_no_row_what_it_shows(

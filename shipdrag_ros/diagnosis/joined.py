@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What coastdowns show alone, beside what the whole glides show that they are part of."""
+"""Several diagnoses joined in one answer: of the force, of log and track, of whole glides."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.diagnosis.words import names_text, probability, sentence
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
 from shipdrag_ros.inference.decision import NONE, Verdict
 
 Diagnose = Callable[[], DiagnosisResult]
 
-_HELD = 'all of each glide is held against the model, such parts with the rest'
+_HELD = 'all of each glide is compared with the model, such parts with the rest'
+_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 _SOUND_PART = (
     'So it is not known whether anything is missing; give the sound part alone with '
     '--window START END'
 )
-
-_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
 def with_whole_glides(
@@ -86,3 +86,54 @@ def _not_followed(alone: Diagnose, notes: Sequence[str], error: ShipdragError) -
     if found.candidates[0].names == NONE:
         raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}') from error
     return replace(found, notes=(*found.notes, *notes, why))
+
+
+def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:
+    """
+    Join what coastdowns show of the force with what log and track show.
+
+    Parameters
+    ----------
+    force
+        Of coastdowns without a stated baseline.
+    log_track
+        Of the same records.
+
+    Returns
+    -------
+    Diagnosis
+        Where log and track disagree, that is the answer, and a note says what the force
+        shows besides: what turns the log wrong, or moves the water, leaves a force
+        behind that is none.
+    """
+    examined = tuple(dict.fromkeys((*force.examined, *log_track.examined)))
+    if log_track.verdict is Verdict.NONE:
+        agree = (
+            'log and track agree: nothing is wrong between them that these records could show '
+            f'(probability {probability(log_track.nothing)})'
+        )
+        return replace(force, notes=(*force.notes, agree, *log_track.notes), examined=examined)
+    besides = () if force.verdict is Verdict.NONE else (_besides(force),)
+    return replace(
+        log_track,
+        notes=(*besides, *log_track.notes, *force.notes),
+        would_decide=log_track.would_decide or force.would_decide,
+        baseline=force.baseline,
+        coastdowns_used=force.coastdowns_used,
+        no_coastdown='',
+        examined=examined,
+        traces=force.traces,
+        facts=force.facts,
+    )
+
+
+def _besides(force: DiagnosisResult) -> str:
+    """Say what the force shows besides."""
+    if force.verdict is Verdict.UNKNOWN:
+        return f'in the force besides: {sentence(force)}'
+    likely = ', '.join(
+        f'{names_text(each.names)} ({probability(each.probability)})'
+        for each in force.candidates
+        if each.names
+    )
+    return f'in the force besides, held against a form fitted to the runs: {likely}'
