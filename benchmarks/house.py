@@ -57,7 +57,9 @@ main({line!r})  # whatever is compiled once, is compiled now
 
 def place(frame):
     name = frame.f_code.co_filename
-    return name.removeprefix(package) if name.startswith(package) else None
+    if not name.startswith(package) or name == package + 'compiled.py':  # it passes calls on
+        return None
+    return name.removeprefix(package)
 
 def traced(frame, event, argument):
     here = place(frame) if event in ('call', 'return') else None

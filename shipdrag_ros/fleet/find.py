@@ -5,11 +5,6 @@ The bags below folders: which files make up which, and what lies beside them.
 A bag is an MCAP file, a directory of rosbag2, or a log or table of a format that is
 imported. A file whose name does not say so is known by its first bytes, where its
 format shows in them (`Format.by_head`). What is none of these is left alone.
-
-Folders on a disk and in an object store, walked alike.
-
-A folder is entered once however many links lead to it, and what is no regular
-file is known before anything reads it.
 """
 
 from __future__ import annotations
@@ -83,7 +78,10 @@ class Folder:
 
 class Tree:
     """
-    What is below a folder that a user names.
+    What is below a folder that a user names, on a disk or in an object store.
+
+    A folder is entered once however many links lead to it, and what is no regular file is
+    known before anything reads it.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from __future__ import annotations
 from shipdrag_ros.parameter import normal
 from shipdrag_ros.posterior.priors import Declared
 
-_WORLD = 'world A'
+_WORLD = 'world A, records'
 _NOISE = 'as the priors of the noise'
 
 LEVEL = Declared('d', 'level of d: the size of r is what was measured', normal(1.0), '', _WORLD)

@@ -80,6 +80,8 @@ def _posed(
 def evidence_of(products: Float64, mean: Float64, precision: Float64) -> float:
     """
     Return the logarithm of the evidence of one linear model, as `of_family`, alone.
+
+    Half of that work: noise is learnt by some hundred of these, and needs no solution.
     """
     solved, log_evidence, right, lower, scale = _posed(products, mean, precision)
     if not solved:

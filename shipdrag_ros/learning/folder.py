@@ -9,7 +9,7 @@ from pathlib import Path
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.ship import LearntTerm
 from shipdrag_ros.ship.term import EXPECTED_NAME, NAME
-from shipdrag_ros.simulation.effects import OWN
+from shipdrag_ros.simulation.effects import taken
 
 MOST_FILES = 200
 """In one folder."""
@@ -44,9 +44,8 @@ def read_term(path: Path) -> LearntTerm:
         If it cannot be used, or has the name of an effect of the library.
     """
     term = LearntTerm.load(path)
-    if term.name in OWN:
-        why = f'name: {term.name!r} is an effect of the library; give it another'
-        raise EffectFileError(str(path), [why])
+    if why := taken(term.name):
+        raise EffectFileError(str(path), why)
     return term
 
 
@@ -59,11 +58,9 @@ def check_name(name: str) -> str:
     EffectFileError
         If it may not.
     """
-    problems = []
+    problems = taken(name)
     if not NAME.fullmatch(name):
         problems.append(f'name: {name[:60]!r}, expected {EXPECTED_NAME}')
-    if name in OWN:
-        problems.append(f'name: {name!r} is an effect of the library; give it another')
     if problems:
         raise EffectFileError(name[:60], problems)
     return name

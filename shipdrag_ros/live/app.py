@@ -1,13 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K.
-
-Frames for many viewers: encoded once, and never queued for one who is slow.
-
-The last frames are kept. A viewer who has fallen behind them gets the whole
-picture instead, and what he missed is counted; memory does not grow with
-viewers, and nobody waits for one.
-"""
+"""Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K."""
 
 from __future__ import annotations
 
@@ -52,7 +44,11 @@ HISTORY = 'rows'  # part of a frame that adds up; all others replace what was
 
 class Frames:
     """
-    The picture as it is now, and the frames that led to it.
+    The picture as it is now, and the frames that led to it, for many viewers.
+
+    A frame is encoded once, and the last ones are kept. A viewer who has fallen behind them
+    gets the whole picture instead, and what he missed is counted; memory does not grow with
+    viewers, and nobody waits for one.
 
     Parameters
     ----------

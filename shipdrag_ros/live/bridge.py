@@ -3,8 +3,6 @@
 What the bridge sees: all that was heard, as parts of a page.
 
 Plain figures in SI units; the page turns them into knots, kN and kW.
-
-A diagnosis for the page, from its document: that of a node's topic or of a bag.
 """
 
 from __future__ import annotations
@@ -77,7 +75,7 @@ _OTHERWISE = {'none': 'nothing is missing', 'unknown': 'something without a name
 
 def verdict_part(found: Mapping[str, Any]) -> dict[str, Any]:
     """
-    Return what the page shows of a document.
+    Return what the page shows of the document of a diagnosis, of a node's topic or of a bag.
 
     Raises
     ------

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The figures of the page: the ship, a curve, a run that has ended, how long the next must go on.
+The figures of the page: the ship, a curve, a run that has ended, what is to come.
 
 Plain numbers in SI units.
-
-What is to come: the glide as the node foretells it, her track, and if she were stopped now.
 """
 
 from __future__ import annotations
@@ -46,7 +44,7 @@ _ENDED = {
 
 class Ahead:
     """
-    What is to come, by one thread.
+    The glide as the node foretells it, her track, and if she were stopped now; by one thread.
 
     Attributes
     ----------

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What stands in large letters: the state, and what to do now.
+What stands in large letters, the state and what to do now, and the checklist of a run.
 
-The checklist of a run: what must hold for its figures to be worth something.
-
-What is not measured is said to be unknown; it is no refusal.
+The checklist holds what must be so for the figures of a run to be worth something. What is not
+measured is said to be unknown; it is no refusal.
 """
 
 from __future__ import annotations

@@ -1,12 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Where the picture comes from: a node that runs, or bags that are played.
-
-A bag as a node would have shown it: through the same monitor, second by second.
-
-Read once, ahead of whoever plays it; playing, pausing and seeking only walk
-what is there.
-"""
+"""Where the picture comes from: a node that runs, or bags that are played."""
 
 from __future__ import annotations
 
@@ -49,7 +42,10 @@ class Moment(NamedTuple):
 
 class Timeline:
     """
-    All moments of a bag, as far as it has been read.
+    All moments of a bag as a node would have shown it, as far as it has been read.
+
+    It is read once, through the same monitor, second by second, ahead of whoever plays it;
+    playing, pausing and seeking only walk what is there.
 
     Parameters
     ----------

@@ -4,17 +4,6 @@ Input topics: found in the graph, subscribed as bytes, counted.
 
 Nobody has to say which of the accepted types a driver publishes, or whether it
 sends reliably, and nobody is left wondering why a topic is silent.
-
-What waits at all inputs, in the order in which it came.
-
-An executor takes one message of each topic in turn. After a pause, a topic at
-1 Hz would so be ten times further in time than one at 10 Hz, whose readings
-would then be rejected as late.
-
-What publishers sent and this node never got, from the sequence numbers of DDS.
-
-A middleware says that a queue ran over, if at all, only where it notices; the
-numbers that a publisher gives its messages show every hole.
 """
 
 from __future__ import annotations
@@ -56,7 +45,10 @@ Publishers = Callable[[], frozenset[str]]
 
 class Sequences:
     """
-    Holes in the sequence numbers of the publishers of one topic.
+    Holes in the sequence numbers of the publishers of one topic: what never came.
+
+    A middleware says that a queue ran over, if at all, only where it notices; the numbers that
+    a publisher gives its messages show every hole.
 
     Parameters
     ----------
@@ -121,7 +113,11 @@ MOST = 200  # messages of a topic at once: some tens of ms, so that timers are k
 
 class Mailbox:
     """
-    The messages of some topics, merged.
+    The messages of some topics, in the order in which they came.
+
+    An executor takes one message of each topic in turn. After a pause, a topic at 1 Hz would
+    so be ten times further in time than one at 10 Hz, whose readings would then be rejected
+    as late.
 
     Parameters
     ----------

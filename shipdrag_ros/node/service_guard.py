@@ -1,13 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
 What a peer may ask of the node: no illegal transition ends it, no flood holds it up.
-
-Requests that are too long, known before they are unpacked.
-
-rclpy makes Python objects of a whole request before anybody can look at it: of
-300 000 parameters for half a minute, in which nothing else runs. The message lies in
-memory by then, with its number of entries at its beginning; one that has too many is
-not unpacked.
 """
 
 from __future__ import annotations
@@ -66,6 +59,10 @@ class _Sequence(ctypes.Structure):
 def unpack_no_giants(service: Service) -> None:
     """
     Let a service be called with `TooLong` instead of a request of more than `LONGEST` entries.
+
+    rclpy makes Python objects of a whole request before anybody can look at it: of 300 000
+    parameters for half a minute, in which nothing else runs. The message lies in memory by
+    then, with its number of entries at its beginning; one that has too many is not unpacked.
 
     Parameters
     ----------

@@ -1,14 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-The trend of each ship of a fleet, and which hull comes first.
-
-When cleaning pays.
-
-Added resistance grows by g a year and costs c a year for each unit of it; a cleaning
-costs C and brings the hull back to where the last one left it. The mean cost a year is
-least where the hull is cleaned as soon as the added resistance since the last cleaning
-reaches sqrt(2 C g / c): the rule of optimal replacement under linear wear.
-"""
+"""The trend of each ship of a fleet, which hull comes first, and when cleaning pays."""
 
 from __future__ import annotations
 
@@ -92,6 +83,13 @@ def cleaning_date(
         Added resistance since the last cleaning, now.
     growth
         Of it, per year.
+
+    Notes
+    -----
+    Added resistance grows by g a year and costs c a year for each unit of it; a cleaning costs
+    C and brings the hull back to where the last one left it. The mean cost a year is least
+    where the hull is cleaned as soon as the added resistance since the last cleaning reaches
+    sqrt(2 C g / c): the rule of optimal replacement under linear wear.
     """
     rng = np.random.default_rng(_SEED)
     added = rng.normal(since_cleaning.value[0], since_cleaning.sd[0], _DRAWS)

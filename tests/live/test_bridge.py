@@ -7,6 +7,7 @@ import asyncio
 import json
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -386,4 +387,5 @@ def test_a_picture_that_cannot_be_made_is_said_on_the_page_until_it_can() -> Non
                 assert not said or 'RuntimeError: out of order' in headline()
                 source.fails = fails
 
-    asyncio.run(watch())
+    with ThreadPoolExecutor(1) as alone:  # a browser of other tests may have a loop in this one
+        alone.submit(asyncio.run, watch()).result()

@@ -61,6 +61,13 @@ _TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
 _effect_of = lru_cache(256)(effect_of)
 
 
+def taken(name: str) -> list[str]:
+    """
+    Return what is wrong with a name that the library has.
+    """
+    return [f'name: {name!r} is an effect of the library; give it another'] if name in OWN else []
+
+
 def declared(term: LearntTerm) -> Effect:
     """
     Return a learnt term as an effect; of two terms of one name, `find` knows the later.
@@ -70,9 +77,8 @@ def declared(term: LearntTerm) -> Effect:
     EffectFileError
         If its name is that of an effect of the library.
     """
-    if term.name in OWN:
-        why = f'name: {term.name!r} is an effect of the library; give it another'
-        raise EffectFileError(term.name, [why])
+    if why := taken(term.name):
+        raise EffectFileError(term.name, why)
     _TERMS[term.name] = term
     return _effect_of(term)
 

@@ -5,8 +5,6 @@ A log of NMEA 0183 as a bag.
 What a sentence does not hold is counted by reason with its first lines; what
 it holds is written, plausible or not, for the monitor to judge. The log itself
 is attached, if it is not too long, so that nothing is lost.
-
-A log of NMEA 0183 as sentences, and a count of what is none.
 """
 
 from __future__ import annotations
@@ -56,7 +54,7 @@ _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past th
 
 class NmeaLog:
     """
-    A log, plain or compressed with gzip.
+    The sentences of a log, plain or compressed with gzip, and a count of what is none.
 
     Parameters
     ----------
