@@ -46,6 +46,10 @@ LOWEST = 0.05  # of the speed at the stop, until which is foretold and compared
 SLOWEST = 1e-3  # Froude number at which a replay of a coast ends
 RECENT = 1.0 / 3.0  # of the readings so far, from which the deceleration persists
 Motion = Callable[[Float64], Float64]
+# two records of one coast are one
+ONCE = tuple(
+    {(each.record.table, each.coast_s): each for each in COASTS[::-1] if each.coast_s}.values()
+)[::-1]
 
 
 @dataclass(frozen=True)
@@ -264,7 +268,7 @@ def report(every: list[Case], problems: list[str]) -> str:
     head += [f'score, {m}' for m in methods] + [f'error, {m}' for m in methods]
     n = len(names)
     # the families of the law were chosen on the first of each two records of the list
-    listed = [coast.record.name for coast in COASTS if coast.coast_s is not None]
+    listed = [coast.record.name for coast in ONCE]
     halves = []
     for half, which in ((listed[::2], 'odd'), (listed[1::2], 'even')):
         of_half = [
@@ -311,9 +315,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     every: list[Case] = []
     problems: list[str] = []
-    for coast in COASTS:
-        if coast.coast_s is None:
-            continue
+    for coast in ONCE:
         (options.out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
         run_command(coast.record.import_command(), data=Path(os.environ[DATA]), out=options.out)
         for each in cases(coast, options.out, options.estimator):
