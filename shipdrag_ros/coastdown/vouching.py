@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Log and track vouch for each other: do all of them still measure the ship?
+
+The last minute of every speed is compared under these hypotheses, by Bayes' rule: some of
+the sources measure one ship, and log and ground differ by a current; the others say nothing
+about her. Each is a mixture of Gaussians of fixed covariance, so that an evidence is a sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import lru_cache
+from itertools import combinations, product
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import (
+    COUNT,
+    FIRST_TRACK,
+    PER_UNIT,
+    SOURCES,
+    SPEED,
+    Bins,
+    displacement,
+    mean_place,
+    smoothing,
+)
+from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.display import mistaken_units, utc
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
+
+LOOK_S = 10  # from one look to the next
+_MEAN_S, _MEANS = 5, 10  # a minute
+_LATE_S = 3  # that other inputs may be behind
+_WRONG = 0.9  # probability of a contradiction that is said: a false alarm costs nine misses
+_UNUSED = 0.75  # probability to say nothing of the ship with which a source is not used
+_AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: need not be computed
+# Priors as (value [m/s], weight). Of a ship, and of an instrument that measures her:
+_LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
+_INERTIA = ((0.01, 0.7), (0.1, 0.2), (1.0, 0.1))  # change in a second; grows with its root
+_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean
+_SLOW = 0.15  # an offset, and as much again that its filter makes while she changes speed
+_CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
+_DRIFT = 0.01  # its change in a second, in open water
+_SWING, _SWING_S = 1.5, 40.0  # its change while she turns, or crosses an eddy: times the current
+_TURNS = {'unknown': 0.1, 'turning': 0.5, 'steady': 0.003}  # probability of that
+_STEADY_RAD = 0.17
+_ASTERN = 0.005  # share of minutes
+# Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
+_ANYWHERE = ((0.2, 0.4), (8.0, 0.6))
+_WANDERS = ((0.0, 0.3), (0.3, 0.7))
+_JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
+_NONSENSE = (0.02, 0.003, 0.003, 0.003)  # share of minutes: a log fouls, a fix hardly ever
+
+_LOG, _HEADING = int(Channel.SPEED_THROUGH_WATER), int(Channel.HEADING)
+_SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
+_TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
+_WALK = np.minimum.outer(_TIME_S, _TIME_S)
+_TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / _SWING_S) ** 2)
+Mixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
+
+
+def _mixture(parts: list[tuple[Float64, float]]) -> Mixture:
+    """Return a mixture of Gaussians, of a covariance and a weight each."""
+    covariance = np.array([each for each, _ in parts])
+    size = covariance.shape[-1] * math.log(2.0 * math.pi) + np.linalg.slogdet(covariance)[1]
+    return np.linalg.inv(covariance), np.log([weight for _, weight in parts]) - 0.5 * size
+
+
+@lru_cache
+def _nothing() -> Mixture:
+    return _mixture(
+        [
+            (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE, a * b * c)
+            for (level, a), (wander, b), (jump, c) in product(_ANYWHERE, _WANDERS, _JUMPS)
+        ]
+    )
+
+
+@lru_cache
+def _one_ship(logs: int, tracks: int, turns: float) -> Mixture:
+    """Return what sources read that measure her, those through the water first."""
+    parts, count = [], logs + tracks
+    swings = ((0.0, 1.0 - turns), (_SWING, turns))
+    currents = list(product(_CURRENT, swings)) if logs and tracks else [((0.0, 1.0), (0.0, 1.0))]
+    drift = _DRIFT**2 * _WALK * (len(currents) > 1)
+    ground = np.zeros((count, count))
+    ground[logs:, logs:] = 1.0
+    for (level, a), (inertia, b), ((current, c), (swing, d)) in product(
+        _LEVEL, _INERTIA, currents
+    ):
+        shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
+        shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
+        for (log, e), (track, f) in product(_NOISE, _NOISE):
+            own = np.kron(np.diag([log**2] * logs + [track**2] * tracks), _WHITE)
+            own += np.kron(np.eye(count), _SLOW**2 * (_SAME + 0.25 * _TURN))
+            parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
+    return _mixture(parts)
+
+
+def _evidence(mixture: Mixture, speed: Float64) -> float:
+    precision, factor = mixture
+    return _log_sum((factor - 0.5 * ((precision @ speed) @ speed)).tolist())
+
+
+def _log_sum(logs: list[float]) -> float:
+    most = max(logs)
+    return most + math.log(math.fsum(math.exp(each - most) for each in logs))
+
+
+def _measured(speeds: Mapping[int, Float64], turns: float, astern_m_s: float) -> float:
+    """Return the log evidence that some sources measure one ship."""
+    logs = int(_LOG in speeds)
+    mixture = _one_ship(logs, len(speeds) - logs, turns)
+    ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
+    through = float(speeds[_LOG].mean()) if logs else 0.0
+    if through >= 0.0:
+        return ahead
+    # she makes way astern: over ground a speed has no sign
+    pace = through / astern_m_s
+    rare = math.log(_ASTERN * max(_LEVEL[1][0] / astern_m_s, 1.0)) - 0.5 * pace * pace
+    other = {**speeds, _LOG: -speeds[_LOG]}
+    return min(rare, 0.0) + _log_sum(
+        [ahead, _evidence(mixture, np.concatenate(list(other.values())))]
+    )
+
+
+def sound_probabilities(
+    speeds: Mapping[int, Float64],
+    *,
+    turns: str = 'unknown',
+    astern_m_s: float = 1.0,
+) -> dict[tuple[int, ...], float]:
+    """
+    Return the probability of each set of sources to be those that measure the ship.
+
+    Parameters
+    ----------
+    speeds : (10,) each
+        Means by source [m/s], at least of two sources.
+    turns
+        Whether she turns: 'steady', 'turning' or 'unknown'.
+    astern_m_s
+        How fast she goes astern, if she does [m/s].
+    """
+    names, found = sorted(speeds), {}
+    for count in range(len(names) + 1):
+        for sound in combinations(names, count):
+            part = {name: speeds[name] for name in sound}
+            logs = [_measured(part, _TURNS[turns], astern_m_s)] if sound else []
+            for name in names:
+                share = _NONSENSE[name]
+                logs.append(math.log(1.0 - share if name in sound else share))
+                if name not in sound:
+                    logs.append(_evidence(_nothing(), speeds[name]))
+            found[sound] = math.fsum(logs)
+    total = _log_sum(list(found.values()))
+    return {sound: math.exp(each - total) for sound, each in found.items()}
+
+
+class Vouching:
+    """
+    What the sources of one monitor say of each other.
+
+    Parameters
+    ----------
+    slow_m_s
+        Below it nothing is compared, and about so fast she goes astern [m/s].
+    hold_s
+        So long a source that said nothing is not used [s]: noise is learnt from its record.
+
+    Attributes
+    ----------
+    until : (sources,) int64
+        Second up to which each source is not used.
+    """
+
+    def __init__(self, slow_m_s: float, hold_s: float) -> None:
+        self.until: Int64 = np.full(SOURCES, NEVER)
+        self._slow_m_s = slow_m_s
+        self._hold_s = round(hold_s)
+        self._now = NEVER
+        self._said: dict[str, tuple[int, str]] = {}
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What to say of each input that is doubted."""
+        return {name: text for name, (until, text) in self._said.items() if until > self._now}
+
+    def sound(self, bins: Bins) -> Bins:
+        """Return bins in which the sources that are not used were never read."""
+        doubted = self.until > self._now
+        if not doubted.any():
+            return bins
+        closed, filling = bins.closed.copy(), bins.filling.copy()
+        closed[:SOURCES][doubted] = filling[:SOURCES][doubted] = NEVER
+        return bins._replace(closed=closed, filling=filling)
+
+    def kept(self, block: Block) -> Block:
+        """Return a block without the samples of sources that are not used."""
+        doubted = np.flatnonzero(self.until > self._now)
+        return block[~np.isin(block.channel, doubted)] if len(doubted) else block
+
+    def look(self, bins: Bins, number: int, width: int, *, hold: bool) -> None:
+        """
+        Compare the last minute.
+
+        Parameters
+        ----------
+        bins
+            What the monitor keeps.
+        number
+            The second that has begun.
+        width
+            Of a slope window: the speed of a track is that of some seconds ago.
+        hold
+            Whether something runs that was begun without the sources that are doubted.
+        """
+        self._now = number
+        if hold:
+            self.until[self.until >= number] = number + LOOK_S + 1
+        lag = smoothing(width)
+        last = number - _LATE_S - lag
+        speeds = {
+            source: mean
+            for source in range(SOURCES)
+            if len(mean := _means(bins, source, last + lag * (source >= FIRST_TRACK)))
+        }
+        table = np.array(list(speeds.values()))
+        if len(speeds) < 2 or np.abs(table.mean(axis=1)).max() < self._slow_m_s:
+            return
+        if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
+            return
+        fast = float(table.min()) > 2.0 * _CURRENT[-1][0]
+        probability = sound_probabilities(
+            speeds,
+            turns=_turns(bins, last, lag) if fast else 'unknown',  # a current across
+            astern_m_s=self._slow_m_s,
+        )
+        if probability[tuple(speeds)] > 1.0 - _WRONG:
+            return
+        wrong = {
+            source: math.fsum(each for sound, each in probability.items() if source not in sound)
+            for source in speeds
+        }
+        for source, each in wrong.items():
+            if each > _UNUSED:
+                self.until[source] = number + self._hold_s
+            if each > 0.5 * max(wrong.values()):
+                text = _doubt(source, speeds, wrong, number)
+                self._said[Channel(source).input] = (number + self._hold_s, text)
+
+
+def _means(bins: Bins, source: int, last: int) -> Float64:
+    """Return means of the speed [m/s] up to a second; none where one is missing."""
+    totals, newest = bins.speeds[source], int(bins.closed[source])
+    edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
+    each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
+    if newest < last - LOOK_S or not each[:, COUNT].all():
+        return np.empty(0)
+    return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
+
+
+def _turns(bins: Bins, last: int, lag: int) -> str:
+    """Say whether she turned in that time, by her heading, or else by a track."""
+    looks = [last - _MEAN_S * k for k in range(_MEANS)]
+    heading = [mean_place(bins, _HEADING, look, _MEAN_S)[1:3] for look in looks]
+    steady = _steady([math.atan2(sine, cosine) for cosine, sine in heading])
+    if steady is not None:
+        return 'steady' if steady else 'turning'
+    for track in range(FIRST_TRACK, SOURCES):
+        ways = [displacement(bins, track, look + lag, _MEAN_S)[1:] for look in looks]
+        if _steady([math.atan2(north, east) for east, north in ways]):
+            return 'steady'  # a course that swings may be that of the errors of a fix
+    return 'unknown'
+
+
+def _steady(angles: list[float]) -> bool | None:
+    """Say whether angles are about the same; None where one is missing."""
+    swings = [abs(math.remainder(each - angles[0], 2.0 * math.pi)) for each in angles]
+    return None if any(map(math.isnan, angles)) else max(swings) < _STEADY_RAD
+
+
+def _doubt(
+    source: int,
+    speeds: Mapping[int, Float64],
+    wrong: Mapping[int, float],
+    number: int,
+) -> str:
+    """Say what contradicts what, who is wrong, and what to do."""
+    best = min((each for each in speeds if each != source), key=lambda each: wrong[each])
+    mine, other = float(speeds[source].mean()), float(speeds[best].mean())
+    units = mistaken_units(mine / other) if other else ''
+    used = ', which is used instead' if wrong[source] > _UNUSED else ''
+    text = (
+        f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
+        f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
+        f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{used}: with a probability of '
+        f'{min(wrong[source], 0.99):.2f} it says nothing of the ship: look at its sensor, axis, '
+        'sign and unit'
+    )
+    return f'{text} (near {units})' if units else text
