@@ -41,7 +41,7 @@ _AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: nee
 _LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
 _INERTIA = ((0.01, 0.7), (0.1, 0.2), (1.0, 0.1))  # change in a second; grows with its root
 _NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean
-_SLOW = 0.15  # an offset, and as much again that its filter makes while she changes speed
+_SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
 _CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
 _DRIFT = 0.01  # its change in a second, in open water
 _SWING, _SWING_S = 1.5, 40.0  # its change while she turns, or crosses an eddy: times the current
@@ -49,7 +49,7 @@ _TURNS = {'unknown': 0.1, 'turning': 0.5, 'steady': 0.003}  # probability of tha
 _STEADY_RAD = 0.17
 _ASTERN = 0.005  # share of minutes
 # Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
-_ANYWHERE = ((0.2, 0.4), (8.0, 0.6))
+_ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
 _WANDERS = ((0.0, 0.3), (0.3, 0.7))
 _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _NONSENSE = (0.02, 0.003, 0.003, 0.003)  # share of minutes: a log fouls, a fix hardly ever
@@ -59,6 +59,7 @@ _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
 _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
 _TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / _SWING_S) ** 2)
+_OWN = _SLOW**2 * (_SAME + 0.25 * _TURN)  # what an instrument errs by, sound or not
 Mixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
 
 
@@ -73,7 +74,7 @@ def _mixture(parts: list[tuple[Float64, float]]) -> Mixture:
 def _nothing() -> Mixture:
     return _mixture(
         [
-            (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE, a * b * c)
+            (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE + _OWN, a * b * c)
             for (level, a), (wander, b), (jump, c) in product(_ANYWHERE, _WANDERS, _JUMPS)
         ]
     )
@@ -95,7 +96,7 @@ def _one_ship(logs: int, tracks: int, turns: float) -> Mixture:
         shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
         for (log, e), (track, f) in product(_NOISE, _NOISE):
             own = np.kron(np.diag([log**2] * logs + [track**2] * tracks), _WHITE)
-            own += np.kron(np.eye(count), _SLOW**2 * (_SAME + 0.25 * _TURN))
+            own += np.kron(np.eye(count), _OWN)
             parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
     return _mixture(parts)
 
