@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES
+from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.driving import start_of
@@ -41,7 +41,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
-from shipdrag_ros.coastdown.vouching import LOOK_S, Vouching
+from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
@@ -117,7 +117,8 @@ class Monitor:
         )
         self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
-        self._vouching = Vouching(self._tuning.speed_min, parameters.steady_s)
+        self._craft = Craft(ship.length_m, self._tuning.speed_min)
+        self._vouching = Vouching(self._craft)
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None
@@ -243,7 +244,7 @@ class Monitor:
         events = self._stop_at_last_sample(EndedBy.RESET)
         events += self._dismissals.flush()
         self._memory, self._reported_s = self._fresh(self._memory.tally), -np.inf
-        self._vouching = Vouching(self._tuning.speed_min, self._parameters.steady_s)
+        self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
     def engine_stopped(self, receive_ns: int) -> str:
@@ -308,9 +309,10 @@ class Monitor:
         """Compare log and track, and go on with one that is sound."""
         watch, number = self._memory.watch, now_ns // SECOND_NS
         watched = int(watch.source[0])
-        self._vouching.look(
-            self._memory.bins, number, self._tuning.slopes.width, hold=watched != NEVER
-        )
+        bins, width = self._memory.bins, self._tuning.slopes.width
+        for source in self._vouching.look(bins, number, width, hold=watched != NEVER):
+            forget_speeds(bins, source)
+            self._memory.steadiness.forget(source)
         watch.look[0] = (number // LOOK_S + 1) * LOOK_S
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:

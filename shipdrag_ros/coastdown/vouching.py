@@ -10,9 +10,10 @@ about her. Each is a mixture of Gaussians of fixed covariance, so that an eviden
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from itertools import combinations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
 
 LOOK_S = 10  # from one look to the next
+_LASTS_S = 70  # a contradiction that lasts so long: its source is no longer used ...
+_HOLD_S = 300  # ... until it agreed so long
 _MEAN_S, _MEANS = 5, 10  # a minute
 _LATE_S = 3  # that other inputs may be behind
 _WRONG = 0.9  # probability of a contradiction that is said: a false alarm costs nine misses
@@ -39,8 +42,10 @@ _UNUSED = 0.75  # probability to say nothing of the ship with which a source is 
 _AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: need not be computed
 # Priors as (value [m/s], weight). Of a ship, and of an instrument that measures her:
 _LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
-_INERTIA = ((0.01, 0.7), (0.1, 0.2), (1.0, 0.1))  # change in a second; grows with its root
-_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean
+_INERTIA = ((0.01, 0.7), (0.1, 0.2))  # change in a second; it grows with the root of time
+_QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
+_LOG_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean
+_TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # a radar errs by 4 to 10 m
 _SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
 _CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
 _DRIFT = 0.01  # its change in a second, in open water
@@ -53,8 +58,11 @@ _ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
 _WANDERS = ((0.0, 0.3), (0.3, 0.7))
 _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _NONSENSE = (0.02, 0.003, 0.003, 0.003)  # share of minutes: a log fouls, a fix hardly ever
+_KM = 0.1  # of a track that says nothing: it is in km
+_STILL = 0.5  # the same of a source that said nothing just before
 
-_LOG, _HEADING = int(Channel.SPEED_THROUGH_WATER), int(Channel.HEADING)
+_LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
+_HEADING = int(Channel.HEADING)
 _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
 _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
@@ -81,7 +89,7 @@ def _nothing() -> Mixture:
 
 
 @lru_cache
-def _one_ship(logs: int, tracks: int, turns: float) -> Mixture:
+def _one_ship(logs: int, tracks: int, turns: float, length_m: float) -> Mixture:
     """Return what sources read that measure her, those through the water first."""
     parts, count = [], logs + tracks
     swings = ((0.0, 1.0 - turns), (_SWING, turns))
@@ -90,11 +98,11 @@ def _one_ship(logs: int, tracks: int, turns: float) -> Mixture:
     ground = np.zeros((count, count))
     ground[logs:, logs:] = 1.0
     for (level, a), (inertia, b), ((current, c), (swing, d)) in product(
-        _LEVEL, _INERTIA, currents
+        _LEVEL, (*_INERTIA, (_QUICK_M_M_S / length_m, _QUICK)), currents
     ):
         shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
         shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
-        for (log, e), (track, f) in product(_NOISE, _NOISE):
+        for (log, e), (track, f) in product(_LOG_NOISE, _TRACK_NOISE):
             own = np.kron(np.diag([log**2] * logs + [track**2] * tracks), _WHITE)
             own += np.kron(np.eye(count), _OWN)
             parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
@@ -111,17 +119,17 @@ def _log_sum(logs: list[float]) -> float:
     return most + math.log(math.fsum(math.exp(each - most) for each in logs))
 
 
-def _measured(speeds: Mapping[int, Float64], turns: float, astern_m_s: float) -> float:
+def _measured(speeds: Mapping[int, Float64], turns: float, craft: Craft) -> float:
     """Return the log evidence that some sources measure one ship."""
     logs = int(_LOG in speeds)
-    mixture = _one_ship(logs, len(speeds) - logs, turns)
+    mixture = _one_ship(logs, len(speeds) - logs, turns, craft.length_m)
     ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
     through = float(speeds[_LOG].mean()) if logs else 0.0
     if through >= 0.0:
         return ahead
     # she makes way astern: over ground a speed has no sign
-    pace = through / astern_m_s
-    rare = math.log(_ASTERN * max(_LEVEL[1][0] / astern_m_s, 1.0)) - 0.5 * pace * pace
+    pace = through / craft.slow_m_s
+    rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
     other = {**speeds, _LOG: -speeds[_LOG]}
     return min(rare, 0.0) + _log_sum(
         [ahead, _evidence(mixture, np.concatenate(list(other.values())))]
@@ -130,9 +138,10 @@ def _measured(speeds: Mapping[int, Float64], turns: float, astern_m_s: float) ->
 
 def sound_probabilities(
     speeds: Mapping[int, Float64],
+    craft: Craft,
     *,
     turns: str = 'unknown',
-    astern_m_s: float = 1.0,
+    doubted: Collection[int] = (),
 ) -> dict[tuple[int, ...], float]:
     """
     Return the probability of each set of sources to be those that measure the ship.
@@ -141,24 +150,38 @@ def sound_probabilities(
     ----------
     speeds : (10,) each
         Means by source [m/s], at least of two sources.
+    craft
+        How fast she may change her speed, and about how fast she goes astern.
     turns
         Whether she turns: 'steady', 'turning' or 'unknown'.
-    astern_m_s
-        How fast she goes astern, if she does [m/s].
+    doubted
+        Sources that said nothing of her just before.
     """
     names, found = sorted(speeds), {}
     for count in range(len(names) + 1):
         for sound in combinations(names, count):
             part = {name: speeds[name] for name in sound}
-            logs = [_measured(part, _TURNS[turns], astern_m_s)] if sound else []
+            logs = [_measured(part, _TURNS[turns], craft)] if sound else []
             for name in names:
-                share = _NONSENSE[name]
+                share = _STILL if name in doubted else _NONSENSE[name]
                 logs.append(math.log(1.0 - share if name in sound else share))
                 if name not in sound:
-                    logs.append(_evidence(_nothing(), speeds[name]))
+                    each = [_evidence(_nothing(), speeds[name])]
+                    if name == _METRES and sound:
+                        scaled = {**part, name: 1e3 * speeds[name]}
+                        beside = _measured(dict(sorted(scaled.items())), _TURNS[turns], craft)
+                        each.append(math.log(_KM) + _MEANS * math.log(1e3) + beside - logs[0])
+                    logs.append(_log_sum(each))
             found[sound] = math.fsum(logs)
     total = _log_sum(list(found.values()))
     return {sound: math.exp(each - total) for sound, each in found.items()}
+
+
+class Craft(NamedTuple):
+    """Length of a craft [m], and a speed at which she is slow [m/s]."""
+
+    length_m: float
+    slow_m_s: float
 
 
 class Vouching:
@@ -167,21 +190,19 @@ class Vouching:
 
     Parameters
     ----------
-    slow_m_s
-        Below it nothing is compared, and about so fast she goes astern [m/s].
-    hold_s
-        So long a source that said nothing is not used [s]: noise is learnt from its record.
+    craft
+        Below her slow speed nothing is compared.
 
     Attributes
     ----------
     until : (sources,) int64
-        Second up to which each source is not used.
+        Second up to which each source is not used; what it read before then never is.
     """
 
-    def __init__(self, slow_m_s: float, hold_s: float) -> None:
+    def __init__(self, craft: Craft) -> None:
         self.until: Int64 = np.full(SOURCES, NEVER)
-        self._slow_m_s = slow_m_s
-        self._hold_s = round(hold_s)
+        self._craft = craft
+        self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
         self._now = NEVER
         self._said: dict[str, tuple[int, str]] = {}
 
@@ -200,11 +221,12 @@ class Vouching:
         return bins._replace(closed=closed, filling=filling)
 
     def kept(self, block: Block) -> Block:
-        """Return a block without the samples of sources that are not used."""
-        doubted = np.flatnonzero(self.until > self._now)
-        return block[~np.isin(block.channel, doubted)] if len(doubted) else block
+        """Return a block without what sources read up to the second since which they are used."""
+        first_ns = np.full(len(Channel), NEVER)
+        first_ns[:SOURCES] = np.maximum(self.until, NEVER // SECOND_NS) * SECOND_NS
+        return block[block.stamp_ns >= first_ns[block.channel]]
 
-    def look(self, bins: Bins, number: int, width: int, *, hold: bool) -> None:
+    def look(self, bins: Bins, number: int, width: int, *, hold: bool) -> list[int]:
         """
         Compare the last minute.
 
@@ -218,11 +240,20 @@ class Vouching:
             Of a slope window: the speed of a track is that of some seconds ago.
         hold
             Whether something runs that was begun without the sources that are doubted.
+
+        Returns
+        -------
+        list of int
+            Sources that are used again from now on.
         """
-        self._now = number
         if hold:
-            self.until[self.until >= number] = number + LOOK_S + 1
-        lag = smoothing(width)
+            self.until[self.until > self._now] = number + LOOK_S + 1
+        back = np.flatnonzero((self.until > self._now) & (self.until <= number))
+        self._now = number
+        self._compare(bins, number, smoothing(width))
+        return [int(source) for source in back if self.until[source] <= number]
+
+    def _compare(self, bins: Bins, number: int, lag: int) -> None:
         last = number - _LATE_S - lag
         speeds = {
             source: mean
@@ -230,28 +261,37 @@ class Vouching:
             if len(mean := _means(bins, source, last + lag * (source >= FIRST_TRACK)))
         }
         table = np.array(list(speeds.values()))
-        if len(speeds) < 2 or np.abs(table.mean(axis=1)).max() < self._slow_m_s:
+        if len(speeds) < 2 or np.abs(table.mean(axis=1)).max() < self._craft.slow_m_s:
             return
         if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
             return
         fast = float(table.min()) > 2.0 * _CURRENT[-1][0]
+        doubted = [source for source in speeds if self.until[source] > number]
         probability = sound_probabilities(
             speeds,
+            self._craft,
             turns=_turns(bins, last, lag) if fast else 'unknown',  # a current across
-            astern_m_s=self._slow_m_s,
+            doubted=doubted,
         )
-        if probability[tuple(speeds)] > 1.0 - _WRONG:
-            return
         wrong = {
             source: math.fsum(each for sound, each in probability.items() if source not in sound)
             for source in speeds
         }
+        contradiction = probability[tuple(speeds)] < 1.0 - _WRONG
         for source, each in wrong.items():
-            if each > _UNUSED:
-                self.until[source] = number + self._hold_s
-            if each > 0.5 * max(wrong.values()):
+            if source in doubted:
+                lasts = each > 1.0 - _WRONG
+            else:  # a radar that takes another mark is odd for the length of its filter
+                begins = NEVER if not (contradiction and each > _UNUSED) else number
+                self._since[source] = (
+                    begins if NEVER in (begins, self._since[source]) else self._since[source]
+                )
+                lasts = begins == number >= self._since[source] + _LASTS_S
+            if lasts:
+                self.until[source] = number + _HOLD_S
+            if lasts or (contradiction and each > 0.5 * max(wrong.values())):
                 text = _doubt(source, speeds, wrong, number)
-                self._said[Channel(source).input] = (number + self._hold_s, text)
+                self._said[Channel(source).input] = (number + _HOLD_S, text)
 
 
 def _means(bins: Bins, source: int, last: int) -> Float64:
