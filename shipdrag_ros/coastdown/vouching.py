@@ -24,8 +24,6 @@ from shipdrag_ros.coastdown.bins import (
     SOURCES,
     SPEED,
     Bins,
-    displacement,
-    mean_place,
     smoothing,
 )
 from shipdrag_ros.coastdown.validate import NEVER
@@ -50,8 +48,7 @@ _SLOW = 0.15  # an offset; half of it that its filter makes while she changes sp
 _CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
 _DRIFT = 0.01  # its change in a second, in open water
 _SWING, _SWING_S = 1.5, 40.0  # its change while she turns, or crosses an eddy: times the current
-_TURNS = {'unknown': 0.1, 'turning': 0.5, 'steady': 0.003}  # probability of that
-_STEADY_RAD = 0.17
+_TURNS = 0.1  # probability of that
 _ASTERN = 0.005  # share of minutes
 # Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
 _ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
@@ -62,7 +59,6 @@ _KM = 0.1  # of a track that says nothing: it is in km
 _STILL = 0.5  # the same of a source that said nothing just before
 
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
-_HEADING = int(Channel.HEADING)
 _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
 _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
@@ -89,10 +85,10 @@ def _nothing() -> Mixture:
 
 
 @lru_cache
-def _one_ship(logs: int, tracks: int, turns: float, length_m: float) -> Mixture:
+def _one_ship(logs: int, tracks: int, length_m: float) -> Mixture:
     """Return what sources read that measure her, those through the water first."""
     parts, count = [], logs + tracks
-    swings = ((0.0, 1.0 - turns), (_SWING, turns))
+    swings = ((0.0, 1.0 - _TURNS), (_SWING, _TURNS))
     currents = list(product(_CURRENT, swings)) if logs and tracks else [((0.0, 1.0), (0.0, 1.0))]
     drift = _DRIFT**2 * _WALK * (len(currents) > 1)
     ground = np.zeros((count, count))
@@ -119,10 +115,10 @@ def _log_sum(logs: list[float]) -> float:
     return most + math.log(math.fsum(math.exp(each - most) for each in logs))
 
 
-def _measured(speeds: Mapping[int, Float64], turns: float, craft: Craft) -> float:
+def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     """Return the log evidence that some sources measure one ship."""
     logs = int(_LOG in speeds)
-    mixture = _one_ship(logs, len(speeds) - logs, turns, craft.length_m)
+    mixture = _one_ship(logs, len(speeds) - logs, craft.length_m)
     ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
     through = float(speeds[_LOG].mean()) if logs else 0.0
     if through >= 0.0:
@@ -140,7 +136,6 @@ def sound_probabilities(
     speeds: Mapping[int, Float64],
     craft: Craft,
     *,
-    turns: str = 'unknown',
     doubted: Collection[int] = (),
 ) -> dict[tuple[int, ...], float]:
     """
@@ -152,8 +147,6 @@ def sound_probabilities(
         Means by source [m/s], at least of two sources.
     craft
         How fast she may change her speed, and about how fast she goes astern.
-    turns
-        Whether she turns: 'steady', 'turning' or 'unknown'.
     doubted
         Sources that said nothing of her just before.
     """
@@ -161,7 +154,7 @@ def sound_probabilities(
     for count in range(len(names) + 1):
         for sound in combinations(names, count):
             part = {name: speeds[name] for name in sound}
-            logs = [_measured(part, _TURNS[turns], craft)] if sound else []
+            logs = [_measured(part, craft)] if sound else []
             for name in names:
                 share = _STILL if name in doubted else _NONSENSE[name]
                 logs.append(math.log(1.0 - share if name in sound else share))
@@ -169,7 +162,7 @@ def sound_probabilities(
                     each = [_evidence(_nothing(), speeds[name])]
                     if name == _METRES and sound:
                         scaled = {**part, name: 1e3 * speeds[name]}
-                        beside = _measured(dict(sorted(scaled.items())), _TURNS[turns], craft)
+                        beside = _measured(dict(sorted(scaled.items())), craft)
                         each.append(math.log(_KM) + _MEANS * math.log(1e3) + beside - logs[0])
                     logs.append(_log_sum(each))
             found[sound] = math.fsum(logs)
@@ -265,12 +258,10 @@ class Vouching:
             return
         if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
             return
-        fast = float(table.min()) > 2.0 * _CURRENT[-1][0]
         doubted = [source for source in speeds if self.until[source] > number]
         probability = sound_probabilities(
             speeds,
             self._craft,
-            turns=_turns(bins, last, lag) if fast else 'unknown',  # a current across
             doubted=doubted,
         )
         wrong = {
@@ -290,7 +281,7 @@ class Vouching:
             if lasts:
                 self.until[source] = number + _HOLD_S
             if lasts or (contradiction and each > 0.5 * max(wrong.values())):
-                text = _doubt(source, speeds, wrong, number)
+                text = _doubt(source, speeds, wrong, number, lasts=lasts)
                 self._said[Channel(source).input] = (number + _HOLD_S, text)
 
 
@@ -304,37 +295,19 @@ def _means(bins: Bins, source: int, last: int) -> Float64:
     return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
 
 
-def _turns(bins: Bins, last: int, lag: int) -> str:
-    """Say whether she turned in that time, by her heading, or else by a track."""
-    looks = [last - _MEAN_S * k for k in range(_MEANS)]
-    heading = [mean_place(bins, _HEADING, look, _MEAN_S)[1:3] for look in looks]
-    steady = _steady([math.atan2(sine, cosine) for cosine, sine in heading])
-    if steady is not None:
-        return 'steady' if steady else 'turning'
-    for track in range(FIRST_TRACK, SOURCES):
-        ways = [displacement(bins, track, look + lag, _MEAN_S)[1:] for look in looks]
-        if _steady([math.atan2(north, east) for east, north in ways]):
-            return 'steady'  # a course that swings may be that of the errors of a fix
-    return 'unknown'
-
-
-def _steady(angles: list[float]) -> bool | None:
-    """Say whether angles are about the same; None where one is missing."""
-    swings = [abs(math.remainder(each - angles[0], 2.0 * math.pi)) for each in angles]
-    return None if any(map(math.isnan, angles)) else max(swings) < _STEADY_RAD
-
-
 def _doubt(
     source: int,
     speeds: Mapping[int, Float64],
     wrong: Mapping[int, float],
     number: int,
+    *,
+    lasts: bool,
 ) -> str:
     """Say what contradicts what, who is wrong, and what to do."""
     best = min((each for each in speeds if each != source), key=lambda each: wrong[each])
     mine, other = float(speeds[source].mean()), float(speeds[best].mean())
     units = mistaken_units(mine / other) if other else ''
-    used = ', which is used instead' if wrong[source] > _UNUSED else ''
+    used = ', which is used instead' if lasts else ''
     text = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
         f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
