@@ -12,7 +12,6 @@ from shipdrag_ros.fields import plain
 from shipdrag_ros.learning.search import Learnt, kind_text
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.ship.expression import unit_text
-from shipdrag_ros.ship.term import RESULT
 
 _SHOWN = 0.001  # probability of a line
 
@@ -46,7 +45,7 @@ def lines(found: Learnt) -> list[str]:
             f'after the stop, at {low:.1f} to {high:.1f} m/s.'
         )
     if found.term is not None:
-        unit = unit_text(RESULT[found.term.term.channel])
+        unit = unit_text(found.term.units[0])
         said.append(f'It is {found.term.term.expression} [{unit}].')
         if found.term.looks_like:
             said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')

@@ -13,9 +13,9 @@ from shipdrag_ros.learning import words
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Scenario
+from shipdrag_ros.simulation.declared import force_n
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import using
-from shipdrag_ros.simulation.learnt import force_n
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 # a sharp edge: a broad one looks like a hump about it
