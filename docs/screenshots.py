@@ -86,7 +86,10 @@ def bridge(folder: Path, open_page: Callable[..., Page]) -> None:
         assert player is not None
         save(page, 'bridge_after.png')
         for at_s, said, name in ((1500, 'STEADY', 'bridge_before'), (2220, 'COAST', 'bridge')):
-            source.control('seek', player['start_s'] + at_s)
+            # over the wire: the page's own thread reads on
+            page.request.post(
+                f'{url}player', data={'action': 'seek', 'value': player['start_s'] + at_s}
+            )
             page.locator('#headline', has_text=said).wait_for()
             page.wait_for_timeout(1000)
             save(page, f'{name}.png')

@@ -49,7 +49,7 @@ _OUTPUT_MEANING = {
     'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
     'forecast': 'the rest of the glide with a band of 90 %: fields `time, speed, speed_low, '
     'speed_high, distance, distance_low, distance_high` from the stamp on, one point a time; '
-    'the distance over ground where positions are used, else through water; '
+    'the distance is through water (over ground: `~/forecast_path`); '
     'empty when withdrawn; latched',
     'forecast_path': 'positions to come, in metres as `position` sends them, or east and north of '
     'the first since the stop; empty when withdrawn; latched',

@@ -48,7 +48,7 @@ class PathAhead:
         length = float(np.hypot(*speed))
         if length == 0.0:
             return None
-        ahead = forecast.in_time()
+        ahead = forecast.in_time(over_ground=True)
         return cls(
             forecast.made_ns + np.round(ahead[:, 0] * SECOND_NS).astype(np.int64),
             here + ahead[:, 4:5] * speed / length,

@@ -87,7 +87,7 @@ class Forecast:
         """Of each of the targets."""
         return tuple(self.reaches(each) for each in self.targets_m_s)
 
-    def in_time(self, time_s: Float64 | None = None) -> Float64:
+    def in_time(self, time_s: Float64 | None = None, *, over_ground: bool = False) -> Float64:
         """
         Return the same by time.
 
@@ -95,6 +95,8 @@ class Forecast:
         ----------
         time_s : (m,)
             From `made_ns` on, ascending from 0; None: those at which she has each speed.
+        over_ground
+            Whether the way is over ground, along her course; else it is through water.
 
         Returns
         -------
@@ -111,9 +113,11 @@ class Forecast:
         columns = (self.time_s[:, 0], self.time_s[:, 1], self.time_s[:, 2])
         speed = np.stack([np.interp(time, each, self.speed_m_s) for each in columns])
         speed[:, 0] += spread[:, 0]
-        steps = np.diff(time) * 0.5 * (speed[:, 1:] + speed[:, :-1] + 2.0 * self.current_m_s)
+        steps = np.diff(time) * 0.5 * (speed[:, 1:] + speed[:, :-1])
         way = np.concatenate([np.zeros((3, 1)), np.cumsum(steps, axis=1)], axis=1)
-        beside = Z * np.interp(time, self.time_s[:, 0], self.drift_sd_m)
-        way[1] = way[0] - np.hypot(way[0] - way[1], beside)
-        way[2] = way[0] + np.hypot(way[2] - way[0], beside)
+        if over_ground:
+            way += self.current_m_s * time
+            beside = Z * np.interp(time, self.time_s[:, 0], self.drift_sd_m)
+            way[1] = way[0] - np.hypot(way[0] - way[1], beside)
+            way[2] = way[0] + np.hypot(way[2] - way[0], beside)
         return np.column_stack([time, *speed, *way])

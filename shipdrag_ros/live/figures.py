@@ -323,7 +323,8 @@ def track_part(
     coming
         The forecast that they belong to; None where it is over.
     time_s
-        At which a mark with its band is set on the track to come; None: there is none.
+        At which a mark is set on the track to come, with the band of the way through water; None:
+        there is none.
     """
     here = heard_m[-1]
     part: PagePart = {
@@ -333,10 +334,12 @@ def track_part(
         'over': coming is None,
     }
     if coming is not None and time_s is not None:
+        mark = np.array([np.interp(time_s, path.time_s, axis) for axis in path.place_m.T])
+        ways = coming.points.T[4:]
+        far = np.array([np.interp(time_s, coming.points[:, 0], each) for each in ways])
         way = path.place_m[-1] - path.place_m[0]
-        far = [np.interp(time_s, coming.points[:, 0], coming.points[:, i]) for i in (4, 5, 6)]
-        ahead = path.place_m[0] + np.outer(far, way / max(float(np.hypot(*way)), 1e-9))
-        part['mark'] = np.round(ahead - here, 2).tolist()
+        beside = np.outer(far - far[0], way / max(float(np.hypot(*way)), 1e-9))
+        part['mark'] = np.round(mark + beside - here, 2).tolist()
     return part
 
 

@@ -171,11 +171,14 @@ class ComingPath:
     Attributes
     ----------
     stamp_ns
+    time_s : (n,)
+        From the stamp on.
     place_m : (n, 2)
         In the plane of the positions since the stop, two of them at least.
     """
 
     stamp_ns: int
+    time_s: Float64
     place_m: Float64
 
 
@@ -189,10 +192,14 @@ def read_path(payload: bytes) -> ComingPath | None:
         If it is none.
     """
     message = types.deserialize(FORECAST_PATH.type, payload)
-    places = [(each.pose.position.x, each.pose.position.y) for each in message.poses]
-    place = np.array(places, np.float64).reshape(-1, 2)
-    place = place[np.isfinite(place).all(axis=1)]
-    return ComingPath(types.stamp_ns(message), place) if len(place) >= 2 else None
+    stamp_ns = types.stamp_ns(message)
+    places = [
+        ((types.stamp_ns(each) - stamp_ns) * 1e-9, each.pose.position.x, each.pose.position.y)
+        for each in message.poses
+    ]
+    rows = np.array(places, np.float64).reshape(-1, 3)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    return ComingPath(stamp_ns, rows[:, 0], rows[:, 1:]) if len(rows) >= 2 else None
 
 
 def _points(topic: OutputTopic, names: tuple[str, ...], payload: bytes) -> tuple[int, Float64]:

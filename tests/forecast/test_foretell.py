@@ -166,6 +166,18 @@ def test_a_current_carries_her_over_ground_alone(early: Estimate, ship: Ship) ->
     assert more == pytest.approx(0.5 * still.time_s.median, rel=1e-9)
 
 
+def test_in_time_her_way_is_through_water_unless_asked(early: Estimate, ship: Ship) -> None:
+    still = foretell(replace(early, current_m_s=0.0), ship).in_time()
+    carried = foretell(replace(early, current_m_s=0.5), ship)
+    assert carried.over_ground
+    assert np.array_equal(carried.in_time()[:, :5], still[:, :5])
+    ground = carried.in_time(over_ground=True)
+    assert np.allclose(ground[:, 4] - still[:, 4], 0.5 * still[:, 0], rtol=1e-12)
+    # the water moves, too: less is known of the way over ground
+    width = np.diff(ground[1:, 5:], axis=1), np.diff(still[1:, 5:], axis=1)
+    assert (width[0] > width[1]).all()
+
+
 def test_a_current_may_set_her_back(early: Estimate, ship: Ship) -> None:
     found = foretell(replace(early, current_m_s=-1.5), ship, speeds_m_s=(1.0, 0.8))
     way = np.array([each.distance_m for each in found.milestones])

@@ -197,7 +197,7 @@ function showGlide() {
   }
   const [time, low, high] = part.time_s;
   setFigure('figure-glide', minutes(time), 'min', '');
-  const way = part.way_m == null ? '' : `, ${far(part.way_m)}`;
+  const way = part.way_m == null ? '' : `, ${far(part.way_m)} through water`;
   text('note-glide', `${speedOf(part)} in ${minutes(time)} (${span(low, high)})${way}${part.hull ? `; by ${part.hull}` : ''}`);
 }
 
@@ -209,7 +209,7 @@ function showTrack(part) {
   const long = units === SI || picture.ship?.mass_kg < 1e4;
   drawTrack(el('track'), part, { label, unit: long ? 1 : 1852, far: length => (long ? `${length} m` : `${Number((length / 1852).toPrecision(2))} nm`) });
   text('track-say', part.over ? 'Since the stop (solid), and as it was foretold half-way (dashed).'
-    : `Since the stop (solid), and to come (dashed)${part.mark ? `; the mark is where she is in ${minutes(glide.time_s[0])}, with its band of 90 %` : ''}.`);
+    : `Since the stop (solid), and to come (dashed)${part.mark ? `; the mark is where she is in ${minutes(glide.time_s[0])}, with the 90 % band of her way through water` : ''}.`);
 }
 
 function signed(list, rows) {
