@@ -238,7 +238,7 @@ def main() -> None:
             rows.append((fault, beside, said, green, 'found' if near else 'missed'))
     head = ('fault of the log', 'sound beside it', 'not green', 'green later [s]', 'stop')
     lines = [*table(head, rows), '']
-    number, sailed = 0, []
+    number, sailed = 0, dict.fromkeys(LENGTHS_M, 0)
     for length_m in LENGTHS_M:
         for inputs in INPUTS:
             for heading in (True, False):
@@ -246,11 +246,10 @@ def main() -> None:
                 block = sailing(
                     options.seed + number, options.hours, length_m, inputs, heading=heading
                 )
-                sailed.append(len(alarms(block, ship_of(length_m))))
-    hours = options.hours * len(sailed)
-    lines.append(
-        f'{sum(sailed)} contradictions said in {hours:.0f} h of sound sailing (simulated)'
-    )
+                sailed[length_m] += len(alarms(block, ship_of(length_m)))
+    hours = options.hours * number
+    each = ', '.join(f'{count} for {length_m:.0f} m' for length_m, count in sailed.items())
+    lines.append(f'Contradictions said in {hours:.0f} h of sound sailing (simulated): {each}.')
     lines += _records()
     print('\n'.join(lines))
     if options.write:

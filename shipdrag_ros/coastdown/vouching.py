@@ -42,8 +42,8 @@ _AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: nee
 _LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
 _INERTIA = ((0.01, 0.7), (0.1, 0.2))  # change in a second; it grows with the root of time
 _QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
-_LOG_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean
-_TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # a radar errs by 4 to 10 m
+_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean of a log or a speed over ground
+_TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # radar: 4 to 10 m
 _SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
 _CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
 _DRIFT = 0.01  # its change in a second, in open water
@@ -64,10 +64,10 @@ _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
 _TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / _SWING_S) ** 2)
 _OWN = _SLOW**2 * (_SAME + 0.25 * _TURN)  # what an instrument errs by, sound or not
-Mixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
+SpeedMixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
 
 
-def _mixture(parts: list[tuple[Float64, float]]) -> Mixture:
+def _mixture(parts: list[tuple[Float64, float]]) -> SpeedMixture:
     """Return a mixture of Gaussians, of a covariance and a weight each."""
     covariance = np.array([each for each, _ in parts])
     size = covariance.shape[-1] * math.log(2.0 * math.pi) + np.linalg.slogdet(covariance)[1]
@@ -75,7 +75,7 @@ def _mixture(parts: list[tuple[Float64, float]]) -> Mixture:
 
 
 @lru_cache
-def _nothing() -> Mixture:
+def _nothing() -> SpeedMixture:
     return _mixture(
         [
             (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE + _OWN, a * b * c)
@@ -85,11 +85,11 @@ def _nothing() -> Mixture:
 
 
 @lru_cache
-def _one_ship(logs: int, tracks: int, length_m: float) -> Mixture:
-    """Return what sources read that measure her, those through the water first."""
-    parts, count = [], logs + tracks
+def _one_ship(logs: int, grounds: int, tracks: int, length_m: float) -> SpeedMixture:
+    """Return what sources read that measure her, in the order of the arguments."""
+    parts, count = [], logs + grounds + tracks
     swings = ((0.0, 1.0 - _TURNS), (_SWING, _TURNS))
-    currents = list(product(_CURRENT, swings)) if logs and tracks else [((0.0, 1.0), (0.0, 1.0))]
+    currents = list(product(_CURRENT, swings)) if 0 < logs < count else [((0.0, 1.0), (0.0, 1.0))]
     drift = _DRIFT**2 * _WALK * (len(currents) > 1)
     ground = np.zeros((count, count))
     ground[logs:, logs:] = 1.0
@@ -98,14 +98,14 @@ def _one_ship(logs: int, tracks: int, length_m: float) -> Mixture:
     ):
         shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
         shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
-        for (log, e), (track, f) in product(_LOG_NOISE, _TRACK_NOISE):
-            own = np.kron(np.diag([log**2] * logs + [track**2] * tracks), _WHITE)
+        for (log, e), (track, f) in product(_NOISE, _TRACK_NOISE if tracks else _NOISE):
+            own = np.kron(np.diag([log**2] * logs + [track**2] * (count - logs)), _WHITE)
             own += np.kron(np.eye(count), _OWN)
             parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
     return _mixture(parts)
 
 
-def _evidence(mixture: Mixture, speed: Float64) -> float:
+def _evidence(mixture: SpeedMixture, speed: Float64) -> float:
     precision, factor = mixture
     return _log_sum((factor - 0.5 * ((precision @ speed) @ speed)).tolist())
 
@@ -118,7 +118,8 @@ def _log_sum(logs: list[float]) -> float:
 def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     """Return the log evidence that some sources measure one ship."""
     logs = int(_LOG in speeds)
-    mixture = _one_ship(logs, len(speeds) - logs, craft.length_m)
+    tracks = sum(source >= FIRST_TRACK for source in speeds)
+    mixture = _one_ship(logs, len(speeds) - logs - tracks, tracks, craft.length_m)
     ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
     through = float(speeds[_LOG].mean()) if logs else 0.0
     if through >= 0.0:
