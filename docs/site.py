@@ -2,7 +2,7 @@
 """
 Pages of the site that are made when it is built: the help of each verb, the notebooks.
 
-The notebooks are run, in half a minute; SHIPDRAG_DOCS_QUICK=1 shows their code alone.
+The notebooks are run, in some two minutes; SHIPDRAG_DOCS_QUICK=1 shows their code alone.
 """
 
 from __future__ import annotations

@@ -124,7 +124,10 @@ def declare(kind: Kind, text: str, *, default: Any = MISSING, hashed: bool = Tru
     Declare a dataclass field that is read from a mapping.
     """
     metadata = {'key': Key(kind, text, default)}
-    return field(default=default, metadata=metadata, hash=None if hashed else False)
+    hash_ = None if hashed else False
+    if default == {}:
+        return field(default_factory=dict, metadata=metadata, hash=hash_)
+    return field(default=default, metadata=metadata, hash=hash_)
 
 
 def keys_of(cls: type[Any]) -> dict[str, Key]:

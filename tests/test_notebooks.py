@@ -47,5 +47,6 @@ def test_it_is_kept_without_outputs(path: Path) -> None:
             assert cell.execution_count is None
 
 
-def test_there_are_three() -> None:
-    assert {path.stem for path in NOTEBOOKS} == {'coastdown', 'hidden_effect', 'fleet_year'}
+def test_there_are_four() -> None:
+    named = {'coastdown', 'hidden_effect', 'fleet_year', 'learn'}
+    assert {path.stem for path in NOTEBOOKS} == named

@@ -11,7 +11,6 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.learning.folder import read_term
 from shipdrag_ros.ship.expression import unit_text
-from shipdrag_ros.ship.term import RESULT
 from shipdrag_ros.simulation.effects import LIBRARY, OWN
 
 
@@ -47,7 +46,7 @@ def _check(files: list[Path], output: Output) -> int:
     document = []
     for path in files:
         term = read_term(path)  # the first that cannot be used is the error
-        unit = unit_text(RESULT[term.term.channel])
+        unit = unit_text(term.units[0])
         output.say(f'{path}: {term.name} can be used: {term.term.expression} [{unit}]')
         document.append({'file': str(path), 'name': term.name, 'channel': term.term.channel})
     output.json({'effects': document})

@@ -77,9 +77,10 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
         values += [abs(each.prior.at(one)) for one in z.tolist()]
         weights += [each.weight] * _POINTS
     order = np.argsort(values)
-    reached = np.cumsum(np.array(weights)[order])
-    at = int(np.searchsorted(reached, share * reached[-1]))
-    return float(values[order[min(at, len(values) - 1)]])
+    weight, value = np.array(weights)[order], np.array(values)[order]
+    # between points: a step of the distribution at the last digit of a weight is none of the limit
+    middle = np.cumsum(weight) - 0.5 * weight
+    return float(np.interp(share * weight.sum(), middle, value))
 
 
 class Sensitivity(NamedTuple):

@@ -3,5 +3,5 @@
 An effect that the library has no name for: a checked term, learnt from several runs.
 
 `search.learn` finds one among the forms of `forms`; the term as data is `ship.LearntTerm`, and
-`simulation.learnt` makes an effect of it.
+`simulation.declared` makes an effect of it.
 """

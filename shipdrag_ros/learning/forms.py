@@ -20,8 +20,8 @@ from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.term import TermForm, TermParameter
+from shipdrag_ros.simulation.declared import effect_of
 from shipdrag_ros.simulation.effect import Effect
-from shipdrag_ros.simulation.learnt import effect_of
 
 SMOOTH_OVER_FORM = 30.0
 """Prior odds of something smooth without a formula, over each form."""

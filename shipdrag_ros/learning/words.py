@@ -11,8 +11,8 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.fields import plain
 from shipdrag_ros.learning.search import Learnt, kind_text
 from shipdrag_ros.report.document import write_page
+from shipdrag_ros.ship import LearntTerm
 from shipdrag_ros.ship.expression import unit_text
-from shipdrag_ros.ship.term import RESULT
 
 _SHOWN = 0.001  # probability of a line
 
@@ -46,7 +46,7 @@ def lines(found: Learnt) -> list[str]:
             f'after the stop, at {low:.1f} to {high:.1f} m/s.'
         )
     if found.term is not None:
-        unit = unit_text(RESULT[found.term.term.channel])
+        unit = unit_text(found.term.units[0])
         said.append(f'It is {found.term.term.expression} [{unit}].')
         if found.term.looks_like:
             said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')
@@ -68,6 +68,28 @@ def table(found: Learnt) -> Table:
         ('what explains the runs', 'probability'),
         tuple((kind, f'{p:.3f}') for kind, p in found.probability.items() if p >= _SHOWN),
     )
+
+
+def _term_tables(term: LearntTerm) -> tuple[tuple[str, Table], ...]:
+    """Return sizes, and what they rest on."""
+    limits = term.limits or {}
+    sizes = tuple(
+        (name, f'{q.value:.4g}', f'{q.sd:.2g}', q.unit, f'{limits[name].upper_95:.4g}')
+        if name in limits
+        else (name, f'{q.value:.4g}', f'{q.sd:.2g}', q.unit, '')
+        for name, q in term.parameters.items()
+    )
+    tables = [('Sizes', Table(('parameter', 'value', 'sd', 'unit', 'at most (95 %)'), sizes))]
+    if rest := term.evidence:
+        facts = (
+            ('ln Bayes factor over nothing', f'{rest.over_nothing:.1f}'),
+            ('over something smooth', f'{rest.over_smooth:.1f}'),
+            ('each half of the runs shows it', 'yes' if rest.halves_agree else 'no'),
+            ('gap of a run left out, before', '100 %'),
+            ('the same, after', f'{1.0 - rest.held_out_gap_cut:.0%}'),
+        )
+        tables.append(('What it rests on', Table((), facts)))
+    return tuple(tables)
 
 
 def document(found: Learnt) -> dict[str, Any]:
@@ -107,4 +129,6 @@ def write_report(path: Path, found: Learnt) -> None:
     """
     shown = (('Probability of each explanation of the runs', table(found)),)
     sections = [Section('What explains the runs', text=lines(found), tables=shown)]
+    if found.term is not None:
+        sections.append(Section('The term', tables=_term_tables(found.term)))
     write_page(path, 'Learnt effect', sections, sentence=sentence(found))

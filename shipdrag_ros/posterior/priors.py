@@ -3,8 +3,8 @@
 Every prior of the model, as data.
 
 docs/model.md prints this table (`python docs/tables.py`). Those of the noise stand in
-`inference.learning`, those of an effect in its module in `simulation.effects`, with the usual odds
-in `simulation.effect.Effect`.
+`inference.learning`, those of an effect in `data/effects.yaml` or its module in
+`simulation.effects`, with the usual odds in `simulation.effect.Effect`.
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -80,12 +81,15 @@ class Formula:
     text
     names
         That it needs, sorted.
+    tree
     """
 
     text: str
     names: tuple[str, ...]
+    tree: ast.expr = field(repr=False, compare=False)
 
     @classmethod
+    @lru_cache(512)  # a fit needs one formula some thousand times
     def parse(cls, text: str) -> Formula:
         """
         Read a formula.
@@ -100,7 +104,7 @@ class Formula:
         if len(nodes) > 3 * MOST_NODES:
             raise FormulaError(f'has more than {MOST_NODES} parts; write a shorter one')
         names = _check(tree, 0)
-        return cls(text, tuple(sorted(names)))
+        return cls(text, tuple(sorted(names)), tree)
 
     def walk(self, algebra: Algebra[T], names: Mapping[str, T]) -> T:
         """
@@ -116,7 +120,7 @@ class Formula:
             raise FormulaError(
                 f'{", ".join(unknown)} is not known; known are {", ".join(sorted(names))}'
             )
-        return _Walk(algebra, names).of(_tree(self.text))
+        return _Walk(algebra, names).of(self.tree)
 
 
 def _tree(text: str) -> ast.expr:

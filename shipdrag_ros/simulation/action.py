@@ -66,16 +66,14 @@ class Action:
     depth_m
         Depth of the water, where it is less than the scenario's.
     log_factor, log_offset_m_s
-        The log reads (1 + log_factor) times the truth plus log_offset_m_s.
+        The log reads (1 + log_factor) times the truth and its errors, plus log_offset_m_s.
     log_lag_s
         Time constant of a first-order filter of the log.
-    log_dead_band_m_s
-        Below this speed u the log reads u^2 / log_dead_band_m_s.
     log_late_s
         A reading of the log is of this time before its stamp.
     log_error
         Functions of speed through water [m/s] and time since the end of the lead-in [s] that
-        return what the log reads too much [m/s].
+        return what the flow at the log is too fast [m/s].
     radar_factor
         Positions and speeds over ground read (1 + radar_factor) times truth.
     ground_lag_s
@@ -100,7 +98,6 @@ class Action:
     log_factor: float = 0.0
     log_offset_m_s: float = 0.0
     log_lag_s: float = 0.0
-    log_dead_band_m_s: float = 0.0
     log_late_s: float = 0.0
     log_error: tuple[ReadingError, ...] = ()
     radar_factor: float = 0.0

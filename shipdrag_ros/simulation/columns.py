@@ -21,7 +21,7 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
-from shipdrag_ros.simulation.sensors import lagged, log_flow, log_reading
+from shipdrag_ros.simulation.sensors import lagged, log_reading
 from shipdrag_ros.simulation.surge import own_action, steps_of
 from shipdrag_ros.simulation.terms import (
     acted,
@@ -162,21 +162,17 @@ def simulate_columns(
     whole = prepared.paths(seen)
     paths = whole[prepared.motion[:, np.newaxis], np.searchsorted(seen, time)]
     speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
-    log = log_flow(
-        speed,
-        *(
-            np.array([getattr(action, name) for action in actions])[:, None]
-            for name in ('log_dead_band_m_s', 'log_factor', 'log_offset_m_s')
-        ),
-    )
+    log = speed.copy()
+    for i, action in enumerate(actions):
+        for error in action.log_error:
+            log[i] += error(speed[i], time - scenario.lead_in_s)
+    factor, offset = np.array([(a.log_factor, a.log_offset_m_s) for a in actions]).T[:, :, None]
+    log = (1.0 + factor) * log + offset
     over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
     for i, action in enumerate(actions):
         path = whole[prepared.motion[i]]
         if action.log_lag_s or action.log_late_s:
             log[i] = log_reading(action, seen, path[:, 0], time, scenario.lead_in_s)
-        else:
-            for error in action.log_error:
-                log[i] += error(speed[i], time - scenario.lead_in_s)
         if action.ground_lag_s > 0.0:
             moved = np.hypot(path[:, 3], path[:, 4])
             over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))

@@ -12,8 +12,23 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
+from shipdrag_ros.fields import (
+    INVALID,
+    Kind,
+    Problems,
+    choice,
+    declare,
+    flag,
+    list_of,
+    named,
+    number,
+    section,
+    text,
+)
 from shipdrag_ros.parameter import Parameter, Scale
+from shipdrag_ros.samples import INPUTS
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action, Vector
 from shipdrag_ros.simulation.scenario import Scenario
@@ -178,12 +193,24 @@ class Said:
         come again, to 1 - 1/e.
     """
 
-    values: tuple[str, ...] = ()
-    fades_s: float = math.inf
+    values: tuple[str, ...] = declare(list_of(text()), 'of the fact', default=())
+    fades_s: float = declare(number(0.0, 1e12, 's'), 'after its date', default=math.inf)
 
 
 DENIES = Said()
 DAY_S = 86400.0
+_MEASURES = {each.name.lower(): each for each in Measure}
+
+
+def _words(of: Mapping[str, Any]) -> Kind:
+    """Expect a list of some words; return what they stand for."""
+    words = list_of(choice(*of))
+
+    def read(value: object, path: str, problems: Problems) -> object:
+        given = words.read(value, path, problems)
+        return given if given is INVALID else tuple(of[word] for word in given)
+
+    return Kind(read, words.expectation)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,22 +264,30 @@ class Effect:
     name: str
     scope: Scope
     parameters: tuple[Parameter, ...]
-    formula: str
-    source: str
+    formula: str = declare(text(), 'what is computed')
+    source: str = declare(text(), 'where it comes from')
     act: Callable[..., Action]
-    struck_out_by: tuple[str, ...] = ()
-    confounders: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
-    not_with: tuple[str, ...] = ()
-    formula_sd: float = 0.0
-    odds: float = 0.04
-    size_power: float = 1.0
+    struck_out_by: tuple[str, ...] = declare(
+        list_of(choice(*INPUTS)), 'what measures it', default=()
+    )
+    confounders: Mapping[str, tuple[Measure, ...]] = declare(
+        named(_words(_MEASURES)), 'what looks alike, and what decides', default={}
+    )
+    not_with: tuple[str, ...] = declare(list_of(text()), 'effects that exclude it', default=())
+    formula_sd: float = declare(number(0.0, 10.0), 'of its formula, relative', default=0.0)
+    odds: float = declare(number(1e-6, 1.0), 'before any data', default=0.04)
+    size_power: float = declare(number(-12.0, 12.0), 'of its size in its trace', default=1.0)
     needs: tuple[str, ...] = ()
     errs_in: tuple[str, ...] = ()
-    without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
-    in_geodetic: bool = True
-    facts: Mapping[str, Said] = field(default_factory=dict)
+    without_baseline: Mapping[WithoutBaseline, str] = declare(
+        named(text()), 'what shows it without a baseline', default={}
+    )
+    in_geodetic: bool = declare(flag(), 'by latitude and longitude too', default=True)
+    facts: Mapping[str, Said] = declare(
+        named(section(Said)), 'what a log book says of it', default={}
+    )
     nameless_at: Mapping[str, float] = field(default_factory=dict)
-    lasts_s: float = 0.0
+    lasts_s: float = declare(number(0.0, 1e9, 's'), 'in which it goes unseen', default=0.0)
 
     def goes_with(self, other: Effect) -> bool:
         """

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
 
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -78,14 +77,6 @@ class QuadraticDrag:
         Return the drag at speeds of 0 or more; S2 (11).
         """
         return quadratic_n(self.density_kg_m3, self.drag_area_m2, speed_m_s)
-
-
-def disc_area_m2(ship: Ship) -> float:
-    """
-    Return the area that the propeller sweeps.
-    """
-    assert ship.propeller is not None  # the effect says that it needs one
-    return 0.25 * pi * ship.propeller.diameter_m**2
 
 
 def _force_n(ship: Ship, speed_m_s: Float64) -> Float64:

@@ -32,8 +32,8 @@ def log_reading(
     Parameters
     ----------
     action
-        With the faults: dead band, scale, offset, lag and clock, in the order
-        in which a log has them.
+        With the faults: errors by speed and time, scale, offset, lag and clock, in the
+        order in which a log has them.
     time_s, speed_m_s : (n,)
         True speed through water, linear between and constant outside.
     at_s : (m,)
@@ -46,28 +46,13 @@ def log_reading(
     (m,)
         [m/s]
     """
-    flow = log_flow(speed_m_s, action.log_dead_band_m_s, action.log_factor, action.log_offset_m_s)
+    flow = speed_m_s.copy()
     for error in action.log_error:
         flow += error(speed_m_s, time_s - stop_s)
+    flow = (1.0 + action.log_factor) * flow + action.log_offset_m_s
     if action.log_lag_s > 0.0:
         flow = lagged(time_s, flow, action.log_lag_s)
     reading: Float64 = np.interp(at_s - action.log_late_s, time_s, flow)
-    return reading
-
-
-def log_flow(
-    speed_m_s: Float64,
-    dead_band_m_s: float | Float64,
-    factor: float | Float64,
-    offset_m_s: float | Float64,
-) -> Float64:
-    """
-    Return what a log without memory reads, of any shape [m/s].
-    """
-    band = np.broadcast_to(dead_band_m_s, speed_m_s.shape)
-    magnitude = np.abs(speed_m_s)
-    passed = np.divide(magnitude, band, out=np.ones_like(band), where=magnitude < band)
-    reading: Float64 = (1.0 + factor) * passed * speed_m_s + offset_m_s
     return reading
 
 

@@ -13,9 +13,9 @@ from shipdrag_ros.learning import words
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Scenario
+from shipdrag_ros.simulation.declared import force_n
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import using
-from shipdrag_ros.simulation.learnt import force_n
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 # a sharp edge: a broad one looks like a hump about it
@@ -60,7 +60,7 @@ def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
     assert np.sqrt(np.mean((found - true) ** 2)) < 0.2 * np.sqrt(np.mean(true**2))
 
 
-def test_what_is_written_says_what_it_rests_on(learnt: Learnt) -> None:
+def test_what_is_written_says_what_it_rests_on(learnt: Learnt, tmp_path: Path) -> None:
     assert learnt.term is not None
     again = LearntTerm.from_yaml(learnt.term.to_yaml())
     assert again == learnt.term
@@ -73,6 +73,10 @@ def test_what_is_written_says_what_it_rests_on(learnt: Learnt) -> None:
     assert rest.held_out_gap_cut > 0.3
     assert 'kelp: a force by speed (step)' in words.sentence(learnt)
     assert words.document(learnt)['learnt']['name'] == 'kelp'
+    words.write_report(tmp_path / 'page.html', learnt)
+    page = (tmp_path / 'page.html').read_text()
+    assert f'{rest.over_smooth:.1f}' in page
+    assert f'{1.0 - rest.held_out_gap_cut:.0%}' in page
 
 
 def test_a_later_run_is_named(learnt: Learnt) -> None:

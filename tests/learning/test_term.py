@@ -26,9 +26,10 @@ from shipdrag_ros.simulation import (
     simulate_columns,
     standard_sensors,
 )
+from shipdrag_ros.simulation.declared import force_n
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, declared, find, parse, using
-from shipdrag_ros.simulation.learnt import force_n
+from shipdrag_ros.simulation.hydrodynamics import friction_n
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')
@@ -66,6 +67,31 @@ term: {channel: force, scope: hull, variable: date, shape: ramp,
   expression: "0.5*rho*A*nabla**(2/3)*u**2*(d - 20600)/30",
   valid: {d: [20600, 20630], u: [0.5, 8]}}
 parameters: {A: {value: 0.02, sd: 0.001}}
+"""
+
+
+LATE = """
+name: late
+term: {channel: clock, scope: sensor, variable: speed, shape: constant, expression: "s*tau",
+  valid: {}}
+parameters:
+  s: {value: 7, sd: 1, unit: s}
+  tau: {prior: [half-normal, 0, 2], bounds: [0, 9], meaning: how often}
+"""
+SET = """
+name: set_and_drift
+term: {channel: water, scope: earth, variable: time, shape: ramp, expression: "A*t/t_end",
+  to_port: "2*A", valid: {t: [0, 1e4]}}
+parameters: {A: {prior: [normal, 0, 0.3], bounds: [-3, 3], unit: m/s}}
+"""
+BALLAST = """
+name: ballast
+term: {channel: inertia, scope: hull, variable: speed, shape: constant, expression: "W/g",
+  valid: {u: [0, 20]}}
+also:
+- {channel: inertia, expression: "0.1*W/(rho*g*nabla)"}
+- {channel: force, expression: "W/(rho*g*nabla)*R_F"}
+parameters: {W: {prior: [log-normal, 0.01, 1], unit: N, counted_in: weight of the ship}}
 """
 
 
@@ -201,7 +227,61 @@ def test_more_of_it_slows_the_ship_more() -> None:
     assert 'weed' not in LIBRARY
 
 
-@pytest.mark.parametrize('text', [WEED, FADING, TURNED, WASHED, SANDED, GROWN])
+def test_a_term_may_act_on_clock_water_and_inertia() -> None:
+    ship = Ship.example()
+    frame = Frame(ship, Scenario(speed_m_s=6.0, duration_s=900.0, heading_rad=2.0), 0.0)
+    assert declared(LearntTerm.from_yaml(LATE)).action(frame, 7.0, 2.0).log_late_s == 14.0
+    water = declared(LearntTerm.from_yaml(SET)).action(frame, 0.4)
+    np.testing.assert_allclose(water.current_m_s, (0.0, 0.8))
+    np.testing.assert_allclose(water.current_change_m_s, (0.4, 0.0), atol=1e-15)
+    effect = declared(LearntTerm.from_yaml(BALLAST))
+    weight_n = ship.mass_kg * GRAVITY_M_S2
+    (size,) = effect.parameters_of(ship)
+    assert size.prior.first == pytest.approx(0.01 * weight_n)
+    ballast = effect.action(frame, 0.2 * weight_n)
+    assert ballast.mass_fraction == pytest.approx(0.2)
+    assert ballast.n_r_change == pytest.approx(0.02)
+    speed = np.array([2.0, 5.0])
+    np.testing.assert_allclose(ballast.resistance_n(speed), 0.2 * friction_n(ship, speed))
+
+
+def test_a_parameter_with_a_prior_needs_no_value() -> None:
+    scale, often = declared(LearntTerm.from_yaml(LATE)).parameters
+    assert (scale.value, scale.low) == (7.0, 0.0)
+    assert not often.is_given
+    assert (often.low, often.high, often.meaning) == (0.0, 9.0, 'how often')
+    assert str(often.prior) == 'half-normal, 0 + 2'
+    (velocity,) = declared(LearntTerm.from_yaml(SET)).parameters
+    assert velocity.low == -3.0
+
+
+@pytest.mark.parametrize(
+    ('text', 'right', 'wrong', 'why'),
+    [
+        (LATE, 's*tau', 's*tau*t/s', 'and t is in it'),
+        (LATE, 's*tau', 'tau', 'needs s'),
+        (SET, 'A*t/t_end', 'A*(t/t_end)**2', 'evenly'),
+        (SET, '"2*A"', '"2*A*L"', 'term.to_port'),
+        (SET, 'channel: water', 'channel: air', 'cannot be simulated'),
+        (SET, 'prior: [normal, 0, 0.3], ', '', 'neither value nor prior'),
+        (SET, '[normal, 0, 0.3]', '[log-normal, 0, 0.3]', 'without a size'),
+        (SET, '[normal, 0, 0.3]', '[log-normal, 1, 300]', 'without a size'),
+        (SET, '[normal, 0, 0.3]', '[wishful, 1, 3]', 'expected'),
+        (SET, '[-3, 3]', '[-3, 0, 3]', 'expected two'),
+        (WASHED, 'A*u*exp', 'A*exp', 'share of the speed that changes'),
+        (FADING, 'valid: {t', 'to_port: "A", valid: {t', 'no direction'),
+        (BALLAST, 'unit: N', 'unit: kg', 'is no kg'),
+        (BALLAST, 'inertia, expression: "0.1', 'depth, expression: "0.1', r'also\[0\]'),
+        (BALLAST, '*R_F"', '*R_F*exp(50*t*t)"', r'also\[1\]'),
+    ],
+)
+def test_what_a_channel_cannot_do_is_refused(text: str, right: str, wrong: str, why: str) -> None:
+    assert right in text
+    with pytest.raises(EffectFileError, match=why):
+        LearntTerm.from_yaml(text.replace(right, wrong))
+
+
+@pytest.mark.parametrize('text', [WEED, FADING, TURNED, WASHED, SANDED, GROWN, LATE, SET, BALLAST])
 def test_a_term_survives_its_own_text_and_a_process(text: str) -> None:
     term = LearntTerm.from_yaml(text)
     assert LearntTerm.from_yaml(term.to_yaml()) == term
@@ -259,6 +339,18 @@ WRONG: dict[str, tuple[Any, ...]] = {
     'covariance': ([[1.0]], [[1, 2], [3, 4]], [[1, 2, 3], [1, 2, 3]], 'x', [[-1, 0], [0, 1]],
                    [[1, 9], [9, 1]], [[math.nan, 0], [0, 1]], [[1, 0]]),
     'looks_like': ('all', [1], ['x' * 200], 3),
+    'parameters.A.prior': ('normal', ['normal'], ['normal', 0, 0], ['flat', 0, 1],
+                           ['log-normal', 1, 99], ['uniform', 2, 1], [['normal'], 0, 1],
+                           ['normal', math.nan, 1], ['normal', 0, '1'], {}, 1),
+    'parameters.A.bounds': ([1], [2, 1], [0, 1, 2], 'any', [0, math.inf], 1),
+    'parameters.A.counted_in': ('furlongs', '', 1, 'draught'),
+    'parameters.A.meaning': (1, None, ['x']),
+    'term.to_port': ('A', 1, '__import__("os")'),
+    'also': (7 * [{'channel': 'force', 'expression': '0.5*rho*A*L**2*u**2'}],
+             'force', [1], [{}], [{'channel': 'force'}], [{'channel': 'x', 'expression': 'A'}],
+             [{'channel': 'depth', 'expression': 'A'}], {'channel': 'log', 'expression': 'A'},
+             [{'channel': 'log', 'expression': 'A', 'to_port': 'A'}],
+             [{'channel': 'ground', 'expression': 'open("/etc/passwd")'}]),
     'limits': ({'z': {'upper_95': 1}}, {'A': 1}, {'A': {'upper_95': math.inf}}, [1]),
     'evidence': ({}, {'runs': 1}, 'much', {'runs': [], 'over_nothing': math.nan, 'over_smooth': 1,
                  'halves_agree': True, 'held_out_gap_cut': 0.5},
@@ -328,7 +420,9 @@ PLAIN = st.recursive(
 
 
 @given(
-    key=st.sampled_from(['name', 'term', 'parameters', 'covariance', 'evidence', 'limits']),
+    key=st.sampled_from(
+        ['name', 'term', 'also', 'parameters', 'covariance', 'evidence', 'limits']
+    ),
     value=PLAIN,
 )
 @settings(max_examples=200, deadline=None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No effect is known by name outside its own module; what others need, it declares."""
+"""No effect is known by name outside its own declaration; what others need, it declares."""
 
 from __future__ import annotations
 

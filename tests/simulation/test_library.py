@@ -6,6 +6,7 @@ from __future__ import annotations
 import pickle
 import sys
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.errors import SimulationError
+from shipdrag_ros import strict_yaml
+from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import INPUTS
-from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.simulation import (
     STANDARD_SD,
     Action,
@@ -29,6 +31,7 @@ from shipdrag_ros.simulation import (
     standard_sensors,
 )
 from shipdrag_ros.simulation import effects as library
+from shipdrag_ros.simulation.declared import effects_in
 from shipdrag_ros.simulation.effects import (
     LIBRARY,
     action_of,
@@ -97,9 +100,39 @@ def test_the_promised_names_stay(name):
     assert [quantity.name for quantity in effect.parameters][: len(parameters)] == parameters
 
 
-def test_every_module_of_the_folder_is_an_effect_of_its_name():
+def test_an_effect_is_declared_in_the_file_or_the_module_of_its_name():
     modules = {path.stem for path in Path(library.__file__).parent.glob('[!_]*.py')}
-    assert modules == set(LIBRARY)
+    file = resources.files('shipdrag_ros') / 'data' / 'effects.yaml'
+    declared = set(strict_yaml.load(file.read_text(encoding='utf-8')))
+    assert modules | declared == set(LIBRARY)
+    assert not modules & declared
+    assert list(LIBRARY) == sorted(LIBRARY)
+    for name in declared:
+        term = LIBRARY[name].act.args[0]
+        assert isinstance(term, LearntTerm)
+        assert term.name == name
+
+
+def test_a_formula_of_the_library_is_checked_like_a_learnt_one(tmp_path):
+    whole = (resources.files('shipdrag_ros') / 'data' / 'effects.yaml').read_text(encoding='utf-8')
+    for right, wrong in (
+        ('"friction_factor*R_F"', '"friction_factor*R_F*u"'),
+        ('"friction_factor*R_F"', '"friction_factor*R_F/(u - 3*sqrt(g*L)/sqrt(g*L))"'),
+        ('"offset_s"', '"offset_s*L"'),
+        ('"change_m_s*(t/t_end)"', '"change_m_s*(t/t_end)**2"'),
+        ('"lag_s"', '"lag_s*exp(-u/sqrt(g*L))"'),
+        ('[log-normal, 0.25, 0.6]', '[log-normal, 0, 0.6]'),
+        ('counted_in: V^(2/3)', 'counted_in: draught'),
+        ('[reciprocal_run]', '[a_prayer]'),
+        ('to_port: "cross_track_m_s"', 'to_port: "cross_track_m_s*L"'),
+        ('expression: "depth_m"', 'expression: "depth_m", to_port: "depth_m"'),
+    ):
+        assert whole.count(right) >= 1
+        (tmp_path / 'effects.yaml').write_text(whole.replace(right, wrong, 1), encoding='utf-8')
+        with pytest.raises(EffectFileError):
+            list(effects_in(tmp_path / 'effects.yaml'))
+    (tmp_path / 'effects.yaml').write_text(whole, encoding='utf-8')
+    assert len(list(effects_in(tmp_path / 'effects.yaml'))) > 10
 
 
 def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
@@ -111,7 +144,7 @@ def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
         'high=1e9),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
     )
     monkeypatch.setattr(library, '__path__', [*library.__path__, str(tmp_path)])
-    monkeypatch.setattr(library, 'LIBRARY', {found.name: found for found in library._found()})
+    monkeypatch.setattr(library, 'LIBRARY', library._found())
     monkeypatch.delitem(sys.modules, f'{library.__name__}.ice')
     truth = simulate(CARGO, SCENARIO, effects=[parse('ice=1e5')])
     extra = truth.specific_resistance(5.0) * CARGO.mass_kg - CARGO.resistance_n(5.0)
@@ -269,7 +302,8 @@ def test_what_is_written_is_read(name, data):
     assert stated == StatedEffect(name, {k: Parameter(v, 0.0) for k, v in zip(names, values)})
     action = action_of(FRAME, [stated])
     expected = LIBRARY[name].action(FRAME, *values)
-    assert replace(action, resistance=()) == replace(expected, resistance=())
+    functions = {'resistance': (), 'log_error': ()}
+    assert replace(action, **functions) == replace(expected, **functions)
 
 
 def test_words_and_defaults_are_read():

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The library of effects: every module in this folder is one.
+The library of effects: declared in `data/effects.yaml`, or a module in this folder.
 
-A new effect is a new module with an `EFFECT`; simulation, command line,
-diagnosis and documentation find it here.
+A new effect is an entry of that file, or where no formula of a term holds it a new module with an
+`EFFECT`; simulation, command line, diagnosis and documentation find it here.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
-from importlib import import_module
+from importlib import import_module, resources
 from itertools import combinations
 from pkgutil import iter_modules
 from types import MappingProxyType
@@ -21,8 +21,8 @@ from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.declared import effect_of, effects_in
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
-from shipdrag_ros.simulation.learnt import effect_of
 
 __all__ = [
     'LIBRARY',
@@ -42,14 +42,16 @@ __all__ = [
 ]
 
 
-def _found() -> Iterator[Effect]:
+def _found() -> dict[str, Effect]:
+    every = [*effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')]
     for module in iter_modules(__path__):
         effect = import_module(f'{__name__}.{module.name}').EFFECT
         assert isinstance(effect, Effect)
-        yield effect
+        every.append(effect)
+    return {effect.name: effect for effect in sorted(every, key=lambda effect: effect.name)}
 
 
-_EVERY = {effect.name: effect for effect in _found()}
+_EVERY = _found()
 LIBRARY: Mapping[str, Effect] = MappingProxyType(_EVERY)
 
 

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a declared term does, as an effect of the simulation: of the library, or learnt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.resources.abc import Traversable
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.errors import EffectFileError
+from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
+from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, log_normal, normal
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
+from shipdrag_ros.ship.expression import PURE, Formula
+from shipdrag_ros.ship.term import TermParameter, TermPart, worth
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import (
+    AREAS,
+    DAY_S,
+    DRAUGHTS,
+    SPEEDS,
+    WEIGHTS,
+    Effect,
+    Frame,
+    Scope,
+)
+from shipdrag_ros.simulation.hydrodynamics import friction_n, viscous_n
+from shipdrag_ros.simulation.scenario import Turn
+
+_KNOTS = 24  # of a force in time: straight between them
+_FOR_EVER_S = 1e7
+_SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
+_SCALES: Mapping[str, Scale] = {
+    scale.text: scale for scale in (ABSOLUTE, WEIGHTS, AREAS, SPEEDS, DRAUGHTS)
+}
+_NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
+_ERRS_IN = {
+    'log': ('speed_through_water',),
+    'clock': ('speed_through_water',),
+    'filter': ('speed_through_water',),
+    'ground': ('position', 'speed_over_ground'),
+}
+
+
+def effects_in(file: Traversable) -> Iterator[Effect]:
+    """
+    Yield the effects of a file of the library: terms, with what else an effect declares.
+
+    Raises
+    ------
+    EffectFileError
+        If it cannot be used; with every problem that was found.
+    """
+    problems: Problems = []
+    data = parse(file.read_text(encoding='utf-8'), subject=file.name, error=EffectFileError)
+    of_term, of_effect = keys_of(LearntTerm), keys_of(Effect)
+    for name, entry in data.items():
+        given = read_keys(of_term | of_effect, {'name': name, **entry}, name, problems)
+        if problems:
+            raise EffectFileError(file.name, problems)
+        term = LearntTerm(**{key: value for key, value in given.items() if key in of_term})
+        more = {key: value for key, value in given.items() if key in of_effect}
+        yield replace(effect_of(term), **more)
+
+
+def effect_of(term: LearntTerm) -> Effect:
+    """
+    Return a term as an effect, as those of the library are.
+    """
+    size, *_ = term.parameters
+    seen = len(term.evidence.runs) if term.evidence else 0
+    names = {name for *_, text in term.formulas for name in Formula.parse(text).names}
+    return Effect(
+        name=term.name,
+        scope=Scope(term.term.scope),
+        parameters=tuple(
+            _parameter(name, each, is_size=name == size) for name, each in term.parameters.items()
+        ),
+        formula=term.term.expression,
+        source=f'learnt from {seen} runs' if seen else 'declared by a file',
+        act=partial(_act, term),
+        needs=tuple(key for name, key in _NEEDS.items() if name in names)
+        + (('air',) if any(part.channel == 'air' for part in term.parts) else ()),
+        errs_in=_ERRS_IN.get(term.term.channel, ()),
+        lasts_s=0.0 if term.term.scope == Scope.RUN else 365.0 * DAY_S,
+    )
+
+
+def _parameter(name: str, declared: TermParameter, *, is_size: bool) -> Parameter:
+    value = math.nan if declared.value is None else declared.value
+    low, high = declared.bounds or (-1e9 if declared.either_sign else 0.0, 1e9)
+    return Parameter(
+        value,
+        name=name,
+        unit='' if declared.unit == '1' else declared.unit,
+        meaning=declared.meaning or ('size' if is_size else 'of its curve'),
+        prior=declared.before or _prior(value, declared.sd, _SIZE_SD if is_size else _SHAPE_SD),
+        low=low,
+        high=high,
+        measured_in=_SCALES[declared.counted_in or ''],
+    )
+
+
+def _prior(value: float, sd: float, least_sd: float) -> Prior:
+    """Return what is expected in later runs of a parameter that was found."""
+    if value == 0.0 or sd > 0.5 * abs(value):
+        return normal(max(sd, 1e-12), mean=value)
+    return log_normal(value, max(sd / abs(value), least_sd))
+
+
+_OF_RUN: Mapping[str, Callable[[Frame], float]] = {
+    'rho': lambda frame: frame.ship.water.density_kg_m3,
+    'g': lambda frame: GRAVITY_M_S2,
+    'pi': lambda frame: math.pi,
+    'L': lambda frame: frame.ship.length_m,
+    'nabla': lambda frame: frame.ship.displaced_volume_m3,
+    'B_WL': lambda frame: frame.ship.breadth_m or math.nan,
+    'T_M': lambda frame: frame.ship.draught_m or math.nan,
+    'D_P': lambda frame: frame.ship.propeller.diameter_m if frame.ship.propeller else math.nan,
+    'n_r': lambda frame: float(frame.ship.n_r(0.5 * frame.scenario.speed_m_s)),
+    't_end': lambda frame: max(frame.scenario.duration_s, 1.0),
+    'psi': lambda frame: math.remainder(frame.scenario.heading_rad, math.tau),  # as was checked
+    'd': lambda frame: frame.scenario.day,
+    'h': lambda frame: frame.scenario.depth_m,
+}
+
+
+def _deep_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    return ship.resistance_n(speed_m_s) - ship.air_drag_n(speed_m_s)
+
+
+_BY_SPEED: Mapping[str, Callable[[Ship, Float64], Float64]] = {
+    'R_T': _deep_n,
+    'R_V': viscous_n,
+    'R_F': friction_n,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Acting:
+    """A formula in a run, with sizes of its parameters."""
+
+    text: str
+    term: LearntTerm
+    frame: Frame
+    values: tuple[float, ...]
+
+    def at(self, speed_m_s: Float64 | float = 0.0, time_s: Float64 | float = 0.0) -> Float64:
+        """Return what it is worth; speeds as they are, times inside of what is valid."""
+        formula = Formula.parse(self.text)
+        known: dict[str, Float64 | float] = dict(zip(self.term.parameters, self.values))
+        for name in formula.names:
+            if name in _OF_RUN:
+                known[name] = self.term.inside(name, _OF_RUN[name](self.frame))
+            elif name in _BY_SPEED:
+                known[name] = _BY_SPEED[name](self.frame.ship, np.asarray(speed_m_s, np.float64))
+        return worth(self.text, known | {'u': speed_m_s, 't': self.term.inside('t', time_s)})
+
+    def force_n(self, speed_m_s: Float64) -> Float64:
+        """Return a force; beyond the speeds that it holds for it goes on as their square."""
+        inside = self.term.inside('u', speed_m_s)
+        force = np.broadcast_to(self.at(inside), np.shape(speed_m_s))
+        beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0) ** 2
+        found: Float64 = force * beyond
+        return found
+
+    def reading_m_s(self, speed_m_s: Float64, since_s: Float64) -> Float64:
+        """Return what the log reads too much; before the stop, as at the stop."""
+        speed = self.term.inside('u', np.abs(speed_m_s))
+        found: Float64 = np.where(speed_m_s < 0.0, -1.0, 1.0) * self.at(
+            speed, np.maximum(since_s, 0.0)
+        )
+        return found
+
+
+def force_n(
+    term: LearntTerm, frame: Frame, values: tuple[float, ...], speed_m_s: Float64
+) -> Float64:
+    """
+    Return the force of a term at speeds (n,), at the stop [N].
+    """
+    return _Acting(term.term.expression, term, frame, values).force_n(speed_m_s)
+
+
+def _act(term: LearntTerm, frame: Frame, *values: float) -> Action:
+    total = Action()
+    for part, unit in zip(term.parts, term.units, strict=True):
+        total += _action(part, _Acting(part.expression, term, frame, values), unit == PURE)
+    return total
+
+
+def _action(part: TermPart, acting: _Acting, is_share: bool) -> Action:
+    """Return what one part does."""
+    names = set(Formula.parse(part.expression).names)
+    match part.channel:
+        case 'force' if 't' in names:
+            return Action(turns=_in_time(acting))
+        case 'force':
+            return Action(resistance=(acting.force_n,))
+        case 'log' if names & {'u', 't', *_BY_SPEED}:
+            return Action(log_error=(acting.reading_m_s,))
+    amount = float(acting.at())
+    match part.channel:
+        case 'water' | 'air':
+            return _moved(part, acting)
+        case 'log':
+            return Action(log_factor=amount) if is_share else Action(log_offset_m_s=amount)
+        case 'inertia' if is_share:
+            return Action(n_r_change=amount)
+        case 'inertia':
+            return Action(mass_fraction=amount / acting.frame.ship.mass_kg)
+        case _:
+            field: dict[str, Any] = {_FIELDS[part.channel]: amount}
+            return Action(**field)
+
+
+def _moved(part: TermPart, acting: _Acting) -> Action:
+    """Return a velocity of water or air, stated along the first run and to port of it."""
+    frame = acting.frame
+    both = acting, replace(acting, text=part.to_port or '0')
+    at_stop, at_end = (
+        np.array([float(each.at(0.0, time_s)) for each in both])
+        for time_s in (0.0, frame.scenario.duration_s)
+    )
+    if part.channel == 'air':
+        return Action(wind_m_s=frame.earth(*at_stop.tolist()))
+    return Action(
+        current_m_s=frame.earth(*at_stop.tolist()),
+        current_change_m_s=frame.earth(*(at_end - at_stop).tolist()),
+    )
+
+
+_FIELDS = {
+    'ground': 'radar_factor',
+    'clock': 'log_late_s',
+    'filter': 'log_lag_s',
+    'shaft': 'stall_m_s',
+    'depth': 'depth_m',
+}
+
+
+def _in_time(acting: _Acting) -> tuple[Turn, ...]:
+    """Return a drag over the square of the speed that grows and falls in time."""
+    last = max(acting.frame.scenario.duration_s, 1.0)
+    knots = np.linspace(0.0, last, _KNOTS + 1)
+    # where much happens early, as of a decay, knots stand closer there
+    knots = last * (knots / last) ** 1.5
+    force = acting.at(1.0, knots)
+    area = np.broadcast_to(2.0 * force / acting.frame.ship.water.density_kg_m3, knots.shape)
+    turns = [Turn(0.0, _FOR_EVER_S, 0.0, float(area[0]))]
+    for start, end, more in zip(knots[:-1], knots[1:], np.diff(area), strict=True):
+        edge = float(end - start)
+        turns.append(Turn(float(start) + 0.5 * edge, _FOR_EVER_S, 0.0, float(more), edge_s=edge))
+    return tuple(turn for turn in turns if turn.drag_area_m2 != 0.0)
