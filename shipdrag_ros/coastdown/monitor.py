@@ -368,10 +368,26 @@ class Monitor:
         if regimes.gliding < announce:
             return []
         dated = self._unreported(regimes)
-        return [self._begin_glide(dated[-1], number)] if dated else []
+        if not dated:
+            return []
+        events = [event for one in dated[:-1] for event in self._all_of(one, regimes, number)]
+        return [*events, self._begin_glide(dated[-1], number)]
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
         return [each for each in regimes.glides() if each.begin_s >= self._reported_s]
+
+    def _all_of(self, one: Dated, regimes: RegimeFilter, number: int) -> list[Event]:
+        """Report a glide that was never announced."""
+        begun = self._begin_glide(one, number)
+        cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
+        return [begun, *self._end_one(one, cause)]
+
+    def _end_one(self, one: Dated, cause: EndedBy) -> list[Event]:
+        assert self._running is not None
+        end_ns = round(one.end_s * SECOND_NS)
+        events = self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
+        self._running, self._reported_s = None, one.end_s
+        return events
 
     def _begin_glide(self, dated: Dated, number: int) -> Onset:
         assert self._candidate is not None
@@ -391,12 +407,11 @@ class Monitor:
                 ended_by or EndedBy.ENGINE, end_ns, Doubt(reason, text), self._final_estimator
             )
         else:
-            one = dated[-1]
-            cause = ended_by or regimes.ended_by(one.after)
-            events = self._running.end(
-                cause, round(one.end_s * SECOND_NS), None, self._final_estimator, _chosen(one)
-            )
-            self._reported_s = one.end_s
+            one = dated[0]
+            events = self._end_one(one, ended_by or regimes.ended_by(one.after))
+            number = int(self._memory.watch.seen[0])
+            for other in dated[1:]:
+                events += self._all_of(other, regimes, number)
         self._running = None
         self._memory.watch.update_ns[0] = ALWAYS
         return events
@@ -407,12 +422,7 @@ class Monitor:
         events: list[Event] = []
         dated = self._unreported(regimes)
         for one in dated:
-            events.append(self._begin_glide(one, number))
-            assert self._running is not None
-            end_ns = round(one.end_s * SECOND_NS)
-            cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
-            events += self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
-            self._running, self._reported_s = None, one.end_s
+            events += self._all_of(one, regimes, number)
         if not dated and self._reported_s < self._candidate.start and regimes.doubted:
             reason, text = regimes.dismissal()
             start_ns, end_ns = self._candidate.start * SECOND_NS, (number + 1) * SECOND_NS

@@ -21,7 +21,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.regimes.numbers import NUMBERS, table
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 
 START_NS = 1_700_000_000_000_000_000
@@ -51,14 +51,14 @@ def of(kind, events):
 
 @pytest.mark.parametrize(
     ('sensors', 'within_s'),
-    [((LOG,), 20.0), ((LOG, SHAFT), 25.0), ((TRACK, COMPASS), 30.0), ((LOG, TRACK), 25.0)],
+    [((LOG,), 10.0), ((LOG, SHAFT), 5.0), ((TRACK, COMPASS), 10.0), ((LOG, TRACK), 5.0)],
 )
 @pytest.mark.parametrize('seed', [1, 2])
 def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s, seed) -> None:
     block = record(sensors=sensors, seed=seed)
     (ended,) = [each for each in of(EndedCoastdown, events_of(ship, block)) if not each.withdrawn]
-    # the thrust falls as exp(-t / 8 s): a twentieth is left after 24 s
-    assert abs(ended.start_ns - START_NS - 900 * S) < within_s * S
+    # the thrust falls as exp(-t / 8 s): as much speed is lost as by an abrupt stop at 8 s
+    assert abs(ended.start_ns - START_NS - 905 * S) < within_s * S
     assert ended.end_ns > START_NS + 1700 * S
     assert ended.estimate is not None
 
@@ -81,13 +81,47 @@ def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
 
 
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
-    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.5, thrust=0.25))
+    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.3, thrust=0.07))
     block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
     monitor = Monitor(ship, replace(FILTER, update_s=5.0))
     updates = of(Update, [*monitor.update(block), *monitor.finish()])
     made = [each.forecast is not None for each in updates]
     assert any(made)
     assert not made[-1]
+
+
+@pytest.mark.parametrize('at_s', [-30, 60, 300])
+def test_fixes_on_another_mark_are_no_turn(ship, record, at_s) -> None:
+    block = record(sensors=(LOG, replace(TRACK, sd=10.0)), seed=0)
+    moved = (block.channel == Channel.POSITION) & (block.stamp_ns >= START_NS + (900 + at_s) * S)
+    value = block.value.copy()
+    value[moved] += 106.0
+    (ended,) = of(EndedCoastdown, events_of(ship, replace(block, value=value)))
+    assert ended.ended_by is EndedBy.RECORD_END
+    assert abs(ended.start_ns - START_NS - 905 * S) < 10 * S
+
+
+@pytest.mark.parametrize('apart_s', [20.0, 90.0])
+def test_of_several_shafts_the_last_that_stops_counts(ship, record, apart_s) -> None:
+    orders = (
+        EngineOrder(0.0, shaft=1.0, thrust=0.5),
+        EngineOrder(apart_s, shaft=0.0, thrust=0.0),
+    )
+    block = record(orders=orders, duration_s=1200.0)
+    since = (block.stamp_ns - START_NS) / S - 900.0
+    rng = np.random.default_rng(4)
+    shafts = [
+        Block.of(
+            channel,
+            block.stamp_ns,
+            11.0 * np.minimum(1.0, np.exp((stop_s - since) / 8.0))
+            + 0.03 * rng.standard_normal(len(block)),
+        )
+        for channel, stop_s in ((Channel.SHAFT, 0.0), (Channel.SHAFT_2, apart_s))
+    ]
+    both = in_arrival_order([block, *shafts])
+    (ended,) = [each for each in of(EndedCoastdown, events_of(ship, both)) if not each.withdrawn]
+    assert -1.0 <= (ended.start_ns - START_NS) / S - 900.0 - apart_s <= 10.0
 
 
 def test_positions_are_believed_beside_a_log_that_says_nothing_true(ship, record) -> None:

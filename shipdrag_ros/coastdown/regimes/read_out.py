@@ -15,6 +15,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     GLIDE,
     GLIDE_TURN,
+    HELD,
+    KIND,
     LEVEL,
     SWITCHES,
     TURN,
@@ -23,26 +25,6 @@ from shipdrag_ros.coastdown.regimes.state import (
 )
 from shipdrag_ros.samples import Float64
 
-PATHS = 4
-
-
-class Path(NamedTuple):
-    """
-    One way in which a coastdown may have gone.
-
-    Attributes
-    ----------
-    stop_s, begin_s, end_s
-        When the thrust began to fall, when it was gone, and the switch out [s of the bank].
-    probability
-        Of all the paths that hold this coastdown.
-    """
-
-    stop_s: float
-    begin_s: float
-    end_s: float
-    probability: float
-
 
 class SmoothedGlide(NamedTuple):
     """
@@ -50,31 +32,32 @@ class SmoothedGlide(NamedTuple):
 
     Attributes
     ----------
-    stop_s, begin_s, end_s
-        Medians of when the thrust began to fall, was gone, and of the end [s of the bank].
+    stop_s, date_s, begin_s, end_s
+        Medians of when the thrust began to fall, of when an abrupt stop would have cost as much
+        speed or a shaft shows the thrust gone, of when it was gone, and of the end [s of the
+        bank].
     begin_sd_s
         Standard deviation of `begin_s`.
     probability
         The largest in it.
     after
         Regime that follows; -1 where none does.
-    paths
-        The likeliest ones, at most `PATHS`.
     """
 
     stop_s: float
+    date_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
     probability: float
     after: int
-    paths: tuple[Path, ...]
 
 
 class _Stretches(NamedTuple):
-    """Every glide of every history: stop, begin, end, weight, and what follows."""
+    """Every glide of every history: stop, date, begin, end, weight, and what follows."""
 
     stop_s: Float64
+    date_s: Float64
     begin_s: Float64
     end_s: Float64
     weight: Float64
@@ -92,16 +75,13 @@ def _stretches(bank: Bank, setting: BankSetting) -> _Stretches:
     last = columns + 1 >= switches[rows]
     following = np.minimum(columns + 1, SWITCHES - 1)
     end = np.where(last, now_s, at[rows, following])
-    begin = np.minimum(at[rows, columns] + ramp[rows, columns], end)
+    stop, lasts = at[rows, columns], ramp[rows, columns]
+    seen = (setting.shafts > 0) & (all_.whole[rows, KIND] < HELD)
+    # the revs fall evenly: an abrupt stop after a third of that costs as much speed
+    date = np.minimum(stop + np.where(seen, lasts, lasts / 3.0), end)
+    begin = np.minimum(stop + lasts, end)
     after = np.where(last, -1, what[rows, following])
-    return _Stretches(at[rows, columns], begin, end, weight[rows], after)
-
-
-def gliding(bank: Bank, setting: BankSetting) -> Float64:
-    """
-    Return P(gliding) in each bin since the start, given all that came.
-    """
-    return _gliding(_stretches(bank, setting), int(bank.histories.clock[0]), setting.step_s)
+    return _Stretches(stop, date, begin, end, weight[rows], after)
 
 
 def _gliding(found: _Stretches, bins: int, step_s: float) -> Float64:
@@ -145,22 +125,14 @@ def glides(bank: Bank, setting: BankSetting, speed: Float64) -> list[SmoothedGli
 def _one(found: _Stretches, peak: float) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
-    stop, begin, end = (
-        _median(each, share) for each in (found.stop_s, found.begin_s, found.end_s)
+    stop, date, begin, end = (
+        _median(each, share) for each in (found.stop_s, found.date_s, found.begin_s, found.end_s)
     )
     mean = float(share @ found.begin_s)
     sd = float(np.sqrt(max(share @ found.begin_s**2 - mean**2, 0.0)))
     codes = np.arange(-1, GLIDE_TURN + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
-    best = np.argsort(-share, kind='stable')[:PATHS]
-    paths = tuple(
-        Path(
-            float(found.stop_s[k]), float(found.begin_s[k]), float(found.end_s[k]),
-            float(share[k]),
-        )
-        for k in best
-    )  # fmt: skip
-    return SmoothedGlide(min(stop, begin), begin, end, sd, peak, after, paths)
+    return SmoothedGlide(min(stop, date), date, max(date, begin), end, sd, peak, after)
 
 
 def _median(value: Float64, share: Float64) -> float:

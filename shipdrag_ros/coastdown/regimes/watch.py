@@ -31,7 +31,7 @@ _LATE = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _EVEN = 0.95
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
-_RAN_DOWN_S = 15.0  # a run-down that is worth a word
+_RAN_DOWN_S = 40.0  # a run-down that no shaft shows and that is no part of the glide
 
 _ENDED = {
     LEVEL: EndedBy.ENGINE,
@@ -49,7 +49,7 @@ _WHY = {
 
 class Dated(NamedTuple):
     """
-    A glide in seconds since the epoch; `slow_s` is how long its thrust ran down.
+    A glide in seconds since the epoch; `slow_s` is how long its thrust ran down before it.
     """
 
     begin_s: float
@@ -153,11 +153,12 @@ class RegimeFilter:
     def _dated(self, glide: SmoothedGlide) -> Dated:
         zero = self._first * self._width
         slow_s = glide.begin_s - glide.stop_s
+        slow = not self._setting.shafts and slow_s > _RAN_DOWN_S * self._setting.pace
         return Dated(
-            zero + glide.begin_s,
+            zero + (glide.begin_s if slow else glide.date_s),
             zero + glide.end_s,
             glide.begin_sd_s,
-            slow_s if slow_s > _RAN_DOWN_S * self._setting.pace else 0.0,
+            slow_s if slow else 0.0,
             glide.probability,
             glide.after,
         )
