@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -31,9 +32,10 @@ _GAIN = either_sign(0.04, 0.8)  # of A in a log: share of the speed
 _TURNS_AT = (0.55, 0.45)  # share of the highest speed: median, sd of the logarithm
 _LASTS = (0.25, 0.8)  # share of the longest run: the same
 _NARROW, _BROAD = 0.03, 0.1  # widths of steps, shares of the same
-_HUMPS = (0.06, 0.12, 0.24)
+_HUMP = (0.12, 0.6)  # width of a hump, the same: median, sd of the logarithm
+_THINNEST = 0.02  # of a hump, the same
 _SCAN = (-1.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.6)  # z where a curve may turn
-_SIZES = (-1.2, 0.0, 1.2)  # z of a size alone
+_SIZES = (-1.2, 0.0, 1.2)  # z of a size alone, and of a width
 _WAYS_ROUND = ((1.0, 0.0), (0.7, 0.7), (0.05, 1.0), (-0.7, 0.7))  # z of two components
 _REFERENCE = 0.2  # Froude number at which A is of the same size whatever the power
 
@@ -110,7 +112,8 @@ class LearnableForm:
         if len(self.priors) == 1:
             starts = [(z,) for z in _SIZES]
         elif self.priors[1].shape is Shape.LOG_NORMAL:
-            starts = [(0.0, z) for z in _SCAN]
+            wide = product(_SIZES, repeat=len(self.priors) - 2)
+            starts = [(0.0, z, *each) for z, each in product(_SCAN, wide)]
         elif len(self.priors) == 2:
             starts = list(_WAYS_ROUND)
         return [replace(way, start=start) for way in first.values() for start in starts]
@@ -181,9 +184,8 @@ def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
             for width in (_NARROW, _BROAD):
                 step = f'step({side}, {width * top:.3g}*sqrt(g*L))'
                 yield 'speed', 'step', f'{base}*{step}', turns
-        for width in _HUMPS:
-            away = f'((u - u_c*sqrt(g*L))/({width * top:.3g}*sqrt(g*L)))**2'
-            yield 'speed', 'hump', f'{base}*exp(-{away})', turns
+        hump = _hump('u', 'u_c', 'sqrt(g*L)', top)
+        yield 'speed', 'hump', f'{base}*{hump}', turns | _width(top)
         yield 'speed', 'decay', f'{base}*exp(-u/(u_c*sqrt(g*L)))', turns
     for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
         for power in (1, 2):
@@ -204,9 +206,7 @@ def _of_log(ship: Ship, span: Span) -> Iterator[_Declared]:
         for width in (_NARROW, _BROAD):
             yield 'speed', 'step', f'A*u*step({side}, {width * top:.3g}*sqrt(g*L))', turns
         yield 'speed', 'ramp', f'A*max({side}, 0*u)', turns
-    for width in _HUMPS:
-        away = f'((u - u_c*sqrt(g*L))/({width * top:.3g}*sqrt(g*L)))**2'
-        yield 'speed', 'hump', f'A*u*exp(-{away})', turns
+    yield 'speed', 'hump', f'A*u*{_hump("u", "u_c", "sqrt(g*L)", top)}', turns | _width(top)
 
 
 def _over_time(base: str, size: Prior, ship: Ship, span: Span) -> Iterator[_Declared]:
@@ -223,9 +223,8 @@ def _over_time(base: str, size: Prior, ship: Ship, span: Span) -> Iterator[_Decl
         for width in (_NARROW, _BROAD):
             step = f'step({side}, {width * longest:.3g}*sqrt(L/g))'
             yield 'time', 'step', f'{base}*{step}', lasts
-    for width in _HUMPS:
-        away = f'((t - {tau})/({width * longest:.3g}*sqrt(L/g)))**2'
-        yield 'time', 'hump', f'{base}*exp(-{away})', lasts
+    hump = _hump('t', 'tau', 'sqrt(L/g)', longest)
+    yield 'time', 'hump', f'{base}*{hump}', lasts | _width(longest)
     for period in (0.15, 0.3, 0.6):
         turn = f'{2.0 * np.pi / (period * longest):.4g}*t*sqrt(g/L)'
         both = f'(A*cos({turn}) + B*sin({turn}))'
@@ -262,6 +261,16 @@ def _by_heading() -> Iterator[_Declared]:
         yield 'heading', 'periodic', _as_power(power).replace('A', both), _two(_SIZE)
     some = _as_power(2) + '*(1 + b*cos(psi) + c*sin(psi))'
     yield 'heading', 'periodic', some, {'A': _SIZE, 'b': normal(0.7), 'c': normal(0.7)}
+
+
+def _hump(variable: str, at: str, unit: str, whole: float) -> str:
+    """Return a bell about a speed or a time, of some width."""
+    width = f'max(w, {_THINNEST * whole:.3g})*{unit}'
+    return f'exp(-(({variable} - {at}*{unit})/({width}))**2)'
+
+
+def _width(whole: float) -> dict[str, Prior]:
+    return {'w': log_normal(_HUMP[0] * whole, _HUMP[1])}
 
 
 def _two(size: Prior) -> dict[str, Prior]:

@@ -35,6 +35,7 @@ from shipdrag_ros.simulation.scenario import Turn
 
 _KNOTS = 24  # of a force in time: straight between them
 _FOR_EVER_S = 1e7
+_STEP = 0.01  # of a speed, over which a power is looked at
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
 _SCALES: Mapping[str, Scale] = {
     scale.text: scale for scale in (ABSOLUTE, WEIGHTS, AREAS, SPEEDS, DRAUGHTS)
@@ -163,12 +164,26 @@ class _Acting:
         return worth(self.text, known | {'u': speed_m_s, 't': self.term.inside('t', time_s)})
 
     def force_n(self, speed_m_s: Float64) -> Float64:
-        """Return a force; beyond the speeds that it holds for it goes on as their square."""
+        """
+        Return a force.
+
+        Above the speeds that it holds for it goes on as their square; below them as the power
+        of the speed that it is at their end, 0 to 2.
+        """
         inside = self.term.inside('u', speed_m_s)
         force = np.broadcast_to(self.at(inside), np.shape(speed_m_s))
-        beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0) ** 2
-        found: Float64 = force * beyond
+        beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0)
+        power = 2.0 if np.all(beyond >= 1.0) else self._power()
+        found: Float64 = force * np.where(beyond < 1.0, beyond**power, beyond**2)
         return found
+
+    def _power(self) -> float:
+        """Return the power of the speed that a force is at the lowest that it holds for."""
+        low = self.term.term.valid['u'][0]
+        here, faster = (float(self.at(speed)) for speed in (low, low * (1.0 + _STEP)))
+        if here * faster <= 0.0:
+            return 2.0
+        return min(max(math.log(faster / here) / math.log1p(_STEP), 0.0), 2.0)
 
     def reading_m_s(self, speed_m_s: Float64, since_s: Float64) -> Float64:
         """Return what the log reads too much; before the stop, as at the stop."""

@@ -14,6 +14,19 @@ from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
 from shipdrag_ros.parameter import half_normal, log_normal, normal
 
 
+def test_the_last_digit_of_a_weight_moves_no_limit() -> None:
+    sizes = [
+        SizePosterior(w, z, 0.7, normal(0.1)) for w, z in ((0.4, -1.0), (0.3, 0.5), (0.3, 2.0))
+    ]
+    moved = [each._replace(weight=each.weight * (1.0 + 1e-13 * k)) for k, each in enumerate(sizes)]
+    for share in (0.05, 0.5, 0.95):
+        assert quantile(moved, share) == pytest.approx(quantile(sizes, share), rel=1e-9)
+    # one hypothesis: a share that falls between two of its points
+    for factor in (1.0 - 1e-12, 1.0 + 1e-12):
+        alone = quantile([SizePosterior(0.3 * factor, 0.0, 1.0, half_normal(1.0))], 0.95)
+        assert alone == pytest.approx(1.95996, rel=1e-4)
+
+
 def test_the_limit_of_a_size_is_the_quantile_of_its_distribution() -> None:
     alone = quantile([SizePosterior(0.3, 0.0, 1.0, normal(0.1))], 0.95)
     assert alone == pytest.approx(0.1 * norm.ppf(0.975), rel=0.02)

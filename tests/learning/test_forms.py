@@ -18,7 +18,7 @@ FORMS = forms(SHIP, SPAN)
 
 
 def test_there_are_forms_by_each_variable() -> None:
-    assert len(FORMS) >= 70
+    assert len(FORMS) >= 60
     by_force = {form.kind[1] for form in FORMS if form.kind[0] == 'force'}
     assert by_force == {'speed', 'time', 'heading', 'date', 'depth'}
     assert {form.kind[1] for form in FORMS if form.kind[0] == 'log'} == {'speed', 'time'}
@@ -40,6 +40,28 @@ def test_each_acts_at_every_start(form: LearnableForm) -> None:
         acts.append(np.abs(shown).max() + len(action.turns))
         assert np.isfinite(shown).all()
     assert max(acts) > 0.0
+
+
+def test_a_hump_has_a_width_of_its_own() -> None:
+    humps = [form for form in FORMS if form.kind[2] == 'hump']
+    assert {form.kind[:2] for form in humps} == {('force', 'speed'), ('force', 'time')} | {
+        ('log', 'speed'),
+        ('log', 'time'),
+    }
+    scenario = Scenario(speed_m_s=7.0, day=20005.0, depth_m=15.0)
+    speed = np.linspace(0.5, 7.0, 400)
+    form = next(form for form in humps if form.kind[:2] == ('force', 'speed'))
+    effect = form.effect()
+    places = [q.name for q in effect.parameters]
+    assert places == ['A', 'u_c', 'w']
+    root = float(SHIP.speed(1.0))
+    for width in (0.01, 0.02):
+        action = effect.action(Frame(SHIP, scenario, 0.0), 0.01, 4.0 / root, width)
+        over = action.resistance_n(speed) / speed ** (
+            2 if 'u**2*exp' in form.term.term.expression else 0
+        )
+        half = speed[over > over.max() / np.e]
+        assert half[-1] - half[0] == pytest.approx(2.0 * width * root, rel=0.05)
 
 
 def test_what_the_runs_do_not_hold_is_not_tried() -> None:

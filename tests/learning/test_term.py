@@ -133,6 +133,19 @@ def test_beyond_its_speeds_a_force_goes_on_as_the_square() -> None:
     assert force_n(term, frame_of(ship), (0.002, 0.09), np.array([0.0]))[0] == 0.0
 
 
+@pytest.mark.parametrize(('factor', 'power'), [('g*L', 0.0), ('u*sqrt(g*L)', 1.0), ('u**2', 2.0)])
+def test_below_its_speeds_a_force_goes_on_as_it_is_there(factor: str, power: float) -> None:
+    text = f"""
+name: held
+term: {{channel: force, scope: hull, variable: speed, shape: power,
+  expression: "0.5*rho*A*nabla**(2/3)*{factor} + 0*rho*nabla**(2/3)*u**2", valid: {{u: [2, 8]}}}}
+parameters: {{A: {{value: 0.01, sd: 0}}}}
+"""
+    speed = np.array([4.0, 2.0, 1.0, 0.5, 0.0])
+    force = force_n(LearntTerm.from_yaml(text), frame_of(Ship.example()), (0.01,), speed)
+    np.testing.assert_allclose(force, force[0] * (speed / 4.0) ** power, rtol=1e-6)
+
+
 def test_a_force_in_time_is_followed() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(FADING)
     scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
