@@ -292,3 +292,11 @@ def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Flo
     there = each[:, COUNT] != 0
     time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
     return time, each[there, SPEED] / PER_UNIT
+
+
+def forget_speeds(bins: Bins, source: int) -> None:
+    """
+    Take the closed bins of a speed source out of the totals.
+    """
+    totals = bins.speeds[source]
+    totals[:] = totals[int(bins.closed[source]) & (len(totals) - 1)].copy()

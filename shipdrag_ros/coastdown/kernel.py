@@ -62,6 +62,7 @@ class WalkEvent(IntEnum):
     BIN = 4  # a bin of the watched source has closed
     SLOPE = 5  # the speed falls faster than chance explains
     SHAFT = 6  # a shaft has slowed down, or its pitch was taken back
+    LOOK = 7  # log and track are to be compared
 
 
 _FULL = int(WalkEvent.FULL)
@@ -70,17 +71,18 @@ _SILENCE = int(WalkEvent.SILENCE)
 _BIN = int(WalkEvent.BIN)
 _SLOPE = int(WalkEvent.SLOPE)
 _SHAFT_SLOWED = int(WalkEvent.SHAFT)
+_LOOK = int(WalkEvent.LOOK)
 
 
 @compiled(inline=True, uncounted=True)
-def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
-    """Say whether no better source has delivered within data_stop_s."""
+def _is_primary(bins: Bins, watch: Watch, tuning: Tuning, source: int, number: int) -> bool:
+    """Say whether no better source that is not doubted has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
-    best = source
-    for better in range(source):
-        if newest_bin(bins, better) >= oldest:
-            best = min(best, better)
-    return best == source
+    doubted, primary = watch.doubted[source] > number, True
+    for other in range(SOURCES):
+        better = other < source if (watch.doubted[other] > number) == doubted else doubted
+        primary = primary and not (better and newest_bin(bins, other) >= oldest)
+    return bool(primary)
 
 
 @compiled(inline=True, uncounted=True)
@@ -93,7 +95,7 @@ def _wakes(
     for scale in range(SCALES):
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         falls = falls or (slope < -steadiness.limit[source, scale] and level > tuning.speed_min)
-    return falls and watch.armed[0] != 0
+    return falls and watch.armed[0] != 0 and watch.doubted[source] <= number
 
 
 @compiled(inline=True, uncounted=True)
@@ -103,7 +105,7 @@ def _look_at_speed(
     """Judge a closed bin of a speed source; return a `WalkEvent` code, 0 to go on."""
     watched = watch.source[0]
     if watched == NEVER:
-        if not _is_primary(bins, tuning, source, number):
+        if not _is_primary(bins, watch, tuning, source, number):
             return (
                 _SLOPE
                 if tuning.all_wake and _wakes(bins, steadiness, watch, tuning, source, number)
@@ -224,6 +226,9 @@ def walk(
                 stop = _SILENCE
                 break
             number = stamp // SECOND_NS
+            if number >= watch.look[0]:
+                stop = _LOOK
+                break
             if bins.samples[c] > 0 and number > bins.filling[c]:
                 closed = close(bins, c, tuning.slopes.width)
                 if c < SOURCES:

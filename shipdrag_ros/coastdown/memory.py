@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.bins import SOURCES, Bins
 from shipdrag_ros.coastdown.ring import RingBuffer, first_store
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness
 from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, CheckMemory, Limits
@@ -47,6 +47,10 @@ class Watch(NamedTuple):
     lead : (2,) int64
         Since which bin the ship has been steady, NEVER if it is not; the longest that it was
         [bins].
+    look : int64
+        The bin at whose first sample log and track are compared next.
+    doubted : (sources,) int64
+        Bin up to which each source is not used: another contradicts it.
     """
 
     source: Int64
@@ -58,6 +62,8 @@ class Watch(NamedTuple):
     level: Float64
     falls: Int64
     lead: Int64
+    look: Int64
+    doubted: Int64
 
     @classmethod
     def fresh(cls) -> Watch:
@@ -74,6 +80,8 @@ class Watch(NamedTuple):
             np.full(1, np.nan),
             np.zeros(1, np.int64),
             np.array([NEVER, 0]),
+            np.full(1, NEVER),
+            np.full(SOURCES, NEVER),
         )
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES
+from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.driving import start_of
@@ -41,6 +41,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
+from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
@@ -116,6 +117,8 @@ class Monitor:
         )
         self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
+        self._craft = Craft(ship.length_m, self._tuning.speed_min)
+        self._vouching = Vouching(self._craft)
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None
@@ -170,11 +173,12 @@ class Monitor:
 
     def doubts(self) -> dict[str, str]:
         """
-        Say which inputs contradict each other: a heading its course, a speed by its unit.
+        Say which inputs contradict each other: a speed another speed, a heading its course.
         """
         bins = self._memory.bins
         heading = heading_doubt(bins, self._parameters.heading_convention)
-        return unit_doubts(bins) | ({'heading': heading} if heading else {})
+        found = self._vouching.texts | unit_doubts(bins)
+        return found | ({'heading': heading} if heading else {})
 
     def health(self) -> dict[str, InputHealth]:
         """
@@ -209,6 +213,8 @@ class Monitor:
                 events.append(self._update(int(stamp_ns[at])))
             elif stop == WalkEvent.BIN:
                 events += self._judge()
+            elif stop == WalkEvent.LOOK:
+                self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
                     events += self._stop_at_last_sample(EndedBy.DATA_STOP)
@@ -238,6 +244,7 @@ class Monitor:
         events = self._stop_at_last_sample(EndedBy.RESET)
         events += self._dismissals.flush()
         self._memory, self._reported_s = self._fresh(self._memory.tally), -np.inf
+        self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
     def engine_stopped(self, receive_ns: int) -> str:
@@ -298,6 +305,19 @@ class Monitor:
 
     # what the walk stopped for
 
+    def _vouch(self, now_ns: int) -> None:
+        """Compare log and track, and go on with one that is sound."""
+        watch, number = self._memory.watch, now_ns // SECOND_NS
+        watched = int(watch.source[0])
+        bins, width = self._memory.bins, self._tuning.slopes.width
+        for source in self._vouching.look(bins, number, width, hold=watched != NEVER):
+            forget_speeds(bins, source)
+            self._memory.steadiness.forget(source)
+        watch.look[0] = (number // LOOK_S + 1) * LOOK_S
+        watch.doubted[:] = self._vouching.until
+        if watched != NEVER and watch.doubted[watched] > number:
+            self._fall_back(now_ns)
+
     def _make_room(self) -> None:
         store = make_room(
             self._memory.store,
@@ -308,7 +328,7 @@ class Monitor:
         self._memory = self._memory._replace(store=store)
 
     def _propose(self, source: int, number: int, *, noticed: bool) -> None:
-        watch, bins = self._memory.watch, self._memory.bins
+        watch, bins = self._memory.watch, self._vouching.sound(self._memory.bins)
         watch.source[0] = source
         seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
         if self._parameters.regimes == 'filter':
@@ -323,7 +343,7 @@ class Monitor:
 
     def _judge(self) -> list[Event]:
         assert self._candidate is not None
-        bins, steadiness = self._memory.bins, self._memory.steadiness
+        bins, steadiness = self._vouching.sound(self._memory.bins), self._memory.steadiness
         tuning, parameters = self._tuning, self._parameters
         number = int(bins.filling[self._candidate.source])
         if self._regimes is not None:
@@ -351,7 +371,9 @@ class Monitor:
     def _follow(self, regimes: RegimeFilter, number: int) -> list[Event]:
         """Let the filter take what has come up to a second."""
         events: list[Event] = []
-        while self._regimes is regimes and regimes.advance(self._memory.bins, number):
+        while self._regimes is regimes and regimes.advance(
+            self._vouching.sound(self._memory.bins), number
+        ):
             events += self._decide(regimes, number)
         return events
 
@@ -449,7 +471,8 @@ class Monitor:
         for source in range(SOURCES):
             # by the rule that found the other silent: or both would be tried in turn for ever
             silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
-            if source == failed or silent or np.isnan(steadiness.limit[source, 0]):
+            doubted = self._memory.watch.doubted[source] > now_ns // SECOND_NS
+            if source == failed or silent or doubted or np.isnan(steadiness.limit[source, 0]):
                 continue
             self._memory.watch.source[0] = source
             other = replace(self._candidate, source=source, slope_sd=np.nan)
@@ -484,6 +507,7 @@ class Monitor:
             late_ns=self._tuning.limits.late_ns,
             capacity=CAPACITY,
         )
+        kept = self._vouching.kept(kept)
         return Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )

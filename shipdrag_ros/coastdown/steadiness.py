@@ -138,6 +138,11 @@ class Steadiness(NamedTuple):
             np.empty(4 * slopes.width),
         )
 
+    def forget(self, source: int) -> None:
+        """Return a source to the state before its first bin."""
+        self.slope[source] = self.limit[source] = self.slope_sd[source] = np.nan
+        self.changes[source], self.due[source] = np.inf, NEVER
+
 
 @compiled(inline=True, uncounted=True)
 def update_limits(

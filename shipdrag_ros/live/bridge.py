@@ -41,6 +41,7 @@ from shipdrag_ros.live.headline import (
     lead_check,
     reciprocal_check,
     rudder_check,
+    shaft_check,
     wind_check,
 )
 from shipdrag_ros.live.outputs import (
@@ -115,7 +116,13 @@ _SPEEDS = (
     ('speed_through_water', 'through water'),
     ('speed_over_ground', 'over ground'),
 )  # with the columns of the trace
-_CHECKED = {'Wind': 'wind_apparent', 'Depth': 'depth', 'Rudder': 'rudder', 'Course': 'heading'}
+_CHECKED = {
+    'Wind': 'wind_apparent',
+    'Depth': 'depth',
+    'Rudder': 'rudder',
+    'Course': 'heading',
+    'Shaft': 'shaft',
+}
 
 _AnyPart = PagePart | list[Any] | None
 
@@ -517,11 +524,13 @@ class Bridge:
         turned = None if course is None or before is None else course - before
         depth = self._recent.mean(Channel.DEPTH, second)
         rudder = self._recent.mean(Channel.RUDDER, second)
+        shaft = self._recent.mean(Channel.SHAFT, second)
         checks = [
             lead_check(lead_s, now.ready_s),
             wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
             depth_check(depth and depth[0], speed_m_s, self._ship),
             rudder_check(rudder and rudder[0]),
+            shaft_check(shaft and shaft[0]),
             course_check(turned, coasting=coasting),
             reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
         ]

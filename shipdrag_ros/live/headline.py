@@ -28,6 +28,9 @@ _RECENT_S = 60
 _GRAVITY_M_S2 = 9.81
 
 
+_ASTERN_RAD_S = 0.5  # 5 rpm
+
+
 class Held(StrEnum):
     """Whether a condition holds."""
 
@@ -55,7 +58,13 @@ class Recent:
     def __init__(self) -> None:
         self._seconds: dict[Channel, deque[tuple[int, float, float]]] = {
             channel: deque()
-            for channel in (Channel.RUDDER, Channel.HEADING, Channel.WIND_APPARENT, Channel.DEPTH)
+            for channel in (
+                Channel.RUDDER,
+                Channel.HEADING,
+                Channel.WIND_APPARENT,
+                Channel.DEPTH,
+                Channel.SHAFT,
+            )
         }
 
     def add(self, block: Block) -> None:
@@ -149,6 +158,18 @@ def rudder_check(angle_rad: float | None) -> Check:
     held = abs(angle_rad) <= RUDDER_RAD
     text = f'{math.degrees(abs(angle_rad)):.0f}° mean of the last minute'
     return Check(name, Held.YES if held else Held.NO, text if held else f'{text}: amidships')
+
+
+def shaft_check(rate_rad_s: float | None) -> Check:
+    """
+    Say how fast the shaft turns; ask where none is received: an engine astern makes r too large.
+    """
+    name = 'Shaft'
+    if rate_rad_s is None:
+        return Check(name, Held.UNKNOWN, 'not received: is the engine stopped, and not astern?')
+    text = f'{rate_rad_s * 30.0 / math.pi:.0f} rpm'
+    astern = rate_rad_s < -_ASTERN_RAD_S
+    return Check(name, Held.NO if astern else Held.YES, f'{text}: astern' if astern else text)
 
 
 def course_check(turned_rad: float | None, *, coasting: bool) -> Check:

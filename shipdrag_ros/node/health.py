@@ -214,6 +214,10 @@ def _state(standing: Standing, inputs: Sequence[InputState]) -> tuple[int, str]:
     if standing.monitor is State.WAITING:
         lead = f'{standing.steady_lead_s:.0f} of {standing.steady_needed_s:.0f} s'
         text = f'waiting: not enough steady sailing yet to know a coastdown by, {lead}'
+    elif standing.monitor is State.COASTDOWN and not any(
+        each.fresh for each in inputs if each.name == 'shaft'
+    ):
+        text += '; no shaft is received: is the engine stopped, and not astern?'
     return (WARN, f'{text}; not well, {said}') if unwell else (OK, text)
 
 

@@ -30,6 +30,7 @@ from shipdrag_ros.live.headline import (
     lead_check,
     reciprocal_check,
     rudder_check,
+    shaft_check,
     wind_check,
 )
 from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
@@ -290,6 +291,9 @@ def test_bytes_that_are_none_of_the_outputs_are_said_once_and_change_nothing_els
         (depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
         (depth_check(None, 8.0, None), Held.UNKNOWN),
         (rudder_check(math.radians(-4.0)), Held.YES),
+        (shaft_check(None), Held.UNKNOWN),
+        (shaft_check(2.0), Held.YES),
+        (shaft_check(-2.0), Held.NO),
         (rudder_check(math.radians(-6.0)), Held.NO),
         (course_check(math.radians(359.0), coasting=True), Held.YES),
         (course_check(math.radians(-30.0), coasting=True), Held.NO),

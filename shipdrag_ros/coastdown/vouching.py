@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Log and track vouch for each other: do all of them still measure the ship?
+
+The last minute of every speed is compared under these hypotheses, by Bayes' rule: some of
+the sources measure one ship, and log and ground differ by a current; the others say nothing
+about her. Each is a mixture of Gaussians of fixed covariance, so that an evidence is a sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from functools import lru_cache
+from itertools import combinations, product
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import (
+    COUNT,
+    FIRST_TRACK,
+    PER_UNIT,
+    SOURCES,
+    SPEED,
+    Bins,
+    smoothing,
+)
+from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.display import mistaken_units, utc
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
+
+LOOK_S = 10  # from one look to the next
+_LASTS_S = 70  # a contradiction that lasts so long: its source is no longer used ...
+_HOLD_S = 300  # ... until it agreed so long
+_MEAN_S, _MEANS = 5, 10  # a minute
+_LATE_S = 3  # that other inputs may be behind
+_WRONG = 0.9  # probability of a contradiction that is said: a false alarm costs nine misses
+_UNUSED = 0.75  # probability to say nothing of the ship with which a source is not used
+_AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: need not be computed
+# Priors as (value [m/s], weight). Of a ship, and of an instrument that measures her:
+_LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
+_INERTIA = ((0.01, 0.7), (0.1, 0.2))  # change in a second; it grows with the root of time
+_QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
+_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean of a log or a speed over ground
+_TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # radar: 4 to 10 m
+_SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
+_CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
+_DRIFT = 0.01  # its change in a second, in open water
+_SWING, _SWING_S = 1.5, 40.0  # its change while she turns, or crosses an eddy: times the current
+_TURNS = 0.1  # probability of that
+_ASTERN = 0.005  # share of minutes
+# Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
+_ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
+_WANDERS = ((0.0, 0.3), (0.3, 0.7))
+_JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
+_NONSENSE = (0.02, 0.003, 0.003, 0.003)  # share of minutes: a log fouls, a fix hardly ever
+_KM = 0.1  # of a track that says nothing: it is in km
+_STILL = 0.5  # the same of a source that said nothing just before
+
+_LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
+_SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
+_TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
+_WALK = np.minimum.outer(_TIME_S, _TIME_S)
+_TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / _SWING_S) ** 2)
+_OWN = _SLOW**2 * (_SAME + 0.25 * _TURN)  # what an instrument errs by, sound or not
+SpeedMixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
+
+
+def _mixture(parts: list[tuple[Float64, float]]) -> SpeedMixture:
+    """Return a mixture of Gaussians, of a covariance and a weight each."""
+    covariance = np.array([each for each, _ in parts])
+    size = covariance.shape[-1] * math.log(2.0 * math.pi) + np.linalg.slogdet(covariance)[1]
+    return np.linalg.inv(covariance), np.log([weight for _, weight in parts]) - 0.5 * size
+
+
+@lru_cache
+def _nothing() -> SpeedMixture:
+    return _mixture(
+        [
+            (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE + _OWN, a * b * c)
+            for (level, a), (wander, b), (jump, c) in product(_ANYWHERE, _WANDERS, _JUMPS)
+        ]
+    )
+
+
+@lru_cache
+def _one_ship(logs: int, grounds: int, tracks: int, length_m: float) -> SpeedMixture:
+    """Return what sources read that measure her, in the order of the arguments."""
+    parts, count = [], logs + grounds + tracks
+    swings = ((0.0, 1.0 - _TURNS), (_SWING, _TURNS))
+    currents = list(product(_CURRENT, swings)) if 0 < logs < count else [((0.0, 1.0), (0.0, 1.0))]
+    drift = _DRIFT**2 * _WALK * (len(currents) > 1)
+    ground = np.zeros((count, count))
+    ground[logs:, logs:] = 1.0
+    for (level, a), (inertia, b), ((current, c), (swing, d)) in product(
+        _LEVEL, (*_INERTIA, (_QUICK_M_M_S / length_m, _QUICK)), currents
+    ):
+        shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
+        shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
+        for (log, e), (track, f) in product(_NOISE, _TRACK_NOISE if tracks else _NOISE):
+            own = np.kron(np.diag([log**2] * logs + [track**2] * (count - logs)), _WHITE)
+            own += np.kron(np.eye(count), _OWN)
+            parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
+    return _mixture(parts)
+
+
+def _evidence(mixture: SpeedMixture, speed: Float64) -> float:
+    precision, factor = mixture
+    return _log_sum((factor - 0.5 * ((precision @ speed) @ speed)).tolist())
+
+
+def _log_sum(logs: list[float]) -> float:
+    most = max(logs)
+    return most + math.log(math.fsum(math.exp(each - most) for each in logs))
+
+
+def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
+    """Return the log evidence that some sources measure one ship."""
+    logs = int(_LOG in speeds)
+    tracks = sum(source >= FIRST_TRACK for source in speeds)
+    mixture = _one_ship(logs, len(speeds) - logs - tracks, tracks, craft.length_m)
+    ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
+    through = float(speeds[_LOG].mean()) if logs else 0.0
+    if through >= 0.0:
+        return ahead
+    # she makes way astern: over ground a speed has no sign
+    pace = through / craft.slow_m_s
+    rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
+    other = {**speeds, _LOG: -speeds[_LOG]}
+    return min(rare, 0.0) + _log_sum(
+        [ahead, _evidence(mixture, np.concatenate(list(other.values())))]
+    )
+
+
+def sound_probabilities(
+    speeds: Mapping[int, Float64],
+    craft: Craft,
+    *,
+    doubted: Collection[int] = (),
+) -> dict[tuple[int, ...], float]:
+    """
+    Return the probability of each set of sources to be those that measure the ship.
+
+    Parameters
+    ----------
+    speeds : (10,) each
+        Means by source [m/s], at least of two sources.
+    craft
+        How fast she may change her speed, and about how fast she goes astern.
+    doubted
+        Sources that said nothing of her just before.
+    """
+    names, found = sorted(speeds), {}
+    for count in range(len(names) + 1):
+        for sound in combinations(names, count):
+            part = {name: speeds[name] for name in sound}
+            logs = [_measured(part, craft)] if sound else []
+            for name in names:
+                share = _STILL if name in doubted else _NONSENSE[name]
+                logs.append(math.log(1.0 - share if name in sound else share))
+                if name not in sound:
+                    each = [_evidence(_nothing(), speeds[name])]
+                    if name == _METRES and sound:
+                        scaled = {**part, name: 1e3 * speeds[name]}
+                        beside = _measured(dict(sorted(scaled.items())), craft)
+                        each.append(math.log(_KM) + _MEANS * math.log(1e3) + beside - logs[0])
+                    logs.append(_log_sum(each))
+            found[sound] = math.fsum(logs)
+    total = _log_sum(list(found.values()))
+    return {sound: math.exp(each - total) for sound, each in found.items()}
+
+
+class Craft(NamedTuple):
+    """Length of a craft [m], and a speed at which she is slow [m/s]."""
+
+    length_m: float
+    slow_m_s: float
+
+
+class Vouching:
+    """
+    What the sources of one monitor say of each other.
+
+    Parameters
+    ----------
+    craft
+        Below her slow speed nothing is compared.
+
+    Attributes
+    ----------
+    until : (sources,) int64
+        Second up to which each source is not used; what it read before then never is.
+    """
+
+    def __init__(self, craft: Craft) -> None:
+        self.until: Int64 = np.full(SOURCES, NEVER)
+        self._craft = craft
+        self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
+        self._now = NEVER
+        self._said: dict[str, tuple[int, str]] = {}
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """What to say of each input that is doubted."""
+        return {name: text for name, (until, text) in self._said.items() if until > self._now}
+
+    def sound(self, bins: Bins) -> Bins:
+        """Return bins in which the sources that are not used were never read."""
+        doubted = self.until > self._now
+        if not doubted.any():
+            return bins
+        closed, filling = bins.closed.copy(), bins.filling.copy()
+        closed[:SOURCES][doubted] = filling[:SOURCES][doubted] = NEVER
+        return bins._replace(closed=closed, filling=filling)
+
+    def kept(self, block: Block) -> Block:
+        """Return a block without what sources read up to the second since which they are used."""
+        first_ns = np.full(len(Channel), NEVER)
+        first_ns[:SOURCES] = np.maximum(self.until, NEVER // SECOND_NS) * SECOND_NS
+        return block[block.stamp_ns >= first_ns[block.channel]]
+
+    def look(self, bins: Bins, number: int, width: int, *, hold: bool) -> list[int]:
+        """
+        Compare the last minute.
+
+        Parameters
+        ----------
+        bins
+            What the monitor keeps.
+        number
+            The second that has begun.
+        width
+            Of a slope window: the speed of a track is that of some seconds ago.
+        hold
+            Whether something runs that was begun without the sources that are doubted.
+
+        Returns
+        -------
+        list of int
+            Sources that are used again from now on.
+        """
+        if hold:
+            self.until[self.until > self._now] = number + LOOK_S + 1
+        back = np.flatnonzero((self.until > self._now) & (self.until <= number))
+        self._now = number
+        self._compare(bins, number, smoothing(width))
+        return [int(source) for source in back if self.until[source] <= number]
+
+    def _compare(self, bins: Bins, number: int, lag: int) -> None:
+        last = number - _LATE_S - lag
+        speeds = {
+            source: mean
+            for source in range(SOURCES)
+            if len(mean := _means(bins, source, last + lag * (source >= FIRST_TRACK)))
+        }
+        table = np.array(list(speeds.values()))
+        if len(speeds) < 2 or np.abs(table.mean(axis=1)).max() < self._craft.slow_m_s:
+            return
+        if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
+            return
+        doubted = [source for source in speeds if self.until[source] > number]
+        probability = sound_probabilities(
+            speeds,
+            self._craft,
+            doubted=doubted,
+        )
+        wrong = {
+            source: math.fsum(each for sound, each in probability.items() if source not in sound)
+            for source in speeds
+        }
+        contradiction = probability[tuple(speeds)] < 1.0 - _WRONG
+        for source, each in wrong.items():
+            if source in doubted:
+                lasts = each > 1.0 - _WRONG
+            else:  # a radar that takes another mark is odd for the length of its filter
+                begins = NEVER if not (contradiction and each > _UNUSED) else number
+                self._since[source] = (
+                    begins if NEVER in (begins, self._since[source]) else self._since[source]
+                )
+                lasts = begins == number >= self._since[source] + _LASTS_S
+            if lasts:
+                self.until[source] = number + _HOLD_S
+            if lasts or (contradiction and each > 0.5 * max(wrong.values())):
+                text = _doubt(source, speeds, wrong, number, lasts=lasts)
+                self._said[Channel(source).input] = (number + _HOLD_S, text)
+
+
+def _means(bins: Bins, source: int, last: int) -> Float64:
+    """Return means of the speed [m/s] up to a second; none where one is missing."""
+    totals, newest = bins.speeds[source], int(bins.closed[source])
+    edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
+    each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
+    if newest < last - LOOK_S or not each[:, COUNT].all():
+        return np.empty(0)
+    return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
+
+
+def _doubt(
+    source: int,
+    speeds: Mapping[int, Float64],
+    wrong: Mapping[int, float],
+    number: int,
+    *,
+    lasts: bool,
+) -> str:
+    """Say what contradicts what, who is wrong, and what to do."""
+    best = min((each for each in speeds if each != source), key=lambda each: wrong[each])
+    mine, other = float(speeds[source].mean()), float(speeds[best].mean())
+    units = mistaken_units(mine / other) if other else ''
+    used = ', which is used instead' if lasts else ''
+    text = (
+        f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
+        f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
+        f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{used}: with a probability of '
+        f'{min(wrong[source], 0.99):.2f} it says nothing of the ship: look at its sensor, axis, '
+        'sign and unit'
+    )
+    return f'{text} (near {units})' if units else text

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A speed that says nothing of the ship is named by another, which carries on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.vouching import (
+    FAULTS,
+    LEAD_S,
+    START_NS,
+    alarms,
+    faulty,
+    judged,
+    sailing,
+    ship_of,
+)
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.vouching import Craft, sound_probabilities
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
+
+LOG, GROUND, TRACK = 0, 1, 2
+CRAFT = Craft(60.0, 1.2)
+SOUND = Channel.SPEED_OVER_GROUND
+MINUTE = np.zeros(10)
+RNG = np.random.default_rng(0)
+
+
+def sound(log: np.ndarray, ground: np.ndarray) -> float:
+    """Return the probability that both measure the ship."""
+    speeds = {LOG: log, GROUND: ground + 0.02 * RNG.standard_normal(10)}
+    return sound_probabilities(speeds, CRAFT)[LOG, GROUND]
+
+
+@pytest.mark.parametrize('fault', [fault for fault in FAULTS if fault not in ('none', 'constant')])
+def test_what_says_nothing_is_not_green_within_a_minute_and_the_stop_is_found(fault: str) -> None:
+    ground = Channel.POSITION if fault == 'position in km' else SOUND
+    first, green, stops = judged(faulty(fault, ground))
+    assert first is not None
+    assert first <= 60
+    assert green < 10
+    if fault != '20 % spikes':  # its readings come back once the spikes are known, and noisy
+        assert stops == pytest.approx([LEAD_S], abs=30.0)
+
+
+def test_a_constant_log_is_known_as_frozen_and_the_stop_is_found() -> None:
+    first, _, stops = judged(faulty('constant', SOUND))
+    assert first == 121
+    assert stops == pytest.approx([LEAD_S], abs=30.0)
+
+
+def test_nothing_is_said_of_a_sound_record_and_the_words_name_what_to_do() -> None:
+    first, _, stops = judged(faulty('none', SOUND))
+    assert first is None
+    assert stops == pytest.approx([LEAD_S], abs=30.0)
+    monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+    monitor.update(faulty('random', SOUND)[:400])
+    text = monitor.doubts()['speed_through_water']
+    for words in ('the speed over ground 5.0', 'is used instead', 'look at its sensor'):
+        assert words in text
+
+
+def test_the_window_of_a_coastdown_is_without_what_says_nothing() -> None:
+    monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+    events = [*monitor.update(faulty('random', SOUND)), *monitor.finish()]
+    (ended,) = [event for event in events if hasattr(event, 'stands')]
+    window = monitor.ended_window(ended)
+    assert not len(window.speed_through_water)
+    assert len(window.speed_over_ground) > 800
+
+
+def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -> None:
+    bad, good = faulty('random', SOUND), faulty('none', SOUND)
+    rows = (good.stamp_ns < START_NS + 200 * SECOND_NS) & (good.channel == LOG)
+    value = np.where(rows[:, None], bad.value, good.value)
+    monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+    block = Block(good.channel, good.stamp_ns, good.receive_ns, value, good.variance)
+    events = [*monitor.update(block), *monitor.finish()]
+    (ended,) = [event for event in events if hasattr(event, 'stands')]
+    window = monitor.ended_window(ended)
+    assert len(window.speed_through_water) > 800
+    assert window.before is not None
+    used_ns = window.before.speed_through_water.time_ns
+    assert START_NS + 500 * SECOND_NS < used_ns[0] < START_NS + 700 * SECOND_NS
+
+
+@pytest.mark.parametrize('fault', ['random', 'position in km'])
+def test_how_the_record_is_cut_into_blocks_cannot_matter(fault: str, bits) -> None:
+    block = faulty(fault, Channel.POSITION)
+    said = []
+    for size in (1, 977, len(block)):
+        monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+        events = [
+            e for i in range(0, len(block), size) for e in monitor.update(block[i : i + size])
+        ]
+        said.append([bits(event) for event in events] + [str(monitor.doubts()).encode()])
+    assert said[0] == said[1] == said[2]
+
+
+def test_a_current_a_turn_in_it_a_glide_and_noise_are_no_contradiction() -> None:
+    step = np.arange(10.0)
+    five = MINUTE + 5.0
+    assert sound(five, five + 1.5) > 0.9
+    assert sound(five, five - 1.5 + step / 3.0) > 0.9
+    assert sound(five - 0.05 * step, five - 0.05 * step) > 0.99
+    assert sound(five + 0.3 * RNG.standard_normal(10), five) > 0.9
+    assert sound(MINUTE, MINUTE + 1.5) > 0.9  # she drifts
+    assert sound(MINUTE - 1.0, MINUTE + 1.0) > 0.9  # she goes astern
+
+
+def test_a_third_source_shows_which_of_two_is_wrong() -> None:
+    five = MINUTE + 5.0
+    two = sound_probabilities({GROUND: five, TRACK: MINUTE + 9.0}, CRAFT)
+    assert max(two[(GROUND,)], two[(TRACK,)]) < 0.9
+    three = sound_probabilities({LOG: five, GROUND: five, TRACK: MINUTE + 9.0}, CRAFT)
+    assert three[LOG, GROUND] > 0.9
+
+
+@pytest.mark.parametrize(('length_m', 'inputs'), [(60.0, 'ls'), (150.0, 'lsp'), (8.0, 'lp')])
+def test_sound_sailing_in_waves_and_a_tide_raises_no_alarm(length_m: float, inputs: str) -> None:
+    block = sailing(31, 1.0, length_m, inputs, heading=False)
+    assert alarms(block, ship_of(length_m)) == []
