@@ -14,6 +14,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from attacks import Bench, nonsense
 from stranger import (
     OK,
     SHIP,
@@ -161,3 +162,16 @@ def test_a_log_in_knots_is_not_green_and_the_remedy_is_named(
     assert OK not in levels
     assert 'knots over m/s' in str(stranger.last())
     assert all(s.level[0] != OK for s in stranger.said('state', since=since))
+
+
+def test_a_log_that_says_nothing_is_named_and_what_is_sound_finds_the_stop(
+    tmp_path: Path,
+) -> None:
+    bench = Bench(tmp_path)
+    try:
+        good, text = nonsense(
+            bench, 'random', doubted='speed_through_water', beside='speed_over_ground'
+        )
+    finally:
+        bench.close()
+    assert good, text
