@@ -884,7 +884,7 @@ class Multiplexer:
         return f'GPGGA,{clock},5400.000,N,00800.000,E,1,08,1.0,5.0,M,40.0,M,,'
 
 
-GOAL = 'not green within 60 s (constant: 120 s) (and two ticks), the stop is found'
+GOAL = 'not green within 60 s (constant: 120 s) and two ticks, the stop is found'
 LINES: dict[str, tuple[str, Callable[[Bench], Found]]] = {
     '1 a log that says nothing, over ground is sound': (GOAL, a_log_that_says_nothing),
     '1 a log that says nothing, the position is sound': (
