@@ -26,7 +26,7 @@ from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
-FILTER = Parameters(regimes='filter', update_s=60.0)
+FILTER = Parameters(update_s=60.0)
 LOG = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03, coloured=GaussMarkov(0.01, 30.0))
 SHAFT = Sensor(channel=Channel.SHAFT, sd=0.05)
 TRACK = Sensor(channel=Channel.POSITION, sd=1.0)
@@ -58,7 +58,7 @@ def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s, seed) -
     block = record(sensors=sensors, seed=seed)
     (ended,) = [each for each in of(EndedCoastdown, events_of(ship, block)) if not each.withdrawn]
     # the thrust falls as exp(-t / 8 s): a twentieth is left after 24 s
-    assert abs(ended.start_ns - START_NS - 900 * S) < within_s * S
+    assert abs(ended.start_ns - START_NS - 912 * S) < within_s * S
     assert ended.end_ns > START_NS + 1700 * S
     assert ended.estimate is not None
 

@@ -11,7 +11,7 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.births import bear, thin
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, weigh
+from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, pushes, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     FIRST_A,
     GLIDE,
     GLIDED,
+    GONE,
     GROUND,
     HIGH,
     LEVEL,
@@ -32,6 +33,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LN_A,
     LN_U,
     LOG,
+    LONGER,
     LOW,
     OPEN,
     P0,
@@ -45,6 +47,11 @@ from shipdrag_ros.coastdown.regimes.state import (
     SHAFTS,
     SINCE,
     STATES,
+    STAYS,
+    STAYS_WAY,
+    SWITCHES,
+    THE_LOG,
+    THE_TRACK,
     WAY,
     WEIGHT,
     BankSetting,
@@ -55,8 +62,21 @@ from shipdrag_ros.samples import Float64
 
 OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
 """What a probability is given of."""
-P_DRIVEN, P_RUN_DOWN, P_GLIDING, P_BRAKED, P_TURNING, P_ENGAGED, P_EVEN, SPEED, FIT = range(9)
-OUTS = 9  # and of even power since the start, mean speed, log predictive density
+(
+    P_DRIVEN,
+    P_RUN_DOWN,
+    P_GLIDING,
+    P_BRAKED,
+    P_TURNING,
+    P_ENGAGED,
+    P_EVEN,
+    SPEED,
+    LOG_LIES,
+    TRACK_LIES,
+    FIT,
+    P_STEADY,
+) = range(12)
+OUTS = 12  # and of even power, mean speed, P(it says nothing true), log predictive density
 _TURNING_RAD_S = 0.5  # a shaft below it drives no ship
 
 
@@ -69,8 +89,8 @@ class Bank(NamedTuple):
     histories, noise
     revs : (4,)
         Of each shaft in the first steady state, times pitch [rad/s].
-    first : (2,)
-        ln of the speed then, and the bins that both were learnt from.
+    first : (3,)
+        ln of the speed then, the bins that both were learnt from, revs over speed in the last bin.
     said, out, work
         Of the last bin; room.
     """
@@ -92,7 +112,7 @@ class Bank(NamedTuple):
             Histories.fresh(),
             NoiseFilters.fresh(),
             np.zeros(4),
-            np.zeros(2),
+            np.array([0.0, 0.0, np.nan]),
             np.full(SAID, np.nan),
             np.zeros(OUTS),
             np.zeros((STATES + 1, STATES)),
@@ -100,17 +120,24 @@ class Bank(NamedTuple):
 
 
 @compiled(uncounted=True)
-def _begin(bank: Bank, setting: BankSetting, speed: float, by_log: bool, both: bool) -> None:
+def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
     all_ = bank.histories
     hull = setting.hull
+    both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
+        by_log = not np.isnan(log) and liar != THE_LOG
+        speed = log if by_log else track
+        if not speed > 0.0:
+            continue
+        off = (math.log(speed) - hull.sails) / n.SAILS[1]
         for regime in (DRIVEN, GLIDE):
             chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
             if liar > 0:
                 chance *= n.LIES_FIRST
             if not chance > 0.0:
                 continue
+            chance *= math.exp(-0.5 * off * off)
             j = all_.used[0]
             all_.used[0] = j + 1
             x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
@@ -123,27 +150,28 @@ def _begin(bank: Bank, setting: BankSetting, speed: float, by_log: bool, both: b
             for k in range(len(w)):
                 w[k] = 0
             x[LN_U] = math.log(speed)
-            p[LN_U, LN_U] = 0.1**2
+            p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             p[WAY, WAY] = 1e4
+            p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
-            f[REVS] = np.nan
+            f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
             f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
             if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], 0.1**2
+                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
                 # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.095**2
+                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
             else:
                 w[COUNT], w[GLIDED] = 1, 1
                 all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
 
 
 @compiled(uncounted=True)
-def _shafts(bank: Bank, even: float, speed: float) -> None:
+def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
     """Put the fastest and the slowest shaft over their steady revs; learn those."""
     said, revs = bank.said, bank.revs
     said[HIGH] = said[LOW] = np.nan
@@ -162,15 +190,47 @@ def _shafts(bank: Bank, even: float, speed: float) -> None:
         if learns:
             revs[k] += gain * (value - revs[k])
             learnt = True
+    said[GONE] = np.nan
+    if not np.isnan(said[HIGH]) and speed > 0.0:
+        before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
+        free = 1.0 / n.NO_THRUST_SEEN
+        if before > free >= now:
+            part = (before - free) / (before - now)
+            said[GONE] = (bank.histories.clock[0] - 1.5 + part) * step_s
+        bank.first[2] = now
     if learns and (learnt or not known):
         bank.first[0] += gain * (math.log(speed) - bank.first[0])
         bank.first[1] += 1.0
 
 
 @compiled(uncounted=True)
+def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
+    """
+    Write down when the screw of a lower level ceases to push, and when it pushes again.
+
+    Between both she glides, and the way to the level was a run-down.
+    """
+    f, w = bank.number[i], bank.whole[i]
+    if w[REGIME] != LEVEL or w[COUNT] == 0:
+        return
+    last = w[COUNT] - 1
+    pushed = bank.what[i, last] == LEVEL
+    if pushed == pushes(bank, i, now_s):
+        return
+    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+        bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
+        w[GLIDED] = 1
+    elif not pushed and w[COUNT] < SWITCHES:
+        bank.at[i, last + 1], bank.what[i, last + 1] = now_s, LEVEL
+        bank.ramp[i, last + 1] = 0.0
+        w[COUNT] += 1
+
+
+@compiled(uncounted=True)
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
+    out[P_STEADY] = 0.0
     for k in range(FIT):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
@@ -181,8 +241,12 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         if regime == DRIVEN:
             out[P_DRIVEN] += share
             out[P_EVEN] += share
+            out[P_STEADY] += share
         elif regime == LEVEL:
-            out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
+            if not pushes(all_, i, now_s):  # a glide, until the water has slowed her to that level
+                out[P_GLIDING] += share
+            else:
+                out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
             if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
                 out[P_EVEN] += share
         elif regime == GLIDE:
@@ -193,10 +257,19 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         else:
             out[P_TURNING] += share
         out[SPEED] += share * math.exp(all_.mean[i, LN_U])
+        if w[LIAR] == THE_LOG:
+            out[LOG_LIES] += share
+        elif w[LIAR] == THE_TRACK:
+            out[TRACK_LIES] += share
 
 
 _SETTING = BankSetting(
-    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0, 0.0
+    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)),
+    0.0,
+    0.0,
+    0,
+    0.0,
+    0.0,
 )  # its types are all that counts
 
 
@@ -210,15 +283,14 @@ def step(bank: Bank, setting: BankSetting) -> None:
     by_log = not np.isnan(log)
     both = by_log and not (np.isnan(ground) and np.isnan(way))
     if all_.used[0] == 0:
-        speed = log if by_log else ground
-        if np.isnan(speed):
-            speed = way / setting.step_s
-        if not speed > 0.0:
+        _begin(bank, setting, log, way / setting.step_s if np.isnan(ground) else ground)
+        if all_.used[0] == 0:
             return
-        _begin(bank, setting, speed, by_log, both)
-        bank.out[SPEED], bank.out[P_EVEN] = speed, 1.0
+        thin(all_, setting)
+        _sum_up(bank, setting)
+        bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
-    _shafts(bank, bank.out[P_EVEN], bank.out[SPEED])
+    _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
         bear(all_, setting, both, not np.isnan(said[RATE]))
@@ -227,7 +299,8 @@ def step(bank: Bank, setting: BankSetting) -> None:
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
+        _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
     thin(all_, setting)
     _sum_up(bank, setting)
-    listen(bank.noise, setting, said, bank.out[P_EVEN])
+    listen(bank.noise, setting, said, bank.out[P_STEADY])
     bank.out[FIT] = before

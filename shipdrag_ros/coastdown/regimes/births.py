@@ -38,7 +38,11 @@ from shipdrag_ros.coastdown.regimes.state import (
     REVS,
     ROOM,
     SINCE,
+    STANDS,
     STATES,
+    STAYS,
+    STAYS_WAY,
+    STUCK,
     SWITCHES,
     THE_LOG,
     THE_TRACK,
@@ -135,14 +139,14 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     learnt = bank.whole[i, REGIME] == LEVEL
     for k in range(len(n.RUN_DOWN_S)):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
-        for kind in range(len(n.DRAGGED)):
-            part = chance * n.RUN_DOWN_SHARE[k] * n.DRAGGED_SHARE[kind]
+        for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
+            part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
             bank.whole[j, KIND] = kind
-            bank.number[j, REVS] = np.nan
+            bank.number[j, REVS] = bank.number[j, FREE] = np.nan
             bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
             x[POWER] += n.DRAGGED_EXPONENT[kind]
@@ -189,6 +193,21 @@ def _turns(
 
 
 @compiled(uncounted=True)
+def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let something but the water slow her."""
+    for k in range(len(n.BRAKES)):
+        j = _born(bank, i, now_s, chance / len(n.BRAKES), BRAKE, 1.0)
+        if j >= 0:
+            if bank.whole[i, REGIME] != GLIDE:
+                _glide(bank, j, setting.hull)
+                bank.number[j, REVS] = np.nan
+                bank.whole[j, KIND] = STANDS
+                bank.mean[j, LN_A] += n.DRAGGED[STANDS]
+                bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
+            _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+
+
+@compiled(uncounted=True)
 def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
     j = _born(bank, i, now_s, chance, LEVEL, 1.0)
@@ -207,6 +226,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
         bank.used[0] = j + 1
         bank.number[j, WEIGHT] += math.log(chance)
         bank.whole[j, LIAR] = liar
+        bank.number[j, STAYS] = bank.number[j, STAYS_WAY] = np.nan
 
 
 @compiled(uncounted=True)
@@ -255,7 +275,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             if not np.isnan(setting.told_s):
                 off = (now_s - setting.told_s) / n.TOLD[1]
                 stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
-            _glides(bank, i, setting, now_s, stop * hours)
+            _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
+            _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
             _levels(bank, i, setting, now_s, level * hours)
             _turns(bank, i, setting, now_s, turn * hours, TURN)
             left = stop + level + turn
@@ -265,11 +286,7 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             if steered:
                 _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
                 left += n.GLIDE_TURN
-            for k in range(len(n.BRAKES)):
-                share = n.GLIDE_BRAKE * hours / len(n.BRAKES)
-                j = _born(bank, i, now_s, share, BRAKE, 1.0)
-                if j >= 0:
-                    _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+            _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
             _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)

@@ -16,6 +16,7 @@ from shipdrag_ros.ship.baseline import ittc57
 
 # Taylor's wetted-surface coefficient of ordinary hulls; C_T = 1.25 C_F + 0.0004
 _TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4
+_HUMP = 0.45  # Froude number above which waves make less, not more
 _POINTS = 64
 _SPEEDS = (0.03, 1.2)  # Froude numbers of the table
 
@@ -34,6 +35,10 @@ class HullPrior(NamedTuple):
         Of what comes on top: a constant and a power of u.
     length_m
         Of the hull.
+    sails
+        ln of the speed at which she is likely to sail.
+    run_down : (run-downs,)
+        Share of each run-down.
     """
 
     first: float
@@ -44,6 +49,8 @@ class HullPrior(NamedTuple):
     exponent: float
     exponent_var: float
     length_m: float
+    sails: float
+    run_down: Float64
 
     @classmethod
     def of(cls, ship: Ship) -> HullPrior:
@@ -54,7 +61,7 @@ class HullPrior(NamedTuple):
         log_u = np.linspace(slow, fast, _POINTS)
         known = _baseline(ship, np.exp(log_u))
         curve, level, exponent = known or (
-            _friction(ship, np.exp(log_u)),
+            _generic(ship, np.exp(log_u)),
             n.RESISTANCE,
             n.EXPONENT,
         )
@@ -67,7 +74,20 @@ class HullPrior(NamedTuple):
             float(exponent[0]),
             float(exponent[1] ** 2),
             ship.length_m,
+            math.log(float(ship.speed(float(n.SAILS[0])))),
+            _run_down(ship),
         )
+
+
+def _run_down(ship: Ship) -> Float64:
+    """Return the shares of the run-downs; what the ship file says of them counts twice."""
+    known = ship.propulsion
+    if known is None or not known.run_down_s > 0.0:
+        return n.RUN_DOWN_SHARE.copy()
+    off = np.log(n.RUN_DOWN_S / (3.0 * known.run_down_s))
+    sd = math.hypot(float(n.RUN_DOWN_FILE_SD), known.sd / known.run_down_s)
+    share = n.RUN_DOWN_SHARE * np.exp(-0.5 * (off / sd) ** 2)
+    return np.asarray(share / share.sum())
 
 
 def _moving(ship: Ship, speed: Float64) -> Float64:
@@ -81,8 +101,14 @@ def _friction(ship: Ship, speed: Float64) -> Float64:
     return np.asarray(np.log(force / _moving(ship, speed)))
 
 
+def _generic(ship: Ship, speed: Float64) -> Float64:
+    """Return the curve of a hull of which length and volume are known: friction and waves."""
+    froude = np.minimum(speed / float(ship.speed(1.0)), _HUMP)
+    return np.asarray(_friction(ship, speed) + np.log1p((froude / n.WAVES) ** 4))
+
+
 def _baseline(ship: Ship, speed: Float64) -> tuple[Float64, Float64, Float64] | None:
-    """Return curve and priors by the baseline; beyond its ends it goes on as friction does."""
+    """Return curve and priors by the baseline; beyond its ends it goes on as the generic one."""
     try:
         low, high = ship.baseline_range_m_s
         low = max(low, speed[0])
@@ -93,11 +119,11 @@ def _baseline(ship: Ship, speed: Float64) -> tuple[Float64, Float64, Float64] | 
     if not np.all(force > 0.0):
         return None
     curve = np.log(force / _moving(ship, near))
-    friction = _friction(ship, speed)
+    generic = _generic(ship, speed)
     inside = (speed >= low) & (speed <= high)
     if not inside.any():
         return None
     first, last = np.flatnonzero(inside)[[0, -1]]
-    curve[:first] = curve[first] + friction[:first] - friction[first]
-    curve[last:] = curve[last] + friction[last:] - friction[last]
+    curve[:first] = curve[first] + generic[:first] - generic[first]
+    curve[last:] = curve[last] + generic[last:] - generic[last]
     return curve, n.RESISTANCE_FILE, n.EXPONENT_FILE

@@ -15,12 +15,14 @@ from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     BEFORE,
     BRAKE,
+    COUNT,
     CURRENT,
     DRIVEN,
     FIRST_A,
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GONE,
     GROUND,
     GUST,
     HELD,
@@ -32,7 +34,10 @@ from shipdrag_ros.coastdown.regimes.state import (
     LN_A,
     LN_U,
     LOG,
+    LONGER,
     LOW,
+    MEAN_LAG,
+    MEAN_U,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -53,6 +58,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     SINCE,
     STANDS,
     STATES,
+    STAYS,
+    STAYS_WAY,
     THE_LOG,
     THE_TRACK,
     TURN,
@@ -69,7 +76,6 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
-_LAG_SD = float(n.LOG_LAG_SD_S) / _LAG_S  # of the lag
 _ROOT = math.sqrt(2.0 * math.pi)
 
 
@@ -97,6 +103,26 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
+def _thrust_left(f: Float64, now_s: float) -> float:
+    """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
+    left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
+    return float(left * left)
+
+
+@compiled(uncounted=True)
+def pushes(bank: Histories, i: int, now_s: float) -> bool:
+    """Say whether the screw of a history pushes."""
+    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
+    if w[REGIME] != LEVEL:
+        return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+    free = f[FREE] if w[KIND] == 1 else 0.0
+    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
+    return bool(rho * n.NO_THRUST > 1.0)
+
+
+@compiled(inline=True, uncounted=True)
 def _force(
     regime: int, free: float, x: Float64, f: Float64, now_s: float, law: float, slope: float
 ) -> tuple[float, float, float, float, float]:
@@ -115,7 +141,7 @@ def _force(
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
         left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
     elif regime == GLIDE:
-        left = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+        left = 1.0 - _thrust_left(f, now_s)
     if regime in (TURN, GLIDE_TURN):
         drag = math.exp(min(x[OPEN], 3.0))
         left, by_open = left + drag, -a * drag
@@ -155,7 +181,7 @@ def predict(
     keep_c = math.exp(-dt / (n.CURRENT_S * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
-    slowing = 0.0
+    slowing = mean_u = mean_lag = 0.0
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
@@ -197,7 +223,7 @@ def predict(
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
-            p[OPEN, OPEN] += n.TURNS_SD**2 * dt / (60.0 * pace)
+            p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         # the wind that she meets falls less than her own way
@@ -205,16 +231,19 @@ def predict(
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
-        p[LAG, LAG] += (1.0 - keep_f * keep_f) * (_LAG_SD * x[LAG]) ** 2
         x[WAY] += dt * (u + x[CURRENT])
-        x[LAG] = keep_f * x[LAG] - u * change
+        lagged = keep_f * x[LAG] - u * change
+        mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
+        x[LAG] = lagged
         x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
+        mean_u += 0.5 * (u + math.exp(x[LN_U])) / _PARTS
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
         x[CURRENT] *= keep_c
         slowing = net
     x[WAY] -= advance
+    f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
     return slowing
 
 
@@ -256,6 +285,17 @@ def _take(
 @compiled(inline=True, uncounted=True)
 def _normal(off: float, sd: float) -> float:
     return math.exp(-0.5 * (off / sd) ** 2) / (_ROOT * sd)
+
+
+@compiled(inline=True, uncounted=True)
+def _untrue(f: Float64, column: int, value: float, wide: float, bad: float) -> float:
+    """Return the log density of a reading that says nothing true: it stays, or is anything."""
+    off = value - f[column]
+    stays = 0.0 if np.isnan(off) else n.STUCK * _normal(off, wide)
+    density = stays + (1.0 - n.STUCK) * bad
+    share = stays / density
+    f[column] = value if share < 0.1 else f[column] + 0.1 * share * off
+    return math.log(density)
 
 
 @compiled(inline=True, uncounted=True)
@@ -308,21 +348,36 @@ def _driving(
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
     f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
-    if several and not settled:  # one of them may turn as before
+    if not settled:  # on its way, or one of several that turns as before
         density = 0.5 * (density + (1.0 if nu < 1.1 else 0.0))
     return density
 
 
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float, left: float, several: bool) -> float:
+def _running_down(
+    f: Float64, kind: int, nu: float, u_part: float, left: float, part: float
+) -> float:
     """
-    Return the density of the revs of a screw that does not drive; `left` is thrust not yet gone.
+    Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
+
+    The error of what is expected is paid for once, as that of a level.
     """
-    if left > 0.0:
-        falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
-        any_ = 1.0 if kind == HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
-        share = 0.5 if several or kind == HELD else 0.8
-        return share * _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) + (1.0 - share) * any_
+    falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
+    if np.isnan(f[FREE]):
+        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
+        f[FREE] = nu / falls
+    else:
+        density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
+        f[FREE] += 0.5 * (nu / falls - f[FREE])
+    any_ = 1.0 if kind >= HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
+    return part * density + (1.0 - part) * any_
+
+
+@compiled(uncounted=True)
+def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
+    """
+    Return the density of the revs of a screw that does not drive.
+    """
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
@@ -333,17 +388,23 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, left: float, sever
         return _normal(nu - at, wide) if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD[0] else 0.0
     if kind == STANDS or np.isnan(revs):
         stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
-        if kind == STANDS:
-            return stands
+        last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         f[REVS] = nu
-        return 0.5 * stands + 0.5
+        # or anything below its last: it runs down
+        return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
     f[REVS] = nu
     return 0.9 * _off(nu, revs) + 0.1
 
 
 @compiled(uncounted=True)
 def _shaft(
-    bank: Histories, i: int, said: Float64, log_first: float, now_s: float, several: bool
+    bank: Histories,
+    i: int,
+    said: Float64,
+    log_first: float,
+    now_s: float,
+    step_s: float,
+    several: bool,
 ) -> float:
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
@@ -356,11 +417,85 @@ def _shaft(
         if several and regime != LEVEL:  # they turn alike
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
     else:
-        left = 1.0 - (now_s - f[SINCE]) / f[RAMP_S] if regime == GLIDE else 0.0
-        density = _dragged(f, bank.whole[i, KIND], nu, u_part, left, several)
+        kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
+        left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
+        if regime == GLIDE and kind < HELD and age_s < step_s:
+            # it stopped within the bin, of which the revs are a mean
+            density = 1.2 if nu < 1.05 else 0.0
+        elif left > 0.0:
+            part = 0.5 if several or kind >= HELD else 0.8
+            density = _running_down(f, kind, nu, u_part, left, part)
+        else:
+            density = _dragged(f, kind, nu, u_part)
         if regime == BRAKE:  # astern, where no sign is read
             density = 0.9 * density + 0.1
     return math.log(density + n.SHAFT_LIES)
+
+
+@compiled(uncounted=True)
+def _stop_seen(bank: Histories, i: int, nu: float, now_s: float, step_s: float) -> None:
+    """Date a stop within its bin by the revs, whose mean is the lower the sooner it came."""
+    f, w = bank.number[i], bank.whole[i]
+    first_s = now_s - 0.5 * step_s
+    if w[REGIME] != GLIDE or w[KIND] >= HELD or w[COUNT] == 0 or f[SINCE] != first_s:
+        return
+    later = step_s * min(max(1.0 - 2.5 * (1.0 - nu), 0.0), 1.0)
+    f[SINCE] += later
+    bank.at[i, w[COUNT] - 1] = f[SINCE]
+
+
+@compiled(uncounted=True)
+def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> None:
+    """End a run-down where a shaft shows that the thrust is gone."""
+    f, w = bank.number[i], bank.whole[i]
+    if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] >= HELD:
+        return
+    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0:
+        f[SINCE] = min(f[SINCE], gone_s - 0.1)
+        f[RAMP_S] = gone_s - f[SINCE]
+        bank.at[i, w[COUNT] - 1], bank.ramp[i, w[COUNT] - 1] = f[SINCE], f[RAMP_S]
+
+
+@compiled(uncounted=True)
+def _by_way(
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
+) -> float:
+    """Update a history by the way between fixes; return its log density."""
+    x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
+    bad, half, h = float(n.BAD_DENSITY), 0.5 * setting.step_s, work[STATES]
+    if bank.whole[i, LIAR] == THE_TRACK:
+        wide = math.hypot(2.5 * noise[N_FIX], noise[N_WALK] * math.sqrt(setting.step_s))
+        return _untrue(f, STAYS_WAY, advance, wide, bad / setting.step_s)
+    u = math.exp(x[LN_U])
+    for j in range(STATES):
+        h[j] = 0.0
+    h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
+    expected = x[WAY] - half * (u + x[CURRENT])
+    gained = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull.first - 1.0)
+    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
+        for k in range(STATES):
+            p[WAY, k] = p[k, WAY] = 0.0
+        p[WAY, WAY] = 1e4
+    return gained
+
+
+@compiled(uncounted=True)
+def _by_shafts(
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float
+) -> float:
+    """Return the log density of the revs, and date the stop and the end of thrust by them."""
+    f, step_s = bank.number[i], setting.step_s
+    now_s = (bank.clock[0] - 0.5) * step_s
+    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
+    gained = n.SHAFT_TEMPER * shown
+    young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
+    if young and bank.whole[i, KIND] < HELD:
+        # no slow error hides that the revs have not changed
+        unchanged = math.log(_off(said[HIGH], 1.0) + n.SHAFT_LIES)
+        gained += (1.0 - n.SHAFT_TEMPER) * min(shown - unchanged, 0.0)
+    _thrust_seen(bank, i, said[GONE], now_s - 1.5 * step_s)
+    _stop_seen(bank, i, said[HIGH], now_s, step_s)
+    return float(gained)
 
 
 @compiled(uncounted=True)
@@ -374,54 +509,46 @@ def weigh(
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[STATES]
-    half = 0.5 * setting.step_s
-    pace = setting.pace
     gained = 0.0
     bad = float(n.BAD_DENSITY)
     least = setting.hull.first - 1.0  # at rest
-    now_s = (bank.clock[0] - 0.5) * setting.step_s
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
         if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
-            gained += math.log(bad)
+            wide = 1.5 * math.hypot(noise[N_LOG], noise[N_WANDER])
+            wide = wide if which == LOG else noise[N_GROUND]
+            gained += _untrue(f, STAYS, said[which], wide, bad)
             continue
         u = math.exp(x[LN_U])
         for j in range(STATES):
             h[j] = 0.0
         h[LN_U] = u
-        lag = half + (0.0 if which == LOG else pace * _GROUND_LAG_S)
-        expected = u - lag * slowing
+        expected = u + f[MEAN_U]
         sd = noise[N_LOG]
         if which == LOG:
-            h[WANDER] = h[LAG] = 1.0
-            expected += x[WANDER] + x[LAG]
+            longer, lags = math.exp(min(max(x[LONGER], -3.0), 3.0)), x[LAG] + f[MEAN_LAG]
+            h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
+            expected += x[WANDER] + longer * lags
         else:
             h[CURRENT] = 1.0
-            expected += x[CURRENT]
+            expected += x[CURRENT] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
-        if liar == THE_TRACK:
-            gained += math.log(bad)
-        else:
-            u = math.exp(x[LN_U])
-            for j in range(STATES):
-                h[j] = 0.0
-            h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
-            expected = x[WAY] - half * (u + x[CURRENT])
-            gained += _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
+        gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
-        wide = n.TURN_RATE * u / setting.hull.length_m + noise[N_RATE]
+        # errors of fixes turn a course by more, the shorter the way
+        sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
+        wide = n.TURN_RATE * u / setting.hull.length_m + sd
         turning = regime in (TURN, GLIDE_TURN)
         share = 0.9 if turning else n.STEADY_TURNS
-        density = share * _normal(said[RATE], wide)
-        density += (1.0 - share) * _normal(said[RATE], noise[N_RATE])
-        gained += n.SHAFT_TEMPER * math.log(density + 1e-9)
+        density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
+        # or anything up to a radian a second, as where fixes jump
+        gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
     if not np.isnan(said[HIGH]):
-        several = setting.shafts > 1
-        gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, several)
+        gained += _by_shafts(bank, i, setting, said, log_first)
     f[WEIGHT] += gained
     if regime in (DRIVEN, TURN):
         # at balance neither is seen, only the filter's own errors

@@ -75,7 +75,7 @@ class NoiseFilters(NamedTuple):
         """
         Return filters that have seen nothing.
         """
-        first = np.array([0.08, 0.03, 60.0, 0.05, 0.05, 1.0, 0.2, 0.003])
+        first = np.array([0.08, 0.03, 60.0, 0.1, 0.1, 10.0, 0.6, 0.01])
         return cls(
             np.zeros((3, FILTERS, _STATES)),
             np.zeros((3, FILTERS, _STATES, _STATES)),
@@ -124,12 +124,14 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         noise.rate[1] += 1.0
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
     slot = noise.queue[0]
-    for k in range(NOISES):
-        noise.used[k] = slot[k]
     for row in range(_DELAY - 1):
         for k in range(NOISES):
             noise.queue[row, k] = noise.queue[row + 1, k]
-    _average(noise, setting, noise.queue[_DELAY - 1])
+    newest = noise.queue[_DELAY - 1]
+    _average(noise, setting, newest)
+    young = max(noise.seen[0], noise.seen[1], noise.seen[2]) < _DELAY
+    for k in range(NOISES):
+        noise.used[k] = newest[k] if young else slot[k]
 
 
 @compiled(uncounted=True)

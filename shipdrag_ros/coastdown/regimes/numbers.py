@@ -53,32 +53,40 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
-LOG_LAG_S = _number('LOG_LAG_S', 5.0, 's', 'middle of the filters of logs')
-LOG_LAG_SD_S = _number('LOG_LAG_SD_S', 3.0, 's', 'how a log bears a sudden change')
+LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
+LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
 # the hull
 RESISTANCE = _grid(
-    'RESISTANCE', (0.30, 0.28), 'ln', 'over friction by length and volume: mean, sd; waves, wind'
+    'RESISTANCE', (0.20, 0.28), 'ln', 'over the curve by length and volume: mean, sd; wind, sea'
 )
 RESISTANCE_FILE = _grid(
-    'RESISTANCE_FILE', (0.15, 0.20), 'ln', 'over the baseline of the ship file: mean, sd'
+    'RESISTANCE_FILE', (0.05, 0.25), 'ln', 'over the baseline of the ship file: mean, sd'
 )
 DRAGGED = _grid(
-    'DRAGGED', (0.15, 0.7, 1.4), 'ln', 'more in a glide: the screw windmills, stands, has no pitch'
+    'DRAGGED',
+    (0.05, 0.7, 1.4, 0.05),
+    'ln',
+    'more in a glide: the screw windmills, stands, has no pitch, or its revs say nothing',
 )
-DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.7, 0.2, 0.1), '1', 'of these')
-DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35, 0.45), 'ln', 'of each')
+DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.68, 0.2, 0.1, 0.02), '1', 'of these')
+DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35, 0.45, 0.2), 'ln', 'of each')
 DRAGGED_EXPONENT = _grid(
-    'DRAGGED_EXPONENT', (-0.1, 0.0, -0.9), '1', 'a screw that turns without pitch drags as u does'
+    'DRAGGED_EXPONENT',
+    (-0.1, 0.0, -0.9, -0.1),
+    '1',
+    'a screw that turns without pitch drags as u does',
 )
 DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')
 WIND_SD = _number('WIND_SD', 0.06, 'of the first resistance', 'a force that stays as she slows')
 KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
-EXPONENT = _grid('EXPONENT', (0.45, 0.6), '1', 'over that of friction: mean, sd; waves have 4')
+WAVES = _number('WAVES', 0.28, 'Froude', 'where waves slow a hull as much as friction does')
+EXPONENT = _grid('EXPONENT', (0.0, 0.35), '1', 'over that of the curve: mean, sd')
 EXPONENT_FILE = _grid('EXPONENT_FILE', (0.1, 0.3), '1', 'over that of the baseline: mean, sd')
 EXPONENT_WALK = _number('EXPONENT_WALK', 0.4, '1', 'per root of ln u: no law is one power')
 NO_THRUST = _number('NO_THRUST', 1.8, '1', 'advance without thrust over that of service')
+NO_THRUST_SEEN = _number('NO_THRUST_SEEN', 1.5, '1', 'the same where 5 % of it is left')
 
 # what disturbs her
 GUST = _grid('GUST', (0.03, 0.08, 0.2), 'of the resistance', 'sd: wind of 13 %, wave groups')
@@ -97,6 +105,8 @@ BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
+STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
+SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 
 # switches, each an hour
 STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')
@@ -107,6 +117,7 @@ MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` o
 MANOEUVRING_S = _number('MANOEUVRING_S', 1800.0, 's', 'manoeuvres come in groups')
 OF_MANOEUVRES = _grid('OF_MANOEUVRES', (0.3, 0.5, 0.2), '1', 'stop, level, turn')
 AFTER_KICK = _number('AFTER_KICK', 0.6, '1', 'of switches after one from a glide: stops')
+BRAKED = _number('BRAKED', 0.2, '1', 'of stops: at once astern')
 GLIDE_LEVEL = _number('GLIDE_LEVEL', 4.0, '1/h', 'gliding to a level')
 GLIDE_BRAKE = _number('GLIDE_BRAKE', 0.5, '1/h', 'gliding to braked')
 GLIDE_TURN = _number('GLIDE_TURN', 0.5, '1/h', 'gliding to turning without thrust')
@@ -117,17 +128,19 @@ SETTLED_S = _number('SETTLED_S', 900.0, 's', 'a level that is held so long is sa
 LEVEL_LEAST_S = _number('LEVEL_LEAST_S', 30.0, 's', 'before the next switch')
 
 # shapes of switches
-RUN_DOWN_S = _grid('RUN_DOWN_S', (2.0, 12.0, 35.0, 75.0), 's', 'fuel cut, pitch, controlled')
-RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.6, 0.2, 0.13, 0.07), '1', 'short by default')
+RUN_DOWN_S = _grid('RUN_DOWN_S', (3.0, 10.0, 24.0, 60.0), 's', 'fuel cut, pitch, controlled')
+RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.55, 0.22, 0.18, 0.05), '1', 'short by default')
+RUN_DOWN_FILE_SD = _number('RUN_DOWN_FILE_SD', 0.5, 'ln', 'of what a ship file says of it')
 LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a telegraph')
 LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
 LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')
 LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
-BRAKES = _grid('BRAKES', (0.4, 1.0), 'of the first resistance', 'astern power')
+BRAKES = _grid('BRAKES', (0.4, 1.0, 2.5), 'of the first resistance', 'astern power, tugs')
 BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')
-TURNS = _grid('TURNS', (0.35, 1.1), 'of the resistance', 'helm')
-TURNS_SD = _number('TURNS_SD', 0.3, 'ln', 'of each, and its drift in a minute')
+TURNS = _grid('TURNS', (0.12, 0.4, 1.1), 'of the resistance', 'helm')
+TURNS_SD = _number('TURNS_SD', 0.35, 'ln', 'of each')
+TURNS_DRIFT = _number('TURNS_DRIFT', 0.1, 'ln', 'of each in a minute')
 TURN_RATE = _number('TURN_RATE', 0.2, 'ship lengths', 'rate of turn over u / L')
 STEADY_TURNS = _number('STEADY_TURNS', 0.03, '1', 'share of bins with a yaw like that of a turn')
 

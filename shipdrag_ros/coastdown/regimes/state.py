@@ -17,28 +17,33 @@ SWITCHES = 12  # that a history remembers
 
 # the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
 # of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m], what the filter of the log lags behind [m/s]
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG = range(9)
-STATES = 9
+# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], and ln of
+# the log's own lag over that
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER = range(10)
+STATES = 10
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
-# expected, or held; revs over speed of a free screw; prior of ln a, exponent, and their variances
+# expected, or held; revs over speed of a free screw, or over those of a run-down; prior of ln a,
+# exponent, and their variances; where an instrument that says nothing true stays, and its fixes
 WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
-COLUMNS = 12
+STAYS, STAYS_WAY = 12, 13
+MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
+COLUMNS = 16
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
 # number of switches, whether she has glided
 REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
 WHOLE = 5
 NOBODY, THE_LOG, THE_TRACK = range(3)
-WINDMILLS, STANDS, HELD = range(3)  # a screw in a glide
+WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
-SAID = 10
+GONE = 10  # when revs over speed fell through those without thrust [s since the start]
+SAID = 11
 
 # noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
 # speed over ground and fixes, their walk, sd of the rate of turn
