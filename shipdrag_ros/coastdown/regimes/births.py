@@ -22,6 +22,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDE,
     GLIDE_TURN,
     GLIDED,
+    HELD,
     KEPT,
     KIND,
     LEVEL,
@@ -146,12 +147,16 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 continue
             x, p = bank.mean[j], bank.spread[j]
             bank.whole[j, KIND] = kind
-            bank.number[j, REVS] = bank.number[j, FREE] = np.nan
+            bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
+            bank.number[j, REVS] = np.nan
             bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
-            x[POWER] += n.DRAGGED_EXPONENT[kind]
-            p[LN_A, LN_A] += n.DRAGGED_SD[kind] ** 2 + (n.KEPT_SD**2 if learnt else 0.0)
-            p[POWER, POWER] += n.DRAGGED_EXPONENT_SD**2
+            tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
+            x[POWER] += tied * n.DRAGGED[kind]
+            p[LN_A, LN_A] += var + (n.KEPT_SD**2 if learnt else 0.0)
+            p[LN_A, POWER] += tied * var
+            p[POWER, LN_A] = p[LN_A, POWER]
+            p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
             _glide(bank, j, setting.hull)
 
 

@@ -348,15 +348,14 @@ def _driving(
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
     f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
-    if not settled:  # on its way, or one of several that turns as before
-        density = 0.5 * (density + (1.0 if nu < 1.1 else 0.0))
+    if not settled:  # on its way to the level, or one of several that turns as before
+        least = 0.0 if several else min(0.8 * math.exp(x[OPEN] - log_first), 0.9)
+        density = 0.5 * density + (0.5 / (1.1 - least) if least < nu < 1.1 else 0.0)
     return density
 
 
 @compiled(uncounted=True)
-def _running_down(
-    f: Float64, kind: int, nu: float, u_part: float, left: float, part: float
-) -> float:
+def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float) -> float:
     """
     Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
 
@@ -369,7 +368,7 @@ def _running_down(
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
         f[FREE] += 0.5 * (nu / falls - f[FREE])
-    any_ = 1.0 if kind >= HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
+    any_ = 1.0 if n.WINDMILL[2] * u_part < nu < 1.05 else 0.0
     return part * density + (1.0 - part) * any_
 
 
@@ -393,7 +392,8 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         # or anything below its last: it runs down
         return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
     f[REVS] = nu
-    return 0.9 * _off(nu, revs) + 0.1
+    moves = 0.1 if kind == HELD else 0.01
+    return (1.0 - moves) * _off(nu, revs) + moves
 
 
 @compiled(uncounted=True)
@@ -418,17 +418,18 @@ def _shaft(
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
     else:
         kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
+        if regime == GLIDE and kind >= HELD and np.isnan(f[REVS]) and not np.isnan(f[FREE]):
+            f[REVS] = f[FREE] * math.exp(min(f[BEFORE] - log_first, 1.0))  # as before the stop
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
         if regime == GLIDE and kind < HELD and age_s < step_s:
             # it stopped within the bin, of which the revs are a mean
             density = 1.2 if nu < 1.05 else 0.0
-        elif left > 0.0:
-            part = 0.5 if several or kind >= HELD else 0.8
-            density = _running_down(f, kind, nu, u_part, left, part)
+        elif left > 0.0 and kind < HELD:
+            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8)
         else:
             density = _dragged(f, kind, nu, u_part)
-        if regime == BRAKE:  # astern, where no sign is read
-            density = 0.9 * density + 0.1
+        if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
+            density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
 
 

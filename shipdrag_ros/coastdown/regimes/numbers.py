@@ -66,16 +66,16 @@ RESISTANCE_FILE = _grid(
 )
 DRAGGED = _grid(
     'DRAGGED',
-    (0.05, 0.7, 1.4, 0.05),
+    (0.05, 0.5, 0.9, 0.05),
     'ln',
     'more in a glide: the screw windmills, stands, has no pitch, or its revs say nothing',
 )
 DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.68, 0.2, 0.1, 0.02), '1', 'of these')
-DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35, 0.45, 0.2), 'ln', 'of each')
+DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.5, 0.8, 0.2), 'ln', 'of each')
 DRAGGED_EXPONENT = _grid(
     'DRAGGED_EXPONENT',
-    (-0.1, 0.0, -0.9, -0.1),
-    '1',
+    (0.0, 0.0, -0.6, 0.0),
+    'of that ln',
     'a screw that turns without pitch drags as u does',
 )
 DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')

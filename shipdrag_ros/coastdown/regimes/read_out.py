@@ -25,6 +25,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     DRIVEN,
     GLIDE,
     GLIDE_TURN,
+    HELD,
+    KIND,
     LEVEL,
     SWITCHES,
     TURN,
@@ -44,8 +46,9 @@ class SmoothedGlide(NamedTuple):
 
     Attributes
     ----------
-    stop_s, begin_s, end_s
-        Medians of when the thrust began to fall, was gone, and of the end [s of the bank].
+    stop_s, start_s, begin_s, end_s
+        Medians of when the thrust began to fall, of the date, of when the thrust was gone, and of
+        the end [s of the bank].
     begin_sd_s
         Standard deviation of `begin_s`.
     probability
@@ -55,6 +58,7 @@ class SmoothedGlide(NamedTuple):
     """
 
     stop_s: float
+    start_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
@@ -66,12 +70,14 @@ class Spans(NamedTuple):
     """
     Every regime of every history, (n,) each.
 
-    `gone_s` is when its thrust was gone, in a glide; `after` the regime that follows, -1 where
+    `date_s` and `gone_s` are when an abrupt stop would have cost as much speed, or a shaft shows
+    that the thrust is gone, and when it was gone, in a glide; `after` the regime that follows, -1 where
     none does; `again` whether she has glided before.
     """
 
     what: Int64
     begin_s: Float64
+    date_s: Float64
     gone_s: Float64
     end_s: Float64
     weight: Float64
@@ -85,6 +91,7 @@ class Spans(NamedTuple):
         return Spans(
             self.what[chosen],
             self.begin_s[chosen],
+            self.date_s[chosen],
             self.gone_s[chosen],
             self.end_s[chosen],
             self.weight[chosen],
@@ -108,13 +115,17 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     place = np.arange(SWITCHES + 1)
     last = place == count
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
-    gone = np.minimum(at + np.where(what == GLIDE, ramp, 0.0), end)
+    ramp = np.where(what == GLIDE, ramp, 0.0)
+    gone = np.minimum(at + ramp, end)
+    seen = (setting.shafts > 0) & (all_.whole[:used, KIND, np.newaxis] < HELD)
+    # the revs fall evenly: an abrupt stop after a third of that costs as much speed
+    date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))
     is_glide = what == GLIDE
     again = np.cumsum(is_glide, axis=1) - is_glide > 0
     weight = np.broadcast_to(np.exp(all_.number[:used, WEIGHT, np.newaxis]), what.shape)
     there = (place <= count) & (end > at)
-    return Spans(what, at, gone, end, weight, after, again).part(there)
+    return Spans(what, at, date, gone, end, weight, after, again).part(there)
 
 
 def _over_time(
@@ -188,14 +199,14 @@ def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _one(found: Spans, peak: float) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
-    stop, begin, end = (
-        _median(each, share) for each in (found.begin_s, found.gone_s, found.end_s)
+    stop, start, begin, end = (
+        _median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
     codes = np.arange(-1, GLIDE_TURN + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
-    return SmoothedGlide(min(stop, begin), begin, end, sd, peak, after)
+    return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, peak, after)
 
 
 def _median(value: Float64, share: Float64) -> float:

@@ -64,8 +64,9 @@ class Dated(NamedTuple):
 
     Attributes
     ----------
-    stop_s, begin_s, end_s
-        When the thrust began to fall, was gone, and the end.
+    stop_s, start_s, begin_s, end_s
+        When the thrust began to fall, the date, when it was gone, and the end. The date is where
+        a shaft shows the thrust gone, or an abrupt stop would have cost as much speed.
     begin_sd_s
         Standard deviation of `begin_s`.
     ran_down
@@ -73,25 +74,15 @@ class Dated(NamedTuple):
         the glide.
     ended_by
         What followed; None where she glides on.
-    seen
-        Whether a shaft shows the stop.
     """
 
     stop_s: float
+    start_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
-    seen: bool
-
-    @property
-    def start_s(self) -> float:
-        """Where the coastdown starts: at the stop, or at the end of a run-down that is cut."""
-        if self.ran_down:
-            return self.begin_s
-        # the revs fall evenly: an abrupt stop after a third of that costs as much speed
-        return self.stop_s + (0.0 if self.seen else (self.begin_s - self.stop_s) / 3.0)
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
@@ -234,14 +225,15 @@ class RegimeFilter:
 
     def _dated(self, glide: SmoothedGlide) -> Dated:
         zero, pace = self._zero_s, self._setting.pace
+        slow = not self._setting.shafts and glide.begin_s - glide.stop_s > _RAN_DOWN_S * pace
         return Dated(
             zero + glide.stop_s,
+            zero + (glide.begin_s if slow else glide.start_s),
             zero + glide.begin_s,
             zero + glide.end_s,
             glide.begin_sd_s,
-            not self._setting.shafts and glide.begin_s - glide.stop_s > _RAN_DOWN_S * pace,
+            slow,
             self._ended_by(glide),
-            self._setting.shafts > 0,
         )
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
