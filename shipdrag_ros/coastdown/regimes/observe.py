@@ -44,6 +44,24 @@ def _apart(one: float, other: float) -> float:
     return math.atan2(math.sin(one - other), math.cos(one - other))
 
 
+@compiled(uncounted=True)
+def _is_one_way(bins: Bins, track: int, last: int, width: int) -> bool:
+    """Say whether no fix is missing in two courses, and none is on another mark than before."""
+    steps = 2 * _COURSE - 1
+    east = north = most = total = 0.0
+    for k in range(steps):
+        time, e, n = displacement(bins, track, last - k * width, width)
+        if np.isnan(time):
+            return False
+        east, north = east + e / time / steps, north + n / time / steps
+    for k in range(steps):
+        time, e, n = displacement(bins, track, last - k * width, width)
+        off = math.hypot(e / time - east, n / time - north)
+        most, total = max(most, off), total + off
+    # no ship stops or reverses within a bin; the rest is noise of fixes
+    return bool(most < math.hypot(east, north) + 4.0 * (total - most) / (steps - 1.0))
+
+
 @compiled('void(Bins, i8, i8, f8, f8[::1])', like={'Bins': Bins.fresh(1)}, uncounted=True)
 def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> None:
     """
@@ -64,7 +82,8 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
             said[ADVANCE] = advance
             _, old_east, old_north = displacement(bins, track, last - width, _COURSE * width)
             turned = _apart(math.atan2(across, along), math.atan2(old_north, old_east))
-            said[RATE] = turned / step_s
+            if _is_one_way(bins, track, last, width):
+                said[RATE] = turned / step_s
     _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
     _, old_cosine, old_sine, old = mean_place(bins, _HEADING, last - width, width)
     if count > 0 and old > 0:
