@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import log_ndtr, ndtri, ndtri_exp
 
 from shipdrag_ros.inference.decision import CERTAIN
 from shipdrag_ros.parameter import Prior, Shape
@@ -68,19 +68,21 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     known = [each for each in sizes if each.weight > 0.0 and np.isfinite(each.sd)]
     if not known:
         raise ValueError('no hypothesis with a weight: the size has no distribution')
-    part = (np.arange(_POINTS) + 0.5) / _POINTS
+    log_beyond = np.log1p(-(np.arange(_POINTS) + 0.5) / _POINTS)
     values, weights = [], []
     for each in known:
         sd = max(each.sd, 1e-12)
-        low = float(ndtr(-each.z / sd)) if each.prior.shape is Shape.HALF_NORMAL else 0.0
-        z = each.z + sd * ndtri(low + part * (1.0 - low))
+        # in logarithms: of a mean far beyond the end of a one-sided prior next to nothing is left
+        left = log_ndtr(each.z / sd) if each.prior.shape is Shape.HALF_NORMAL else 0.0
+        z = each.z - sd * ndtri_exp(log_beyond + left)
         values += [abs(each.prior.at(one)) for one in z.tolist()]
         weights += [each.weight] * _POINTS
     order = np.argsort(values)
     weight, value = np.array(weights)[order], np.array(values)[order]
     # between points: a step of the distribution at the last digit of a weight is none of the limit
+    weight /= weight.sum()  # it may be as small as a number can be
     middle = np.cumsum(weight) - 0.5 * weight
-    return float(np.interp(share * weight.sum(), middle, value))
+    return float(np.interp(share, middle, value))
 
 
 class Sensitivity(NamedTuple):

@@ -33,6 +33,12 @@ def test_the_limit_of_a_size_is_the_quantile_of_its_distribution() -> None:
     # one-sided: what is beyond the end is none of it
     one_sided = quantile([SizePosterior(1.0, 0.0, 1.0, half_normal(0.1))], 0.95)
     assert one_sided == pytest.approx(0.1 * halfnorm.ppf(0.95), rel=0.02)
+    # given that it is there: how improbable that is does not matter
+    improbable = quantile([SizePosterior(3e-312, 0.0, 1.0, half_normal(0.1))], 0.95)
+    assert improbable == pytest.approx(one_sided, rel=1e-6)
+    # of a mean far beyond the end an exponential tail is left
+    beyond = quantile([SizePosterior(1.0, -40.0, 1.0, half_normal(0.1))], 0.95)
+    assert beyond == pytest.approx(-0.1 * math.log(0.05) / 40.0, rel=0.02)
     deep = quantile([SizePosterior(1.0, 0.0, 1.0, log_normal(20.0, 0.35))], 0.05)
     assert deep == pytest.approx(20.0 * math.exp(0.35 * norm.ppf(0.05)), rel=0.02)
     both = [SizePosterior(0.9, 1.0, 1e-6, normal(1.0)), SizePosterior(0.1, 3.0, 1e-6, normal(1.0))]
