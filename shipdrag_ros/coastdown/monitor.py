@@ -180,6 +180,12 @@ class Monitor:
         found = self._vouching.texts | unit_doubts(bins)
         return found | ({'heading': heading} if heading else {})
 
+    def contradictions(self) -> dict[str, str]:
+        """
+        Say which inputs contradicted another at any time.
+        """
+        return self._vouching.ever
+
     def health(self) -> dict[str, InputHealth]:
         """
         Say how every input is doing, by its name.

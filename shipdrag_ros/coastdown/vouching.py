@@ -205,6 +205,14 @@ class Vouching:
         """What to say of each input that is doubted."""
         return {name: text for name, (until, text) in self._said.items() if until > self._now}
 
+    @property
+    def ever(self) -> dict[str, str]:
+        """The last that was said of each input that was not used; of none: of all."""
+        unused = {Channel(source).input for source in np.flatnonzero(self.until > NEVER).tolist()}
+        return {
+            name: text for name, (_, text) in self._said.items() if name in unused or not unused
+        }
+
     def sound(self, bins: Bins) -> Bins:
         """Return bins in which the sources that are not used were never read."""
         doubted = self.until > self._now
@@ -270,7 +278,11 @@ class Vouching:
             for source in speeds
         }
         contradiction = probability[tuple(speeds)] < 1.0 - _WRONG
+        left = len(speeds) - len(doubted)
         for source, each in wrong.items():
+            if source not in doubted and left < 2:
+                self._since[source] = NEVER  # the others say nothing of her: it is all there is
+                continue
             if source in doubted:
                 lasts = each > 1.0 - _WRONG
             else:  # a radar that takes another mark is odd for the length of its filter
@@ -280,9 +292,11 @@ class Vouching:
                 )
                 lasts = begins == number >= self._since[source] + _LASTS_S
             if lasts:
+                left -= source not in doubted
                 self.until[source] = number + _HOLD_S
             if lasts or (contradiction and each > 0.5 * max(wrong.values())):
-                text = _doubt(source, speeds, wrong, number, lasts=lasts)
+                used = {other: bool(self.until[other] <= number) for other in speeds}
+                text = _doubt(source, speeds, wrong, used, number)
                 self._said[Channel(source).input] = (number + _HOLD_S, text)
 
 
@@ -300,19 +314,19 @@ def _doubt(
     source: int,
     speeds: Mapping[int, Float64],
     wrong: Mapping[int, float],
+    used: Mapping[int, bool],
     number: int,
-    *,
-    lasts: bool,
 ) -> str:
     """Say what contradicts what, who is wrong, and what to do."""
-    best = min((each for each in speeds if each != source), key=lambda each: wrong[each])
+    others = [each for each in speeds if each != source]
+    best = min(others, key=lambda each: (not used[each], wrong[each]))
     mine, other = float(speeds[source].mean()), float(speeds[best].mean())
     units = mistaken_units(mine / other) if other else ''
-    used = ', which is used instead' if lasts else ''
+    instead = ', which is used instead' if used[best] and not used[source] else ''
     text = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
         f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
-        f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{used}: with a probability of '
+        f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{instead}: with a probability of '
         f'{min(wrong[source], 0.99):.2f} it says nothing of the ship: look at its sensor, axis, '
         'sign and unit'
     )

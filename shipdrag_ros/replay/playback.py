@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
@@ -82,6 +82,8 @@ class ReplayResult:
         Comparison with the outputs in the bag.
     steady_lead_s
         The longest that the ship was steady; None where no coastdown was looked for.
+    contradictions
+        What was said of inputs that contradict another, by input.
     """
 
     run: Run
@@ -92,6 +94,7 @@ class ReplayResult:
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
     steady_lead_s: float | None = None
+    contradictions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def not_coastdowns(self) -> tuple[NotCoastdown, ...]:
@@ -252,6 +255,7 @@ def _as_on_board(
         _counts(run, inputs, used, rejected),
         comparison.finish(),
         monitor.steady_lead_s,
+        monitor.contradictions(),
     )
 
 

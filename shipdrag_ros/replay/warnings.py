@@ -46,6 +46,7 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
     """
     return (
         *result.run.warnings,
+        *(f'{name}: {text}' for name, text in result.contradictions.items()),
         *_inputs(result.inputs),
         *_resets(result.events),
     )

@@ -117,6 +117,22 @@ def test_no_coastdown_is_a_result(steady_bag: Path, capsys: pytest.CaptureFixtur
     assert 'No coastdown found: longest steady sailing ' in capsys.readouterr().out
 
 
+def test_a_log_in_another_unit_is_named_and_the_positions_give_the_figure(
+    tmp_path: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = tmp_path / 'km_h.mcap'
+    line = ['simulate', '--ship', str(ship_file), '-o', str(bag), '--speed', '8', '--seed', '5']
+    line += ['--lead-in', '1200', '--duration', '1200', '--effect', 'log_scale=2.6']
+    assert main([*line, '--inputs', 'speed_through_water,position']) == 0
+    found = replay(capsys, bag)
+    (warning,) = (each['warning'] for each in found['warnings'])
+    assert warning.startswith('speed_through_water: over a minute up to')
+    assert 'the position 2.30' in warning
+    assert 'which is used instead' in warning
+    (coastdown,) = found['coastdowns']
+    assert coastdown['samples'].keys() == {'position'}
+
+
 def test_a_given_window_is_estimated_as_it_is(
     coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

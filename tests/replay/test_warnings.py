@@ -14,7 +14,9 @@ SURPLUS = Unreadable.SURPLUS_JOINT.value
 
 
 def told(inputs: dict[str, InputCounts], *events: Reset) -> tuple[str, ...]:
-    result = SimpleNamespace(run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events)
+    result = SimpleNamespace(
+        run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events, contradictions={}
+    )
     return warnings.run_warnings(result)  # type: ignore[arg-type]
 
 
