@@ -26,7 +26,7 @@ from shipdrag_ros.simulation import (
     STANDARD_SD,
     START_NS,
 )
-from shipdrag_ros.simulation.effects import LIBRARY, find, parse, values_of
+from shipdrag_ros.simulation.effects import LIBRARY, effects_of, find, parse, values_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -146,6 +146,7 @@ def run(options: argparse.Namespace) -> int:
     """
     output = Output(options.json)
     ship = Ship.load(options.ship)
+    effects_of(ship)  # those that her file declares are known by name from here on
     speed_m_s = options.speed
     if speed_m_s is None:
         speed_m_s = usual_speed(ship)

@@ -72,11 +72,9 @@ def table(found: Learnt) -> Table:
 
 def _term_tables(term: LearntTerm) -> tuple[tuple[str, Table], ...]:
     """Return sizes, and what they rest on."""
-    limits = term.limits or {}
+    most = {name: f'{limit.upper_95:.4g}' for name, limit in (term.limits or {}).items()}
     sizes = tuple(
-        (name, f'{q.value:.4g}', f'{q.sd:.2g}', q.unit, f'{limits[name].upper_95:.4g}')
-        if name in limits
-        else (name, f'{q.value:.4g}', f'{q.sd:.2g}', q.unit, '')
+        (name, f'{q.value:.4g}', f'{q.sd:.2g}', q.unit, most.get(name, ''))
         for name, q in term.parameters.items()
     )
     tables = [('Sizes', Table(('parameter', 'value', 'sd', 'unit', 'at most (95 %)'), sizes))]

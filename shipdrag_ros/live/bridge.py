@@ -66,7 +66,7 @@ from shipdrag_ros.messages.heard import (
     Samples,
     ShipFile,
 )
-from shipdrag_ros.samples import MOTION_INPUTS, Channel
+from shipdrag_ros.samples import MOTION_INPUTS, SHAFTS, Channel
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -524,13 +524,13 @@ class Bridge:
         turned = None if course is None or before is None else course - before
         depth = self._recent.mean(Channel.DEPTH, second)
         rudder = self._recent.mean(Channel.RUDDER, second)
-        shaft = self._recent.mean(Channel.SHAFT, second)
+        shafts = [self._recent.mean(channel, second) for channel in SHAFTS]
         checks = [
             lead_check(lead_s, now.ready_s),
             wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
             depth_check(depth and depth[0], speed_m_s, self._ship),
             rudder_check(rudder and rudder[0]),
-            shaft_check(shaft and shaft[0]),
+            shaft_check(min((each[0] for each in shafts if each is not None), default=None)),
             course_check(turned, coasting=coasting),
             reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
         ]

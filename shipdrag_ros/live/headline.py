@@ -17,8 +17,9 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.display import M_S_PER_KNOT
+from shipdrag_ros.estimation.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.messages.heard import READY_S
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import SHAFTS, Block, Channel
 from shipdrag_ros.ship import Ship
 
 WIND_M_S = 5.4  # true wind, Beaufort 3: above it air drag is no small correction
@@ -26,9 +27,6 @@ RUDDER_RAD = math.radians(5.0)  # a mean angle above it is steering, and slows t
 COURSE_RAD = 0.35  # the parameter `turn_rad` as it is set at first
 _RECENT_S = 60
 _GRAVITY_M_S2 = 9.81
-
-
-_ASTERN_RAD_S = 0.5  # 5 rpm
 
 
 class Held(StrEnum):
@@ -63,7 +61,7 @@ class Recent:
                 Channel.HEADING,
                 Channel.WIND_APPARENT,
                 Channel.DEPTH,
-                Channel.SHAFT,
+                *SHAFTS,
             )
         }
 
@@ -162,13 +160,18 @@ def rudder_check(angle_rad: float | None) -> Check:
 
 def shaft_check(rate_rad_s: float | None) -> Check:
     """
-    Say how fast the shaft turns; ask where none is received: an engine astern makes r too large.
+    Say how fast a shaft turns; ask where none is received: an engine astern makes r too large.
+
+    Parameters
+    ----------
+    rate_rad_s
+        Of the one that turns ahead the least.
     """
     name = 'Shaft'
     if rate_rad_s is None:
         return Check(name, Held.UNKNOWN, 'not received: is the engine stopped, and not astern?')
     text = f'{rate_rad_s * 30.0 / math.pi:.0f} rpm'
-    astern = rate_rad_s < -_ASTERN_RAD_S
+    astern = rate_rad_s < -STANDS_RAD_S
     return Check(name, Held.NO if astern else Held.YES, f'{text}: astern' if astern else text)
 
 

@@ -76,18 +76,18 @@ class Variable(StrEnum):
     DATE = auto()
 
 
-_OF_RUN: tuple[str, ...] = ('speed',)
+_CONSTANT: tuple[str, ...] = ('speed',)  # by nothing: even over the speed
 ACTING: Mapping[str, tuple[str, ...]] = {
     'force': ('speed', 'time', 'heading', 'date', 'depth'),
     'water': ('speed', 'time'),
-    'air': _OF_RUN,
+    'air': _CONSTANT,
     'log': ('speed', 'time'),
-    'ground': _OF_RUN,
-    'inertia': _OF_RUN,
-    'clock': _OF_RUN,
-    'filter': _OF_RUN,
-    'shaft': _OF_RUN,
-    'depth': _OF_RUN,
+    'ground': _CONSTANT,
+    'inertia': _CONSTANT,
+    'clock': _CONSTANT,
+    'filter': _CONSTANT,
+    'shaft': _CONSTANT,
+    'depth': _CONSTANT,
 }
 """What a term acts on, with the variables by which that can be simulated."""
 CHANNELS = tuple(ACTING)

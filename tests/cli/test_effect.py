@@ -88,6 +88,17 @@ def test_a_learnt_effect_is_named_and_written_into_the_ship_file(
     assert 'weed: A = ' in capsys.readouterr().out
 
 
+def test_a_term_of_the_ship_file_may_be_simulated_without_a_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ship = tmp_path / 'ship.yaml'
+    term = replace(LearntTerm.load(WEED), name='weed_of_her_own')  # no test before knows it
+    ship.write_text(replace(Ship.load(SHIP), learnt=(term,)).to_yaml())
+    line = ['simulate', '--ship', str(ship), '-o', str(tmp_path / 'a.mcap')]
+    assert main([*line, '--effect', 'weed_of_her_own=0.002', '--duration', '60']) == 0
+    assert 'weed_of_her_own: A = 0.002' in capsys.readouterr().out
+
+
 def test_a_hostile_term_in_a_ship_file_is_an_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

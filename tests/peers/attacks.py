@@ -253,8 +253,8 @@ def kill_9(bench: Bench) -> Found:
 KILLS = 20
 
 
-def stopped_for_15_s(bench: Bench) -> Found:
-    node = bench.node()
+def under_way(bench: Bench) -> tuple[list[bytes], Callable[[], None]]:
+    """Sail until the node uses what it hears; return what was sent, and how to send more."""
     sent = []
 
     def sail() -> None:
@@ -262,6 +262,12 @@ def stopped_for_15_s(bench: Bench) -> Found:
         bench.peer.log.publish(sent[-1])
 
     bench.seconds_until(lambda: bench.peer.value(LOG, 'used') > 10, meanwhile=sail, within_s=30.0)
+    return sent, sail
+
+
+def stopped_for_15_s(bench: Bench) -> Found:
+    node = bench.node()
+    sent, sail = under_way(bench)
     node.process.send_signal(signal.SIGSTOP)
     bench.seconds_until(lambda: False, meanwhile=sail, within_s=15.0)
     node.process.send_signal(signal.SIGCONT)
@@ -700,13 +706,7 @@ def wrong_readings(bench: Bench) -> Found:
 def a_full_disk(bench: Bench) -> Found:
     """The node may write no more for 10 s."""
     node = bench.node()
-    sent = []
-
-    def sail() -> None:
-        sent.append(cdr_twist(time.time_ns(), 5.0 + 1e-4 * len(sent)))
-        bench.peer.log.publish(sent[-1])
-
-    bench.seconds_until(lambda: bench.peer.value(LOG, 'used') > 10, meanwhile=sail, within_s=30.0)
+    sent, sail = under_way(bench)
     before = resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, (1000, -1))
 
     def said() -> bool:

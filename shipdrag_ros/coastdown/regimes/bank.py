@@ -51,7 +51,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     STAYS_WAY,
     SWITCHES,
     THE_LOG,
-    THE_TRACK,
     WAY,
     WEIGHT,
     BankSetting,
@@ -70,13 +69,11 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     P_TURNING,
     P_ENGAGED,
     P_EVEN,
-    SPEED,
-    LOG_LIES,
-    TRACK_LIES,
-    FIT,
     P_STEADY,
-) = range(12)
-OUTS = 12  # and of even power, mean speed, P(it says nothing true), log predictive density
+    SPEED,
+    FIT,
+) = range(10)
+OUTS = 10  # and of even power, of the first one, mean speed, log predictive density
 _TURNING_RAD_S = 0.5  # a shaft below it drives no ship
 
 
@@ -230,7 +227,6 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
-    out[P_STEADY] = 0.0
     for k in range(FIT):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
@@ -257,10 +253,6 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         else:
             out[P_TURNING] += share
         out[SPEED] += share * math.exp(all_.mean[i, LN_U])
-        if w[LIAR] == THE_LOG:
-            out[LOG_LIES] += share
-        elif w[LIAR] == THE_TRACK:
-            out[TRACK_LIES] += share
 
 
 _SETTING = BankSetting(
