@@ -95,7 +95,10 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     assert abs(float(viewer.text('#figure-over').split()[0].strip('+'))) < 15.0  # she is clean
     assert 'clean hull' in viewer.text('#curve-say')
     for chart in ('curve', 'speeds', 'shafts'):
-        assert viewer.page.evaluate(f'{DRAWN}("{chart}")') > 3
+        end_s = time.monotonic() + 60.0  # drawn with the next message
+        while viewer.page.evaluate(f'{DRAWN}("{chart}")') <= 3:
+            assert time.monotonic() < end_s, chart
+            viewer.page.wait_for_timeout(50)
     assert 'speed through water' in viewer.text('#inputs')
     assert 'Steady lead' in viewer.text('#checks')
     agreed = viewer.wait_for('#verdict', 'Nothing is missing')
