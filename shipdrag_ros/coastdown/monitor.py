@@ -39,7 +39,6 @@ from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
-from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
@@ -177,7 +176,7 @@ class Monitor:
         """
         bins = self._memory.bins
         heading = heading_doubt(bins, self._parameters.heading_convention)
-        found = self._vouching.texts | unit_doubts(bins)
+        found = self._vouching.texts
         return found | ({'heading': heading} if heading else {})
 
     def contradictions(self) -> dict[str, str]:

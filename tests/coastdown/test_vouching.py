@@ -31,7 +31,7 @@ RNG = np.random.default_rng(0)
 def sound(log: np.ndarray, ground: np.ndarray) -> float:
     """Return the probability that both measure the ship."""
     speeds = {LOG: log, GROUND: ground + 0.02 * RNG.standard_normal(10)}
-    return sound_probabilities(speeds, CRAFT)[LOG, GROUND]
+    return sound_probabilities(speeds, CRAFT).sets[LOG, GROUND]
 
 
 @pytest.mark.parametrize('fault', [fault for fault in FAULTS if fault not in ('none', 'constant')])
@@ -112,9 +112,9 @@ def test_a_current_a_turn_in_it_a_glide_and_noise_are_no_contradiction() -> None
 
 def test_a_third_source_shows_which_of_two_is_wrong() -> None:
     five = MINUTE + 5.0
-    two = sound_probabilities({GROUND: five, TRACK: MINUTE + 9.0}, CRAFT)
+    two = sound_probabilities({GROUND: five, TRACK: MINUTE + 9.0}, CRAFT).sets
     assert max(two[(GROUND,)], two[(TRACK,)]) < 0.9
-    three = sound_probabilities({LOG: five, GROUND: five, TRACK: MINUTE + 9.0}, CRAFT)
+    three = sound_probabilities({LOG: five, GROUND: five, TRACK: MINUTE + 9.0}, CRAFT).sets
     assert three[LOG, GROUND] > 0.9
 
 
