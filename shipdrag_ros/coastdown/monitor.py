@@ -185,6 +185,12 @@ class Monitor:
         """
         return self._vouching.ever
 
+    def left_out(self) -> dict[str, str]:
+        """
+        Say which inputs were left out at any time, as another contradicted them.
+        """
+        return self._vouching.left_out
+
     def health(self) -> dict[str, InputHealth]:
         """
         Say how every input is doing, by its name.
@@ -215,9 +221,9 @@ class Monitor:
             if stop == WalkEvent.FULL:
                 self._make_room()
             elif stop == WalkEvent.UPDATE:
-                events.append(self._update(int(stamp_ns[at])))
+                events += self._vouching.explained([self._update(int(stamp_ns[at]))])
             elif stop == WalkEvent.BIN:
-                events += self._judge()
+                events += self._vouching.explained(self._judge())
             elif stop == WalkEvent.LOOK:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
@@ -513,9 +519,10 @@ class Monitor:
             capacity=CAPACITY,
         )
         kept = self._vouching.kept(kept)
-        return Window.from_block(
+        window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
+        return replace(window, notes=(*window.notes, *self._vouching.notes(start_ns)))
 
     # how a coastdown ends
 
@@ -536,7 +543,7 @@ class Monitor:
             age_s = end_ns // SECOND_NS - self._candidate.start
             events += self._dismiss(cut_short(ended_by, age_s), end_ns)
         self._stand_down()
-        return events
+        return self._vouching.explained(events)
 
     def _end_at(self, end: End, end_ns: int) -> list[Event]:
         assert self._candidate is not None

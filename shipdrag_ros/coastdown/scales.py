@@ -28,14 +28,19 @@ _MIDDLE = 0.5 * (EDGES[1:] + EDGES[:-1])
 CURRENT = ((0.4, 0.7), (1.0, 0.3))  # between log and ground [m/s]
 TURNS = 0.1  # probability that she turns in it
 _TURN_S = 60.0
+_ANOTHER = 0.2  # probability that it is another one before some time, after a turn
 _DRIFT = ((0.002, 0.5), (0.01, 0.5))  # its change in a second [m/s]; grows with the root of time
-_PLACE = ((1.0, 0.4), (4.0, 0.3), (16.0, 0.3))  # of a way made good [m]
-_JITTER = ((0.1, 0.5), (0.5, 0.5))  # of a log in one second [m/s]
-_OFFSET, _LEAST = 0.1, 0.03  # of a log; of a mean that lasts long [m/s]
+_PLACE = ((1.0, 0.5), (8.0, 0.5))  # of a way made good [m]
+_JITTER, _OFFSET = 0.2, 0.1  # of a log in one second, and always [m/s]
+_LEAST = 0.03  # of a way made good that lasts long [m/s]
 _SOUND = ((0.02, 0.8), (0.06, 0.2))  # of ln scale: a Doppler log, a paddle wheel
-_WIDE, _UNITS, _UNIT = 0.5, 0.5, 0.04  # of one that is wrong; share of mistaken units, and their sd
+_WIDE, _UNITS, _UNIT = (
+    0.5,
+    0.5,
+    0.04,
+)  # of one that is wrong; share of mistaken units, and their sd
 
-_NEAR, _FAR = np.arange(-0.18, 0.19, 0.02), np.arange(0.22, 1.7, 0.04)
+_NEAR, _FAR = np.arange(-0.2, 0.21, 0.025), np.arange(0.26, 1.7, 0.06)
 _LN = np.concatenate([-_FAR[::-1], _NEAR, _FAR])
 _SCALE = np.exp(_LN)
 
@@ -46,10 +51,10 @@ def _normal(away: Float64, sd: float) -> Float64:
 
 def _share(density: Float64) -> Float64:
     density = density * np.gradient(_LN)
-    return np.log(np.maximum(density / density.sum(), 1e-300))
+    return np.asarray(np.log(np.maximum(density / density.sum(), 1e-300)), np.float64)
 
 
-_IS_SOUND = _share(sum(part * _normal(_LN, sd) for sd, part in _SOUND))
+_IS_SOUND = _share(np.sum([part * _normal(_LN, sd) for sd, part in _SOUND], axis=0))
 _IS_WRONG = _share(
     (1.0 - _UNITS) * _normal(_LN, _WIDE)
     + _UNITS * np.mean([_normal(_LN - math.log(each), _UNIT) for each in UNIT_RATIOS], axis=0)
@@ -76,27 +81,32 @@ class Scaled(NamedTuple):
 
 
 @lru_cache
-def _settings(count: int) -> tuple[Float64, Float64, Float64]:
-    """Return whitening, what a log adds to unit variances, and logarithms of the factors."""
-    white, added, factors = [], [], []
+def _settings(count: int) -> tuple[Float64, Float64, Float64, Float64]:
+    """Return whitening, what a log adds to unit variances, factors as logarithms, currents."""
+    white, added, factors, currents = [], [], [], []
     middle, width = _MIDDLE[:count], _WIDTH[:count]
     apart, since = np.subtract.outer(middle, middle), middle[-1] - middle
     same = np.ones((count, count))
-    kinds = ((same, 1.0 - TURNS), (np.exp(-np.abs(apart) / _TURN_S), TURNS))
     walk = np.minimum.outer(since, since)
-    for (size, a), (kind, b), (drift, c), (place, d), (jitter, e) in product(
-        CURRENT, kinds, _DRIFT, _PLACE, _JITTER
-    ):
+    steady = 1.0 - TURNS - _ANOTHER
+    kinds = [(same, drift, steady * part) for drift, part in _DRIFT]
+    kinds.append((np.exp(-np.abs(apart) / _TURN_S), _DRIFT[-1][0], TURNS))
+    for first in range(1, count):
+        newer = np.arange(count) < first
+        one = (newer[:, None] == newer).astype(np.float64)
+        kinds.append((one, _DRIFT[-1][0], _ANOTHER / (count - 1)))
+    of_log = np.diag(_JITTER**2 / width) + _OFFSET**2 * same
+    for (size, a), (kind, drift, b), (place, c) in product(CURRENT, kinds, _PLACE):
         water = size**2 * kind + drift**2 * walk
         ground = water + np.diag((place / width) ** 2 + _LEAST**2)
-        of_log = np.diag(jitter**2 / width) + _OFFSET**2 * same
         lower = np.linalg.cholesky(ground)
         inverse = np.linalg.inv(lower)
         more, vectors = np.linalg.eigh(inverse @ of_log @ inverse.T)
         white.append(vectors.T @ inverse)
         added.append(np.maximum(more, 0.0))
-        factors.append(math.log(a * b * c * d * e) - np.log(np.diag(lower)).sum())
-    return np.array(white), np.array(added), np.array(factors)
+        currents.append([size])
+        factors.append(math.log(a * b * c) - np.log(np.diag(lower)).sum())
+    return np.array(white), np.array(added), np.array(factors), np.array(currents)
 
 
 def scaled(reading: Float64, truth: Float64) -> Scaled:
@@ -108,12 +118,19 @@ def scaled(reading: Float64, truth: Float64) -> Scaled:
     reading, truth : (n,)
         Means over the spans of `EDGES` [m/s], the newest first, n at most all.
     """
-    white, added, factors = _settings(len(reading))
+    white, added, factors, currents = _settings(len(reading))
     one, two = white @ truth, white @ reading
+    # over ground a current from abeam adds more, the slower she is
+    abeam = currents**2 / (2.0 * np.maximum(truth, currents))
+    beside = (white @ abeam[:, :, None])[:, :, 0]
     inverse = 1.0 / _SCALE[:, None, None]
-    variance = 1.0 + inverse**2 * added
-    away = (one - inverse * two) ** 2 / variance + np.log(variance)
-    each = np.logaddexp.reduce(factors - 0.5 * away.sum(axis=-1), axis=1)
+    precision = 1.0 / (1.0 + inverse**2 * added)
+    away = one - inverse * two
+    scaled_away = away * precision
+    along, size = (scaled_away * beside).sum(axis=-1), 1.0 + (beside**2 * precision).sum(axis=-1)
+    square = (away * scaled_away - np.log(precision)).sum(axis=-1)
+    logs = square - along**2 / size + np.log(size)
+    each = np.logaddexp.reduce(factors - 0.5 * logs, axis=1)
     wrong = each + _IS_WRONG
     log_odds = np.logaddexp.reduce(wrong) - np.logaddexp.reduce(each + _IS_SOUND)
     scale = float(_SCALE[int(np.argmax(wrong))])
@@ -134,7 +151,7 @@ def means(bins: Bins, source: int, last: int) -> Float64:
         The second with which the newest ends.
     """
     totals, newest = bins.speeds[source], int(bins.closed[source])
-    edges = last - EDGES[EDGES < len(totals)]
+    edges = last - EDGES[len(totals) > EDGES]
     each = -np.diff(totals[np.minimum(edges, newest) & (len(totals) - 1)], axis=0)
     there = 2 * each[:, COUNT] > -np.diff(edges)
     count = len(there) if there.all() else int(np.argmin(there))

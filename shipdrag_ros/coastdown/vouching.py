@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations, product
 from typing import NamedTuple
@@ -27,6 +28,7 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     smoothing,
 )
+from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
 from shipdrag_ros.coastdown.scales import CURRENT, TURNS, Scaled, means, scaled
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.display import mistaken_units, utc
@@ -231,6 +233,20 @@ class Craft(NamedTuple):
     slow_m_s: float
 
 
+class Contradiction(NamedTuple):
+    """
+    What is said of a source until a second: why it is doubted, and what to do.
+    """
+
+    until: int
+    why: str
+    remedy: str
+
+    @property
+    def text(self) -> str:
+        return f'{self.why}: {self.remedy}'
+
+
 class Vouching:
     """
     What the sources of one monitor say of each other.
@@ -251,20 +267,59 @@ class Vouching:
         self._craft = craft
         self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
         self._now = NEVER
-        self._said: dict[str, tuple[int, str]] = {}
+        self._said: dict[str, Contradiction] = {}
 
     @property
     def texts(self) -> dict[str, str]:
         """What to say of each input that is doubted."""
-        return {name: text for name, (until, text) in self._said.items() if until > self._now}
+        return {name: one.text for name, one in self._said.items() if one.until > self._now}
 
     @property
     def ever(self) -> dict[str, str]:
         """The last that was said of each input that was not used; of none: of all."""
-        unused = {Channel(source).input for source in np.flatnonzero(self.until > NEVER).tolist()}
-        return {
-            name: text for name, (_, text) in self._said.items() if name in unused or not unused
-        }
+        return self.left_out or {name: one.text for name, one in self._said.items()}
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """The last that was said of each input that was not used."""
+        return {name: one.text for name, one in self._unused(NEVER).items()}
+
+    def _unused(self, since: int) -> dict[str, Contradiction]:
+        sources = np.flatnonzero(self.until > since).tolist()
+        return {name: self._said[name] for name in {Channel(each).input: None for each in sources}}
+
+    def notes(self, start_ns: int) -> tuple[str, ...]:
+        """Say of each input that is not used from a time on [ns] that it is left out, and why."""
+        unused = self._unused(start_ns // SECOND_NS)
+        return tuple(f'without {name}: {one.text}' for name, one in unused.items())
+
+    def explained(self, events: list[Event]) -> list[Event]:
+        """Say in what failed that an input is left out, why, and what to do."""
+        unused = self._unused(self._now)
+        if not unused:
+            return events
+        why = '; '.join(
+            f'the {name.replace("_", " ")} is left out: {one.why}' for name, one in unused.items()
+        )
+        remedy = '; '.join(one.remedy for one in unused.values())
+
+        def told(text: str) -> str:
+            return (
+                f'{why}. By what is left, {text}. To do: {remedy}; or give a speed over ground, '
+                'of which less is needed than of positions'
+            )
+
+        def of(event: Event) -> Event:
+            if isinstance(event, NotCoastdown):
+                return replace(event, text=told(event.text))
+            if isinstance(event, NoEstimate):
+                return replace(event, reason=told(event.reason))
+            if isinstance(event, EndedCoastdown) and event.failure:
+                cuts = tuple(replace(cut, text=told(cut.text)) for cut in event.cuts)
+                return replace(event, failure=told(event.failure), cuts=cuts)
+            return event
+
+        return [of(event) for event in events]
 
     def sound(self, bins: Bins) -> Bins:
         """Return bins in which the sources that are not used were never read."""
@@ -321,7 +376,7 @@ class Vouching:
         if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
             return
         doubted = [source for source in speeds if self.until[source] > number]
-        scales = _scales(bins, speeds, last, lag, self._craft)
+        scales = _scales(bins, speeds, last, lag)
         found = sound_probabilities(speeds, self._craft, doubted=doubted, scales=scales)
         wrong = {source: found.wrong(source) for source in speeds}
         contradiction = found.sets[tuple(speeds)] < 1.0 - _WRONG
@@ -343,33 +398,36 @@ class Vouching:
             if lasts:
                 left -= source not in doubted
                 self.until[source] = number + _HOLD_S
-            if lasts or (contradiction and each > 0.5 * max(wrong.values())):
+            if lasts or (contradiction and each == max(wrong.values())):
                 used = {other: bool(self.until[other] <= number) for other in speeds}
-                name, text = Channel(source).input, ''
-                if not contradiction:  # what was said is still the best that is known
-                    _, text = self._said.get(name, (NEVER, ''))
-                text = text or _doubt(source, speeds, found, used, scales, number)
-                self._said[name] = (number + _HOLD_S, text)
+                name = Channel(source).input
+                one = self._said.get(name)
+                if contradiction or one is None:  # else what was said is the best that is known
+                    one = _doubt(source, speeds, found, used, scales, number)
+                self._said[name] = one._replace(until=number + _HOLD_S)
 
 
 def _scales(
-    bins: Bins, sources: Collection[int], last: int, lag: int, craft: Craft
+    bins: Bins, sources: Collection[int], last: int, lag: int
 ) -> dict[tuple[int, int], Scaled]:
     """Say of each speed whether it is another one in a wrong scale."""
     read = {
         source: means(bins, source, last + lag * (source >= FIRST_TRACK)) for source in sources
     }
     found = {}
-    for one, other in product(read, read):
-        if one == other or one >= FIRST_TRACK:
+    for one, other in combinations(read, 2):
+        if one >= FIRST_TRACK:
             continue
         count = min(len(read[one]), len(read[other]))
         both = np.array([read[one][:count], read[other][:count]])
-        # as long as she makes way, and ahead
-        way = (both > 0.0).all(axis=0) & (both.max(axis=0) > craft.slow_m_s)
+        # as long as she makes way ahead, through the water and faster than a current may run:
+        # a speed over ground has no sign
+        way = (both > 0.0).all(axis=0) & (both[1] > CURRENT[-1][0])
         count = count if way.all() else int(np.argmin(way))
         if count:
-            found[one, other] = scaled(*both[:, :count])
+            found[one, other] = both_ways = scaled(*both[:, :count])
+            if other < FIRST_TRACK:  # which of two is wrong is known beforehand alone
+                found[other, one] = both_ways._replace(scale=1.0 / both_ways.scale)
     return found
 
 
@@ -390,7 +448,7 @@ def _doubt(
     used: Mapping[int, bool],
     scales: Mapping[tuple[int, int], Scaled],
     number: int,
-) -> str:
+) -> Contradiction:
     """Say what contradicts what, who is wrong, and what to do."""
     others = [each for each in speeds if each != source]
     best = min(others, key=lambda each: (not used[each], found.wrong(each)))
@@ -398,20 +456,22 @@ def _doubt(
     instead = ', which is used instead' if used[best] and not used[source] else ''
     units = mistaken_units(mine / other) if other else ''
     near = f' (near {units})' if units else ''
-    text = (
+    why = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
         f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
         f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{instead}: with a probability of '
     )
     if (source, best) in scales and found.scaled[source] > 0.5 * found.wrong(source):
         scale = scales[source, best]
-        return (
-            f'{text}{min(found.scaled[source], 0.99):.2f}, by {scale.span_s} s, it reads about '
-            f'{scale.scale:.2f} times the speed{near}: look at its calibration and at the unit '
-            f'that its driver converts from; if they are right, a current of '
-            f'{abs(other - mine):.1f} m/s runs, which she feels when she turns'
+        return Contradiction(
+            number,
+            f'{why}{min(found.scaled[source], 0.99):.2f}, by {scale.span_s} s, it reads about '
+            f'{scale.scale:.2f} times the speed{near}',
+            'look at the unit that its driver converts from and at its calibration; if they are '
+            f'right, a current of {abs(other - mine):.1f} m/s runs, which shows when she turns',
         )
-    return (
-        f'{text}{min(found.wrong(source), 0.99):.2f} it says nothing of the ship: look at its '
-        f'sensor, axis, sign and unit{near}'
+    return Contradiction(
+        number,
+        f'{why}{min(found.wrong(source), 0.99):.2f} it says nothing of the ship{near}',
+        'look at its sensor, axis, sign and unit',
     )
