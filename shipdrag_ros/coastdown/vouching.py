@@ -304,10 +304,7 @@ class Vouching:
         remedy = '; '.join(one.remedy for one in unused.values())
 
         def told(text: str) -> str:
-            return (
-                f'{why}. By what is left, {text}. To do: {remedy}; or give a speed over ground, '
-                'of which less is needed than of positions'
-            )
+            return f'{why}. By what is left, {text}. To do: {remedy}'
 
         def of(event: Event) -> Event:
             if isinstance(event, NotCoastdown):
@@ -456,6 +453,8 @@ def _doubt(
     instead = ', which is used instead' if used[best] and not used[source] else ''
     units = mistaken_units(mine / other) if other else ''
     near = f' (near {units})' if units else ''
+    alone = all(each >= FIRST_TRACK for each in others)
+    less = '; of a speed over ground less is needed than of positions alone' if alone else ''
     why = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
         f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
@@ -468,10 +467,10 @@ def _doubt(
             f'{why}{min(found.scaled[source], 0.99):.2f}, by {scale.span_s} s, it reads about '
             f'{scale.scale:.2f} times the speed{near}',
             'look at the unit that its driver converts from and at its calibration; if they are '
-            f'right, a current of {abs(other - mine):.1f} m/s runs, which shows when she turns',
+            f'right, a current of {abs(other - mine):.1f} m/s runs, which turns show{less}',
         )
     return Contradiction(
         number,
         f'{why}{min(found.wrong(source), 0.99):.2f} it says nothing of the ship{near}',
-        'look at its sensor, axis, sign and unit',
+        f'look at its sensor, axis, sign and unit{less}',
     )
