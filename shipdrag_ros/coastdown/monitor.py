@@ -42,6 +42,7 @@ from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.doubted import averaged
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
@@ -101,8 +102,8 @@ class Monitor:
     ) -> None:
         self._ship = ship
         self._parameters = parameters
-        self._estimator = None if estimate is None else shielded(estimate)
-        self._final_estimator = shielded(final)
+        self._estimator = None if estimate is None else shielded(averaged(estimate))
+        self._final_estimator = shielded(averaged(final))
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
             Limits.of(parameters),
@@ -522,7 +523,8 @@ class Monitor:
         window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
-        return replace(window, notes=(*window.notes, *self._vouching.notes(start_ns)))
+        notes = (*window.notes, *self._vouching.notes(start_ns))
+        return replace(window, notes=notes, log_doubt=self._vouching.log_doubt)
 
     # how a coastdown ends
 

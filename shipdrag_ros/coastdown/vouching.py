@@ -29,7 +29,7 @@ from shipdrag_ros.coastdown.bins import (
     smoothing,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
-from shipdrag_ros.coastdown.scales import CURRENT, TURNS, Scaled, means, scaled
+from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, means, scaled
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
@@ -268,6 +268,7 @@ class Vouching:
         self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
         self._now = NEVER
         self._said: dict[str, Contradiction] = {}
+        self._scaled = (NEVER, 0.0)  # when it was last known whether the log is, and how probable
 
     @property
     def texts(self) -> dict[str, str]:
@@ -278,6 +279,13 @@ class Vouching:
     def ever(self) -> dict[str, str]:
         """The last that was said of each input that was not used; of none: of all."""
         return self.left_out or {name: one.text for name, one in self._said.items()}
+
+    @property
+    def log_doubt(self) -> float:
+        """Probability that the log is in a wrong scale, though it is used."""
+        when, doubt = self._scaled
+        known = when > self._now - EDGES[-1] and self.until[_LOG] <= self._now
+        return doubt if known else 0.0
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -375,6 +383,8 @@ class Vouching:
         doubted = [source for source in speeds if self.until[source] > number]
         scales = _scales(bins, speeds, last, lag)
         found = sound_probabilities(speeds, self._craft, doubted=doubted, scales=scales)
+        if any(one == _LOG for one, _ in scales):
+            self._scaled = (number, found.scaled[_LOG])
         wrong = {source: found.wrong(source) for source in speeds}
         contradiction = found.sets[tuple(speeds)] < 1.0 - _WRONG
         left = len(speeds) - len(doubted)
