@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -142,7 +143,7 @@ class Prior:
         Raises
         ------
         ValueError
-            If the prior is a choice or uniform.
+            If the prior is a choice.
         """
         a, b = self.first, self.second
         match self.shape:
@@ -150,7 +151,10 @@ class Prior:
                 return value / b
             case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
                 return math.log(max(value / a, 1e-300)) / b
-            case Shape.CHOICE | Shape.UNIFORM:
+            case Shape.UNIFORM:
+                share = min(max((value - a) / (b - a), 1e-12), 1.0 - 1e-12)
+                return NormalDist().inv_cdf(share)
+            case Shape.CHOICE:
                 raise ValueError(f'a prior that is {self} has no z of a value')
             case _:
                 return (value - a) / b
