@@ -65,7 +65,8 @@ def main() -> None:
         value[rows, 0] = spoilt(KINDS[hour % len(KINDS)], value[rows, 0], rng)
     block = Block(block.channel, block.stamp_ns, block.receive_ns, value, block.variance)
     monitor, states = Monitor(ship_of(LENGTH_M), Parameters(), estimate=None), InputStates()
-    green, first, false = dict.fromkeys(KINDS, 0), {}, 0
+    green, false = dict.fromkeys(KINDS, 0), dict.fromkeys(KINDS, 0)
+    first: dict[int, int] = {}
     for at_s, part in enumerate(by_seconds(block)):
         monitor.update(part)
         sound = well(monitor, states, at_s)
@@ -75,21 +76,26 @@ def main() -> None:
             green[kind] += sound
             if not sound:
                 first.setdefault(hour, since)
-        elif not 0 <= since < LASTS_S + HELD_S:
-            false += not sound
+        elif since >= LASTS_S + HELD_S or (since < 0 and hour):
+            # until the next one begins it is that of before
+            false[kind if since > 0 else KINDS[(hour - 1) % len(KINDS)]] += not sound
     rows = []
     for place, kind in enumerate(KINDS):
         hours = range(place, options.hours, len(KINDS))
         seen = ', '.join(f'{first[h]}' if h in first else 'never' for h in hours)
-        rows.append((kind, len(hours), seen, f'{green[kind] / 60.0:.1f}'))
+        minutes = (f'{each[kind] / 60.0:.1f}' for each in (green, false))
+        rows.append((kind, len(hours), seen, *minutes))
     wrong = options.hours * LASTS_S / 60.0
-    head = ('the log', 'faults of 10 min', 'not green after [s]', 'green while wrong [min]')
+    head = (
+        'the log', 'faults of 10 min', 'not green after [s]', 'green while wrong [min]',
+        'not green later [min]',
+    )  # fmt: skip
     lines = [
         *table(head, rows),
         '',
         f'Green in {sum(green.values()) / 60.0:.0f} of {wrong:.0f} minutes in which the log was '
-        f'wrong; not green in {false / 60.0:.1f} of {options.hours * 60 - wrong:.0f} in which '
-        'nothing was.',
+        f'wrong; not green in {sum(false.values()) / 60.0:.0f} of '
+        f'{options.hours * 60 - wrong:.0f} in which nothing was.',
     ]
     print('\n'.join(lines))
     if options.write:
