@@ -193,7 +193,7 @@ def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
                 yield 'speed', 'step', f'{base}*{step}', turns
         hump = _hump('u', 'u_c', 'sqrt(g*L)', top)
         yield 'speed', 'hump', f'{base}*{hump}', turns | _width(top)
-        yield 'speed', 'decay', f'{base}*exp(-u/(u_c*sqrt(g*L)))', turns
+    yield 'speed', 'decay', f'{_as_power(0)}*exp(-u/(u_c*sqrt(g*L)))', turns
     for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
         for power in (1, 2):
             ramp = f'(max({side}, 0*u)/({_REFERENCE:g}*sqrt(g*L)))**{power}'

@@ -24,7 +24,7 @@ from shipdrag_ros.fields import (
     show,
     text,
 )
-from shipdrag_ros.parameter import Prior, Shape
+from shipdrag_ros.parameter import Prior, Shape, log_normal, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.expression import Formula, Unit, Units, Values
 from shipdrag_ros.ship.vocabulary import (
@@ -41,6 +41,7 @@ from shipdrag_ros.ship.vocabulary import (
 _ANY = (-math.inf, math.inf)
 _MOST = 1e9  # of a number
 _WIDEST = 5.0  # sd of the logarithm of a size
+_UNSURE = 0.5  # relative sd of a parameter that may have the other sign
 _SIDES_SD = 3.0  # of a parameter, inside which a formula must be sound
 
 
@@ -135,14 +136,10 @@ class TermParameter:
 
     def within(self, sds: float) -> tuple[float, float]:
         """Return between what it lies, so many standard deviations about the middle."""
-        prior = self.before
-        if prior is None:
-            assert self.value is not None
-            low, high = (self.value + side * sds * self.sd for side in (-1.0, 1.0))
-            if self.value * low < 0.0 or self.value * high < 0.0:  # a size keeps its sign
-                return (0.0, high) if self.value > 0.0 else (low, 0.0)
-            return low, high
+        prior = self.before or as_found(self.value or 0.0, self.sd)
         low, high = sorted(prior.at(z) for z in (-sds, sds))
+        if self.prior is None and self.value and low * high < 0.0:  # a size keeps its sign
+            return (0.0, high) if self.value > 0.0 else (low, 0.0)
         if prior.shape is Shape.HALF_NORMAL:
             return 0.0, high
         return (-high, high) if prior.shape is Shape.EITHER_SIGN else (low, high)
@@ -169,6 +166,15 @@ class TermParameter:
         if prior is None:
             return self.value or 0.0
         return prior.at(0.0) or prior.at(1.0)
+
+
+def as_found(value: float, sd: float) -> Prior:
+    """
+    Return what is expected of a parameter that was found; one that is sure keeps its sign.
+    """
+    if value == 0.0 or sd > _UNSURE * abs(value):
+        return normal(max(sd, 1e-12), mean=value)
+    return log_normal(value, sd / abs(value))
 
 
 @dataclass(frozen=True, kw_only=True)
