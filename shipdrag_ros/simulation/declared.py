@@ -76,6 +76,8 @@ def effect_of(term: LearntTerm) -> Effect:
     """
     size, *_ = term.parameters
     seen = len(term.evidence.runs) if term.evidence else 0
+    # what it leaves of a run that it was not learnt on is how far its formula may be off
+    left = 1.0 - term.evidence.held_out_gap_cut if term.evidence else 0.0
     names = {name for *_, text in term.formulas for name in Formula.parse(text).names}
     return Effect(
         name=term.name,
@@ -86,6 +88,7 @@ def effect_of(term: LearntTerm) -> Effect:
         formula=term.term.expression,
         source=f'learnt from {seen} runs' if seen else 'declared by a file',
         act=partial(_act, term),
+        formula_sd=min(left, 1.0),
         needs=tuple(key for name, key in _NEEDS.items() if name in names)
         + (('air',) if any(part.channel == 'air' for part in term.parts) else ()),
         errs_in=_ERRS_IN.get(term.term.channel, ()),
