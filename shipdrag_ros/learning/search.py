@@ -38,16 +38,20 @@ from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
-_FITTED, _KINDS = (
-    16,
-    10,
-)  # forms that are fitted: by the linear response, the best of so many kinds
+_FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds first
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
 _LOOKS = 2  # at runs
 _UPPER = 1.645
 _MANY, _APART_D, _DEEPER = 3, 0.5, 1.1  # runs, days and ratio of depths that can show a form
+
+
+_DECIDES = {
+    'heading': 'on another heading',
+    'depth': 'in water of another depth',
+    'date': 'some weeks later',
+}
 
 
 @dataclass(frozen=True)
@@ -396,10 +400,9 @@ class _Judged:
         return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
 
     def _where(self, kinds: dict[str, float]) -> Where | None:
-        if next(iter(kinds)) == self.case.of_kind(NONE):
+        case, stated = self.case, self.case.comparing.as_stated
+        if next(iter(kinds)) == case.of_kind(NONE):
             return None
-        case = self.case
-        stated = case.comparing.as_stated
         return where(case.seen, case.comparing, case.found, stated, of_force=False)
 
     def _percent(self, best: Names) -> float:
@@ -436,12 +439,9 @@ class _Judged:
         used = ', '.join(f'{v:g}' for v in sorted({round(r.speed_m_s, 1) for r in self.case.seen}))
         if len({channel for channel, _ in left}) > 1:
             return 'a run with a speed over ground from GNSS beside the log'
-        if 'heading' in variables:
-            return 'a run on another heading, at a speed of one of these'
-        if 'depth' in variables:
-            return 'a run in water of another depth, at a speed of one of these'
-        if 'date' in variables:
-            return 'a run some weeks later, at a speed of one of these'
+        for variable, run in _DECIDES.items():
+            if variable in variables:
+                return f'a run {run}, at a speed of one of these'
         if len(variables) > 1 or len(self.case.seen) < 2:
             return (
                 f'a run from another speed than {used} m/s: what goes by the speed stays there, '

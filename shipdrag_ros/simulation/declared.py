@@ -98,14 +98,14 @@ def effect_of(term: LearntTerm) -> Effect:
 
 def _parameter(name: str, declared: TermParameter, *, is_size: bool) -> Parameter:
     value = math.nan if declared.value is None else declared.value
-    least = (_SIZE_SD if is_size else _SHAPE_SD) * abs(value)
+    least = (_SIZE_SD if is_size else _SHAPE_SD) * abs(value)  # by which later runs may differ
     low, high = declared.accepted
     return Parameter(
         value,
         name=name,
         unit='' if declared.unit == '1' else declared.unit,
         meaning=declared.meaning or ('size' if is_size else 'of its curve'),
-        prior=declared.before or as_found(value, max(declared.sd, least)),
+        prior=declared.expected if declared.prior else as_found(value, max(declared.sd, least)),
         low=low,
         high=high,
         measured_in=_SCALES[declared.counted_in or ''],
