@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.fields import declare, number
 
-_WIDER, _WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
+WIDER, WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
 
 
 class Shape(StrEnum):
@@ -70,7 +70,7 @@ class Prior:
                 return math.log(2.0 / b) + _log_normal(value / b) if value >= 0.0 else -math.inf
             case Shape.HEAVY_TAILED:
                 z = (value - a) / b
-                narrow = math.log(1.0 - _WIDER_CHANCE) + _log_normal(z) - math.log(b)
+                narrow = math.log(1.0 - WIDER_CHANCE) + _log_normal(z) - math.log(b)
                 return narrow + float(np.logaddexp(0.0, _log_odds_wider(z)))
             case Shape.LOG_NORMAL:
                 if value * a <= 0.0:
@@ -101,7 +101,7 @@ class Prior:
             case Shape.HALF_NORMAL:
                 return float(abs(rng.normal(0.0, b)))
             case Shape.HEAVY_TAILED:
-                wider = _WIDER if rng.random() < _WIDER_CHANCE else 1.0
+                wider = WIDER if rng.random() < WIDER_CHANCE else 1.0
                 return float(rng.normal(a, wider * b))
             case Shape.LOG_NORMAL:
                 return float(a * math.exp(b * rng.standard_normal()))
@@ -193,7 +193,7 @@ class Prior:
                 return 0.0
             case Shape.HEAVY_TAILED:
                 wider = 1.0 / (1.0 + math.exp(-min(_log_odds_wider(z), 700.0)))
-                return 1.0 - wider * (1.0 - 1.0 / _WIDER**2)
+                return 1.0 - wider * (1.0 - 1.0 / WIDER**2)
             case _:
                 return 1.0
 
@@ -398,5 +398,5 @@ def _log_normal(standard: float) -> float:
 
 def _log_odds_wider(z: float) -> float:
     """Return the logarithm of the odds that what is z off is of the wider normal."""
-    before = math.log(_WIDER_CHANCE / (_WIDER * (1.0 - _WIDER_CHANCE)))
-    return before + 0.5 * z * z * (1.0 - 1.0 / _WIDER**2)
+    before = math.log(WIDER_CHANCE / (WIDER * (1.0 - WIDER_CHANCE)))
+    return before + 0.5 * z * z * (1.0 - 1.0 / WIDER**2)
