@@ -44,22 +44,20 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(files: list[Path], output: Output) -> int:
-    document, refused = [], []
+    document = []
+    refused: list[str] = []
     for path in files:
         try:
             term = LearntTerm.load(path)
         except EffectFileError as error:
-            refused.append({'file': str(path), 'problems': error.problems})
+            refused += [f'{path}: {problem}' for problem in error.problems]
             continue
         unit = unit_text(term.units[0])
         output.say(f'{path}: {term.name} can be used: {term.term.expression} [{unit}]')
         document.append({'file': str(path), 'name': term.name, 'channel': term.term.channel})
     output.json({'effects': document, 'refused': refused})
     if refused:
-        raise EffectFileError(
-            f'{len(refused)} of {len(files)} file(s) cannot be used',
-            [f'{each["file"]}: {problem}' for each in refused for problem in each['problems']],
-        )
+        raise EffectFileError('learnt effects', refused)
     return 0
 
 

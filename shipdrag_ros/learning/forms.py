@@ -123,12 +123,10 @@ def forms(ship: Ship, span: Span) -> tuple[LearnableForm, ...]:
     """
     Return all forms that some runs of a ship can carry.
     """
-    every = [('force', *each) for each in (*_by_speed(ship, span), *_by_time(ship, span))]
-    every += [
-        ('force', *each) for each in (*_by_heading(), *_by_day(span), *_by_depth(ship, span))
-    ]
-    if span.log:
-        every += [('log', *each) for each in _of_log(ship, span)]
+    by_run = (*_by_heading(), *_by_day(span), *_by_depth(ship, span))
+    forces = (*_by_speed(ship, span), *_over_time(_as_power(2), _SIZE, ship, span), *by_run)
+    every = [('force', *each) for each in forces]
+    every += [('log', *each) for each in (_of_log(ship, span) if span.log else ())]
     return tuple(_form(number, span, *each) for number, each in enumerate(every))
 
 
@@ -158,12 +156,7 @@ def _form(
     term = LearntTerm(
         name=f'form_{number}_{channel}_{variable}_{shape}',
         term=TermForm(
-            channel=channel,
-            expression=expression,
-            scope=scope,
-            variable=variable,
-            shape=shape,
-            valid=valid,
+            channel, expression, scope=scope, variable=variable, shape=shape, valid=valid
         ),
         parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
     )
@@ -193,15 +186,11 @@ def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
                 yield 'speed', 'step', f'{base}*{step}', turns
         hump = _hump('u', 'u_c', 'sqrt(g*L)', top)
         yield 'speed', 'hump', f'{base}*{hump}', turns | _width(top)
-        yield 'speed', 'decay', f'{base}*exp(-u/(u_c*sqrt(g*L)))', turns
+    yield 'speed', 'decay', f'{_as_power(0)}*exp(-u/(u_c*sqrt(g*L)))', turns
     for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
         for power in (1, 2):
             ramp = f'(max({side}, 0*u)/({_REFERENCE:g}*sqrt(g*L)))**{power}'
             yield 'speed', 'ramp', f'{_as_power(0)}*{ramp}', turns
-
-
-def _by_time(ship: Ship, span: Span) -> Iterator[_Declared]:
-    yield from _over_time(_as_power(2), _SIZE, ship, span)
 
 
 def _of_log(ship: Ship, span: Span) -> Iterator[_Declared]:

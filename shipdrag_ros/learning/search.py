@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import inverse_of
 from shipdrag_ros.diagnosis.result import Where
 from shipdrag_ros.diagnosis.sights import day_of, lowest_m_s, ship_runs
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
@@ -38,17 +38,20 @@ from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
-_FITTED, _KINDS = (
-    16,
-    10,
-)  # forms that are fitted: by the linear response, the best of so many kinds
-_BEGUN = 2  # starts of each
+_FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds first
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
 _LOOKS = 2  # at runs
 _UPPER = 1.645
 _MANY, _APART_D, _DEEPER = 3, 0.5, 1.1  # runs, days and ratio of depths that can show a form
+
+
+_DECIDES = {
+    'heading': 'on another heading',
+    'depth': 'in water of another depth',
+    'date': 'some weeks later',
+}
 
 
 @dataclass(frozen=True)
@@ -173,8 +176,10 @@ class _LearningCase:
             first.setdefault(every[name].kind, name)
         chosen = list(dict.fromkeys((*list(first.values())[:_KINDS], *ranked)))[:_FITTED]
         kept = {name: every[name] for name in chosen}
-        begun = {name: ranked[name][:_BEGUN] for name in chosen}
-        return cls.compared(runs, seen, ship, kept, begun, progress)
+        begun = {name: ranked[name] for name in chosen}
+        # noise is learnt with the traces of forms: with those that fit, not those that were tried
+        alone = cls.compared(runs, seen, ship, kept, begun, progress, library=False)
+        return cls.compared(runs, seen, ship, kept, alone.fitted_ways(), progress)
 
     @classmethod
     def compared(
@@ -185,10 +190,23 @@ class _LearningCase:
         kept: dict[str, LearnableForm],
         ways: dict[str, list[EffectWay]],
         progress: Progress,
+        *,
+        library: bool = True,
     ) -> _LearningCase:
         progress('comparing forms', 0, 0)
-        comparing = _comparing(runs, seen, ship, ways, library=True)
+        comparing = _comparing(runs, seen, ship, ways, library=library)
         return cls(tuple(runs), tuple(seen), ship, kept, ways, comparing, comparing.compare())
+
+    def fitted_ways(self) -> dict[str, list[EffectWay]]:
+        """Return the ways of each form, begun where they were fitted."""
+        found: dict[str, list[EffectWay]] = {}
+        first = self.comparing.runs.size + len(self.comparing.base.unknowns)
+        for fit in self.found.fitted:
+            if self.is_form(fit.names):
+                way = fit.hypothesis.ways[-1]
+                at = fit.at[first : first + len(way.unknowns)]
+                found.setdefault(fit.names[0], []).append(replace(way, start=tuple(at.tolist())))
+        return found
 
     def half(self, which: int, progress: Progress) -> _LearningCase:
         """Return the same of every second run."""
@@ -280,7 +298,10 @@ class _Judged:
             agree, why = self._halves(best)
             reason = '' if agree else why
         if not reason and best is not None:
-            term = self._term(case.found.best[best], best[0])
+            try:
+                term = self._term(case.found.best[best], best[0])
+            except EffectFileError as error:
+                reason = f'{case.of_kind(best)} is too little known: {"; ".join(error.problems)}'
         return Learnt(
             term,
             reason,
@@ -379,10 +400,9 @@ class _Judged:
         return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
 
     def _where(self, kinds: dict[str, float]) -> Where | None:
-        if next(iter(kinds)) == self.case.of_kind(NONE):
+        case, stated = self.case, self.case.comparing.as_stated
+        if next(iter(kinds)) == case.of_kind(NONE):
             return None
-        case = self.case
-        stated = case.comparing.as_stated
         return where(case.seen, case.comparing, case.found, stated, of_force=False)
 
     def _percent(self, best: Names) -> float:
@@ -419,12 +439,9 @@ class _Judged:
         used = ', '.join(f'{v:g}' for v in sorted({round(r.speed_m_s, 1) for r in self.case.seen}))
         if len({channel for channel, _ in left}) > 1:
             return 'a run with a speed over ground from GNSS beside the log'
-        if 'heading' in variables:
-            return 'a run on another heading, at a speed of one of these'
-        if 'depth' in variables:
-            return 'a run in water of another depth, at a speed of one of these'
-        if 'date' in variables:
-            return 'a run some weeks later, at a speed of one of these'
+        for variable, run in _DECIDES.items():
+            if variable in variables:
+                return f'a run {run}, at a speed of one of these'
         if len(variables) > 1 or len(self.case.seen) < 2:
             return (
                 f'a run from another speed than {used} m/s: what goes by the speed stays there, '

@@ -95,13 +95,6 @@ def document(found: Learnt) -> dict[str, Any]:
     Return it as plain data; `learnt` is None where nothing is written.
     """
     term = found.term
-    place = None
-    if found.where is not None:
-        place = {
-            'channel': found.where.channel,
-            'time_s': list(found.where.time_s),
-            'speed_m_s': list(found.where.speed_m_s),
-        }
     return {
         'learnt': None
         if term is None
@@ -114,7 +107,7 @@ def document(found: Learnt) -> dict[str, Any]:
         'reason': found.reason or None,
         'next_run': found.next_run or None,
         'probability': found.probability,
-        'where': place,
+        'where': plain(found.where),
         'likeliest': found.likeliest and kind_text(found.likeliest),
         'largest_percent': found.largest_percent,
         'runs': list(found.runs),

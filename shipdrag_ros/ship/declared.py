@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a file says that an effect does: formulas, and their parameters."""
+"""
+What the file of an effect says that it does: formulas, and their parameters.
+
+First the words: channels, variables, names and units; then what is said with them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,23 +29,143 @@ from shipdrag_ros.fields import (
     show,
     text,
 )
-from shipdrag_ros.parameter import Prior, Shape
+from shipdrag_ros.parameter import Prior, Shape, log_normal, normal
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.expression import Formula, Unit, Units, Values
-from shipdrag_ros.ship.vocabulary import (
-    CHANNELS,
-    COUNTED_IN,
-    OWN_UNITS,
-    PRIORS,
-    SCOPES,
-    SHAPES,
-    UNITS,
-    VARIABLES,
-)
+from shipdrag_ros.ship.expression import PURE, Formula, Unit, Units, Values
+from shipdrag_ros.ship.sections import GRAVITY_M_S2
 
+SCOPES = ('hull', 'earth', 'sensor', 'run')
+SHAPES = ('constant', 'power', 'step', 'ramp', 'hump', 'decay', 'periodic')
+VARIABLES = {'speed': 'u', 'time': 't', 'heading': 'psi', 'date': 'd', 'depth': 'h'} | (
+    dict.fromkeys(('relative_angle', 'shaft', 'wind', 'position'), '')
+)
+"""What a term goes by, and what a formula calls it; nothing: it cannot be simulated."""
+_SPEED: Unit = (0.0, 1.0, -1.0)
+_LENGTH: Unit = (0.0, 1.0, 0.0)
+_TIME: Unit = (0.0, 0.0, 1.0)
+_FORCE: Unit = (1.0, 1.0, -2.0)
+_MASS: Unit = (1.0, 0.0, 0.0)
+_GAIN: Unit = (0.0, 1.0, -2.0)
+UNITS: Mapping[str, Unit] = {
+    **dict.fromkeys(('1', 'rad'), PURE),
+    'm': _LENGTH,
+    **dict.fromkeys(('m2', 'm^2'), (0.0, 2.0, 0.0)),
+    's': _TIME,
+    'm/s': _SPEED,
+    'm/s2': _GAIN,
+    'kg': _MASS,
+    'N': _FORCE,
+}
+
+
+class TermChannel(NamedTuple):
+    """
+    What something adds to.
+
+    Attributes
+    ----------
+    most
+        What a formula may be worth on a ship of 100 m, by its unit.
+    by
+        The variables by which it can be simulated; only by speed: also by nothing.
+    during
+        Those of u and t that may change it during a run.
+    is_vector
+    """
+
+    most: Mapping[Unit, float]
+    by: tuple[str, ...] = ('speed',)
+    during: str = ''
+    is_vector: bool = False
+
+
+CHANNELS: Mapping[str, TermChannel] = {
+    'force': TermChannel({_FORCE: 1e8}, ('speed', 'time', 'heading', 'date', 'depth'), 'ut'),
+    'water': TermChannel({_SPEED: 50.0}, ('speed', 'time'), 't', is_vector=True),
+    'air': TermChannel({_SPEED: 200.0}, is_vector=True),
+    'log': TermChannel({_SPEED: 50.0, PURE: 10.0}, ('speed', 'time'), 'ut'),
+    'ground': TermChannel({PURE: 10.0}),
+    'inertia': TermChannel({PURE: 10.0, _MASS: 1e8}),
+    'clock': TermChannel({_TIME: 1e4}),
+    'filter': TermChannel({_TIME: 1e4}),
+    'shaft': TermChannel({_SPEED: math.inf}),
+    'depth': TermChannel({_LENGTH: 2e4}),
+}
+"""
+Of a resistance; of the velocity of water and air, along the first run and to port of it; of what
+the log reads too much, or its share of the speed; of the share by which distances over ground are
+too long; of what n_r is larger by, or the mass; of the time by which the log is late, and that of
+its filter; of the speed below which the flow does not turn the propeller; of the depth.
+"""
+
+
+class FormulaName(NamedTuple):
+    """
+    What a formula may hold.
+
+    Attributes
+    ----------
+    unit
+    usual
+        On a ship of 100 m.
+    ends
+        Between what it lies on any ship, cut into boxes in which ranges are looked at.
+    power
+        Of the length of the ship, that the ends are times of.
+    """
+
+    unit: Unit
+    usual: float
+    ends: tuple[float, ...]
+    power: int = 0
+
+
+def _even(low: float, high: float, boxes: int) -> tuple[float, ...]:
+    return tuple(np.linspace(low, high, boxes + 1).tolist())
+
+
+NAMES: Mapping[str, FormulaName] = {
+    'rho': FormulaName((1.0, -3.0, 0.0), 1025.0, (990.0, 1035.0)),
+    'g': FormulaName(_GAIN, GRAVITY_M_S2, (GRAVITY_M_S2, GRAVITY_M_S2)),
+    'L': FormulaName(_LENGTH, 100.0, (2.0, 10.0, 30.0, 100.0, 200.0, 400.0)),
+    'nabla': FormulaName((0.0, 3.0, 0.0), 9000.0, (1e-4, 0.1), 3),
+    'B_WL': FormulaName(_LENGTH, 18.0, (0.05, 0.6), 1),
+    'T_M': FormulaName(_LENGTH, 7.0, (0.01, 0.3), 1),
+    'D_P': FormulaName(_LENGTH, 5.0, (0.005, 0.2), 1),
+    'n_r': FormulaName(PURE, 0.1, (0.0, 1.0)),
+    'R_T': FormulaName(_FORCE, 3e5, (0.0, 1e10)),
+    'R_V': FormulaName(_FORCE, 2e5, (0.0, 1e10)),
+    'R_F': FormulaName(_FORCE, 2e5, (0.0, 1e10)),
+    'u': FormulaName(_SPEED, 5.0, _even(0.0, 20.0, 16)),
+    't': FormulaName(_TIME, 500.0, _even(0.0, 86400.0, 8)),
+    't_end': FormulaName(_TIME, 1000.0, (1.0, 86400.0)),
+    'psi': FormulaName(PURE, 0.3, (-math.pi, 0.0, math.pi)),
+    'd': FormulaName(PURE, 20605.0, _even(0.0, 40000.0, 8)),
+    'h': FormulaName(_LENGTH, 200.0, tuple(np.geomspace(0.5, 1e4, 17).tolist())),
+    'pi': FormulaName(PURE, math.pi, (math.pi, math.pi)),
+}
+"""
+Density, gravity; of the ship length, displaced volume, breadth, draught, diameter of the
+propeller, n_r at half of her speed at the stop; her resistance at u in calm deep water without
+that of the air, its viscous part and of that the friction (1 + k) C_F; speed through water, time
+since the stop, that at the end of the record, yaw, days since 1970 and depth of the water at the
+stop.
+"""
+OWN_UNITS = {name: each.unit for name, each in NAMES.items()}
+BY_SPEED = ('R_T', 'R_V', 'R_F')
+COUNTED_IN = {
+    'V^(2/3)': 'nabla**(2/3)',
+    'sqrt(g L)': 'sqrt(g*L)',
+    'draught': 'T_M',
+    'weight of the ship': 'rho*g*nabla',
+}
+"""What sizes may be counted in, so that one prior serves ships of all sizes."""
+_NO_FORM = (Shape.HEAVY_TAILED, Shape.CHOICE, Shape.FLAT)  # that a file may state
+PRIORS = {each.name.lower().replace('_', '-'): each for each in Shape if each not in _NO_FORM}
 _ANY = (-math.inf, math.inf)
 _MOST = 1e9  # of a number
 _WIDEST = 5.0  # sd of the logarithm of a size
+_UNSURE = 0.5  # relative sd of a parameter that may have the other sign
 _SIDES_SD = 3.0  # of a parameter, inside which a formula must be sound
 
 
@@ -121,10 +246,10 @@ class TermParameter:
     meaning: str | None = declare(text(), 'in words', default=None)
 
     @property
-    def before(self) -> Prior | None:
-        """Its prior, where one is stated."""
+    def expected(self) -> Prior:
+        """Its prior: as stated, or as it was found."""
         if self.prior is None:
-            return None
+            return as_found(self.value or 0.0, self.sd)
         word, first, second = self.prior
         return Prior(PRIORS[word], first, second)
 
@@ -135,14 +260,10 @@ class TermParameter:
 
     def within(self, sds: float) -> tuple[float, float]:
         """Return between what it lies, so many standard deviations about the middle."""
-        prior = self.before
-        if prior is None:
-            assert self.value is not None
-            low, high = (self.value + side * sds * self.sd for side in (-1.0, 1.0))
-            if self.value * low < 0.0 or self.value * high < 0.0:  # a size keeps its sign
-                return (0.0, high) if self.value > 0.0 else (low, 0.0)
-            return low, high
+        prior = self.expected
         low, high = sorted(prior.at(z) for z in (-sds, sds))
+        if self.prior is None and self.value and low * high < 0.0:  # a size keeps its sign
+            return (0.0, high) if self.value > 0.0 else (low, 0.0)
         if prior.shape is Shape.HALF_NORMAL:
             return 0.0, high
         return (-high, high) if prior.shape is Shape.EITHER_SIGN else (low, high)
@@ -159,16 +280,21 @@ class TermParameter:
         """Between what it may be given."""
         if self.bounds is not None:
             return self.bounds[0], self.bounds[-1]
-        either_sign = self.typical <= 0.0 if self.prior is None else self.ends[0] < 0.0
-        return -_MOST if either_sign else 0.0, _MOST
+        return -_MOST if self.ends[0] < 0.0 else 0.0, _MOST
 
     @property
     def typical(self) -> float:
         """A size that is no rarity, as it is counted."""
-        prior = self.before
-        if prior is None:
-            return self.value or 0.0
-        return prior.at(0.0) or prior.at(1.0)
+        return self.expected.at(0.0) or self.expected.at(1.0)
+
+
+def as_found(value: float, sd: float) -> Prior:
+    """
+    Return what is expected of a parameter that was found; one that is sure keeps its sign.
+    """
+    if value == 0.0 or sd > _UNSURE * abs(value):
+        return normal(max(sd, 1e-12), mean=value)
+    return log_normal(value, sd / abs(value))
 
 
 @dataclass(frozen=True, kw_only=True)

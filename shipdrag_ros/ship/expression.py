@@ -9,7 +9,6 @@ or values. What is no number, name, operator or function of the list is refused.
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -410,10 +409,3 @@ _NUMPY: dict[str, Callable[..., Float64]] = {
     'cos': np.cos,
     'sin': np.sin,
 }
-
-
-def is_finite(values: Float64) -> bool:
-    """
-    Say whether all values are numbers of a size that can be used.
-    """
-    return bool(np.all(np.abs(values) < _OVERFLOW)) and not math.isnan(float(np.sum(values)))

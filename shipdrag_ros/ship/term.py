@@ -118,7 +118,7 @@ class LearntTerm(DeclaredTerm):
         EffectFileError
             If it cannot be used; with every problem that was found.
         """
-        return cls._read(_data_of(path), str(path))
+        return cls.from_yaml(_text_of(path), subject=str(path))
 
     @classmethod
     def from_yaml(cls, content: str, *, subject: str = 'effect') -> LearntTerm:
@@ -136,11 +136,8 @@ class LearntTerm(DeclaredTerm):
         EffectFileError
             If it cannot be used; with every problem that was found.
         """
-        return cls._read(parse(content, subject=subject, error=EffectFileError), subject)
-
-    @classmethod
-    def _read(cls, data: object, subject: str) -> LearntTerm:
         problems: Problems = []
+        data = parse(content, subject=subject, error=EffectFileError)
         found = read_terms({'': data}, problems)
         if problems:
             raise EffectFileError(subject, problems)
@@ -291,7 +288,8 @@ def read_folders(folders: Sequence[Path]) -> tuple[LearntTerm, ...]:
             problems.append(f'{folder}: no .yaml file, expected learnt effects')
         for path in files:
             try:
-                given[f'{path}: '] = _data_of(path)
+                content = _text_of(path)
+                given[f'{path}: '] = parse(content, subject=str(path), error=EffectFileError)
             except EffectFileError as error:
                 problems += [f'{path}: {problem}' for problem in error.problems]
     found = read_terms(given, problems)
@@ -300,6 +298,5 @@ def read_folders(folders: Sequence[Path]) -> tuple[LearntTerm, ...]:
     return found
 
 
-def _data_of(path: str | PathLike[str]) -> object:
-    content = text_of(path, what='a learnt effect (YAML)', error=EffectFileError)
-    return parse(content, subject=str(path), error=EffectFileError)
+def _text_of(path: str | PathLike[str]) -> str:
+    return text_of(path, what='a learnt effect (YAML)', error=EffectFileError)

@@ -14,10 +14,10 @@ import numpy as np
 
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
-from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, log_normal, normal
+from shipdrag_ros.parameter import ABSOLUTE, Parameter, Scale
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
-from shipdrag_ros.ship.declared import TermParameter, TermPart, worth
+from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
 from shipdrag_ros.ship.expression import PURE, Formula
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
@@ -76,6 +76,8 @@ def effect_of(term: LearntTerm) -> Effect:
     """
     size, *_ = term.parameters
     seen = len(term.evidence.runs) if term.evidence else 0
+    # what it leaves of a run that it was not learnt on is how far its formula may be off
+    left = 1.0 - term.evidence.held_out_gap_cut if term.evidence else 0.0
     names = {name for *_, text in term.formulas for name in Formula.parse(text).names}
     return Effect(
         name=term.name,
@@ -86,6 +88,7 @@ def effect_of(term: LearntTerm) -> Effect:
         formula=term.term.expression,
         source=f'learnt from {seen} runs' if seen else 'declared by a file',
         act=partial(_act, term),
+        formula_sd=min(left, 1.0),
         needs=tuple(key for name, key in _NEEDS.items() if name in names)
         + (('air',) if any(part.channel == 'air' for part in term.parts) else ()),
         errs_in=_ERRS_IN.get(term.term.channel, ()),
@@ -95,24 +98,18 @@ def effect_of(term: LearntTerm) -> Effect:
 
 def _parameter(name: str, declared: TermParameter, *, is_size: bool) -> Parameter:
     value = math.nan if declared.value is None else declared.value
+    least = (_SIZE_SD if is_size else _SHAPE_SD) * abs(value)  # by which later runs may differ
     low, high = declared.accepted
     return Parameter(
         value,
         name=name,
         unit='' if declared.unit == '1' else declared.unit,
         meaning=declared.meaning or ('size' if is_size else 'of its curve'),
-        prior=declared.before or _prior(value, declared.sd, _SIZE_SD if is_size else _SHAPE_SD),
+        prior=declared.expected if declared.prior else as_found(value, max(declared.sd, least)),
         low=low,
         high=high,
         measured_in=_SCALES[declared.counted_in or ''],
     )
-
-
-def _prior(value: float, sd: float, least_sd: float) -> Prior:
-    """Return what is expected in later runs of a parameter that was found."""
-    if value == 0.0 or sd > 0.5 * abs(value):
-        return normal(max(sd, 1e-12), mean=value)
-    return log_normal(value, max(sd / abs(value), least_sd))
 
 
 _OF_RUN: Mapping[str, Callable[[Frame], float]] = {
@@ -186,11 +183,15 @@ class _Acting:
         return min(max(math.log(faster / here) / math.log1p(_STEP), 0.0), 2.0)
 
     def reading_m_s(self, speed_m_s: Float64, since_s: Float64) -> Float64:
-        """Return what the log reads too much; before the stop, as at the stop."""
-        speed = self.term.inside('u', np.abs(speed_m_s))
-        found: Float64 = np.where(speed_m_s < 0.0, -1.0, 1.0) * self.at(
-            speed, np.maximum(since_s, 0.0)
-        )
+        """
+        Return what the log reads too much.
+
+        Before the stop it is as at the stop; beyond the speeds that it holds for it keeps its
+        share of the speed.
+        """
+        inside = self.term.inside('u', np.abs(speed_m_s))
+        share = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), np.sign(speed_m_s))
+        found: Float64 = share * self.at(inside, np.maximum(since_s, 0.0))
         return found
 
 

@@ -207,6 +207,29 @@ def test_a_log_in_time_reads_as_its_formula_says() -> None:
     np.testing.assert_allclose(column, wanted, atol=2e-4)
 
 
+def test_beyond_its_speeds_an_error_of_the_log_keeps_its_share() -> None:
+    washed = declared(LearntTerm.from_yaml(WASHED))
+    (error,) = washed.action(frame_of(Ship.example()), 0.05, 100.0).log_error
+    speed = np.array([0.1, 0.5, 4.0, 8.0, 16.0, -16.0])
+    np.testing.assert_allclose(error(speed, np.zeros(6)) / speed, 0.05)
+
+
+def test_a_parameter_that_is_hardly_known_keeps_its_sign() -> None:
+    # three sd below the value would be a pole at 0
+    term = LearntTerm.from_yaml(FADING.replace('{value: 100, sd: 5}', '{value: 100, sd: 45}'))
+    low, high = term.parameters['tau'].ends
+    assert 0.0 < low < 50.0
+    assert high > 200.0
+
+
+def test_a_formula_is_as_sure_as_it_foretold_runs_left_out() -> None:
+    rest = 'evidence: {runs: [a], over_nothing: 9, over_smooth: 5, halves_agree: true, '
+    for cut, left in ((0.9, 0.1), (-3.0, 1.0)):
+        term = LearntTerm.from_yaml(f'{WEED}{rest}held_out_gap_cut: {cut}}}')
+        assert declared(term).formula_sd == pytest.approx(left)
+    assert declared(LearntTerm.from_yaml(WEED)).formula_sd == 0.0
+
+
 @pytest.mark.parametrize(
     ('text', 'runs', 'ratio'),
     [

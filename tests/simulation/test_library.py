@@ -38,6 +38,7 @@ from shipdrag_ros.simulation.effects import (
     confounders,
     discriminating_measurements,
     parse,
+    using,
 )
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -354,6 +355,17 @@ def test_all_impossible_effects_are_told_at_once():
         'locked_propeller and residual_thrust cannot be there at the same time',
     ):
         assert part in str(told.value)
+
+
+def test_a_ship_without_inertia_is_told() -> None:
+    weightless = LearntTerm.from_yaml(
+        'name: weightless\n'
+        'term: {channel: inertia, scope: hull, variable: speed, shape: constant,\n'
+        '  expression: "A*rho*nabla", valid: {}}\n'
+        'parameters: {A: {value: -1, sd: 0, bounds: [-2, 2]}}\n'
+    )
+    with using([weightless]), pytest.raises(SimulationError, match='without inertia'):
+        action_of(FRAME, [StatedEffect('weightless', {'A': Parameter(-1.0, 0.0)})])
 
 
 def test_every_parameter_goes_from_process_to_process() -> None:

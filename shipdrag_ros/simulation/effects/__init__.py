@@ -255,6 +255,8 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
         problems.extend(_problems(effect, item, frame))
         if len(problems) == before:
             total += effect.action(frame, *values_of(item, frame.ship).values())
+    if total.mass_fraction <= -1.0 or 1.0 + float(frame.ship.n_r(0.0)) + total.n_r_change <= 0.0:
+        problems.append(f'{", ".join(names)} leave the ship without inertia')
     if problems:
         raise SimulationError('effects: ' + '; '.join(problems))
     return total
