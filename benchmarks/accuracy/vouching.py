@@ -142,25 +142,30 @@ def judged(block: Block) -> tuple[int | None, int, int | None, list[float]]:
     for second, part in enumerate(by_seconds(block)):
         events = monitor.update(part)
         stops += [(e.start_ns - START_NS) / SECOND_NS for e in events if isinstance(e, Onset)]
-        doubts = monitor.doubts()
         out = second if out is None and monitor.left_out() else out
-        facts = [
-            InputFacts(
-                name,
-                type=name,
-                age_s=0.0,
-                doubt=doubts.get(name, ''),
-                total=Counts(health.messages, health.used, health.rejected),
-            )
-            for name, health in monitor.health().items()
-            if health.messages
-        ]
-        found = states.tick(facts, simulated=True, now_s=float(second))
-        well = all(each.finding.level == OK for each in found)
-        if not well and first is None:
+        sound = well(monitor, states, second)
+        if not sound and first is None:
             first = second
-        green += well and second >= 60
+        green += sound and second >= 60
     return first, green, out, stops
+
+
+def well(monitor: Monitor, states: InputStates, second: int) -> bool:
+    """Return whether the health of every input is green at a second."""
+    doubts = monitor.doubts()
+    facts = [
+        InputFacts(
+            name,
+            type=name,
+            age_s=0.0,
+            doubt=doubts.get(name, ''),
+            total=Counts(health.messages, health.used, health.rejected),
+        )
+        for name, health in monitor.health().items()
+        if health.messages
+    ]
+    found = states.tick(facts, simulated=True, now_s=float(second))
+    return all(each.finding.level == OK for each in found)
 
 
 def engine(rng: np.random.Generator, count: int, length_m: float) -> tuple[Float64, Float64]:

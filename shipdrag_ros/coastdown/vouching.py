@@ -266,6 +266,7 @@ class Vouching:
         self.until: Int64 = np.full(SOURCES, NEVER)
         self._craft = craft
         self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
+        self._nothing: Int64 = np.full(SOURCES, NEVER)  # when each last said nothing of the ship
         self._now = NEVER
         self._said: dict[str, Contradiction] = {}
         self._scaled = (NEVER, 0.0)  # when it was last known whether the log is, and how probable
@@ -381,7 +382,7 @@ class Vouching:
         if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
             return
         doubted = [source for source in speeds if self.until[source] > number]
-        scales = _scales(bins, speeds, last, lag)
+        scales = _scales(bins, speeds, last, lag, self._nothing)
         found = sound_probabilities(speeds, self._craft, doubted=doubted, scales=scales)
         if any(one == _LOG for one, _ in scales):
             self._scaled = (number, found.scaled[_LOG])
@@ -407,6 +408,8 @@ class Vouching:
                 self.until[source] = number + _HOLD_S
             if lasts or (contradiction and each == max(wrong.values())):
                 used = {other: bool(self.until[other] <= number) for other in speeds}
+                if contradiction and found.scaled[source] < 0.5 * each:
+                    self._nothing[source] = number
                 name = Channel(source).input
                 one = self._said.get(name)
                 if contradiction or one is None:  # else what was said is the best that is known
@@ -415,7 +418,7 @@ class Vouching:
 
 
 def _scales(
-    bins: Bins, sources: Collection[int], last: int, lag: int
+    bins: Bins, sources: Collection[int], last: int, lag: int, nothing: Int64
 ) -> dict[tuple[int, int], Scaled]:
     """Say of each speed whether it is another one in a wrong scale."""
     read = {
@@ -430,6 +433,8 @@ def _scales(
         # as long as she makes way ahead, through the water and faster than a current may run:
         # a speed over ground has no sign
         way = (both > 0.0).all(axis=0) & (both[1] > CURRENT[-1][0])
+        # and since both said something of her
+        way &= EDGES[1 : count + 1] <= last - nothing[[one, other]].max()
         count = count if way.all() else int(np.argmin(way))
         if count:
             found[one, other] = both_ways = scaled(*both[:, :count])

@@ -519,6 +519,27 @@ def fifty_life_cycles(bench: Bench) -> Found:
     return good, f'{failed} failed; {sizes[0]:.0f} MiB after 10, {sizes[1]:.0f} MiB after 50'
 
 
+def memory_by_rate(bench: Bench) -> Found:
+    """Log, speed over ground and position at a rate, recorded; the memory a minute apart."""
+    said, good = [], True
+    for rate_hz in (1.0, 10.0, 100.0):
+        node, way, sizes = bench.node(), 0.0, []
+        began_s = due_s = time.monotonic()
+        for at_s in (30.0, 90.0):
+            while due_s < began_s + at_s:
+                bench.sail(ground=True)
+                way += 5.0 / rate_hz
+                bench.peer.place.publish(point(time.time_ns(), way))
+                due_s += 1.0 / rate_hz
+                bench.peer.spin(max(due_s - time.monotonic(), 0.0))
+            sizes.append(memory_mib(node.process.pid))
+        came = bench.peer.value('input position', 'messages') / 90.0
+        node.end(signal.SIGTERM)
+        good = good and sizes[1] < 512.0 and sizes[1] < sizes[0] + 64.0
+        said.append(f'{rate_hz:.0f} Hz ({came:.0f}): {sizes[0]:.0f}, {sizes[1]:.0f} MiB')
+    return good, '; '.join(said)
+
+
 def control_characters(bench: Bench) -> Found:
     """Everywhere a peer may write text, it writes what would rule a terminal."""
     port = free_port()
@@ -953,6 +974,10 @@ LINES: dict[str, tuple[str, Callable[[Bench], Found]]] = {
     'malformed and huge messages': ('counted; memory bounded', malformed_and_huge),
     'parameters that name files': ('none can be set', parameters_that_name_files),
     '50 life cycles': ('none fails, no growth', fifty_life_cycles),
+    'three inputs at 1, 10, 100 Hz (received), after 30 and 90 s': (
+        'below 512 MiB, growth below 64 MiB',
+        memory_by_rate,
+    ),
     '1000 viewers': ('200 see it, the rest is told', a_thousand_viewers),
 }
 
