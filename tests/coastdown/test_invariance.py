@@ -32,7 +32,6 @@ INPUTS = (LOG, Channel.SPEED_OVER_GROUND, Channel.POSITION, Channel.HEADING, Cha
 QUICK = Parameters(
     steady_s=300.0,
     slope_window_s=20.0,
-    confirm_s=40.0,
     window_s=150.0,
     update_s=7.0,
     data_stop_s=20.0,

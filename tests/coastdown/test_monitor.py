@@ -256,7 +256,7 @@ def test_health_counts_everything(ship) -> None:
 
 
 def test_memory_does_not_grow(ship) -> None:
-    watched = monitor(ship, steady_s=60.0, window_s=60.0, slope_window_s=5.0, confirm_s=10.0)
+    watched = monitor(ship, steady_s=60.0, window_s=60.0, slope_window_s=5.0)
     rng = np.random.default_rng(0)
 
     def size() -> int:

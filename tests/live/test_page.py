@@ -64,7 +64,6 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         'use_sim_time': True,
         'steady_s': 400.0,
         'slope_window_s': 30.0,
-        'confirm_s': 60.0,
         'froude_min': 0.12,  # an early end
     }
     file = tmp_path / 'parameters.yaml'

@@ -35,7 +35,6 @@ LEAD_IN_S, COAST_S = 900.0, 900.0
 SETTINGS = {
     'steady_s': 600.0,
     'slope_window_s': 30.0,
-    'confirm_s': 60.0,
     'data_stop_s': 20.0,
     'update_s': 30.0,
 }
