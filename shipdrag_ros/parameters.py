@@ -38,7 +38,6 @@ FORMER_KEYS = {
     'regimes': 'leave it out: the filter of regimes is the only judge of a deceleration',
     'confirm_s': _JUDGED,
     'shaft_stopped_fraction': _JUDGED,
-    'turn_rad': _JUDGED,
 }
 """Keys that a parameter file had before, and what replaces each."""
 # every module of that folder is one; listed without importing it
@@ -132,6 +131,14 @@ class Parameters:
         unit='1/day',
         low=1e-3,
         high=100.0,
+    )
+    turn_rad: float = _parameter(
+        0.35,
+        'a change of heading, or of course over ground, from which on a window that is given by '
+        'hand is cut; larger: turning slows the ship and is counted as resistance',
+        unit='rad',
+        low=0.05,
+        high=3.0,
     )
     froude_min: float = _parameter(
         0.05,

@@ -146,8 +146,8 @@ class EndedCoastdown:
     `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are no
     coastdown, before `start_ns` and after `end_ns`; or all of what speaks against one that was
     withdrawn. The thrust began to fall at `stop_ns`, not after `start_ns`; None where the window
-    was given, and what comes before it is not known to be steady sailing. `regimes` is None
-    where nothing judged it.
+    was given, and what comes before it is not known to be steady sailing: `regimes` is None then,
+    and where there are cuts, `stretch` shows the whole of it: times [ns] and mean speeds [m/s].
     """
 
     __repr__ = short_repr
@@ -161,6 +161,7 @@ class EndedCoastdown:
     heading_rad: float | None = None
     withdrawn: bool = False
     cuts: tuple[NotCoastdown, ...] = ()
+    stretch: tuple[tuple[int, float], ...] = ()
     stop_ns: int | None = None
     regimes: Regimes | None = field(default=None, repr=False)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +13,10 @@ from numpy.typing import NDArray
 from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.coastdown.given import estimate_given
-from shipdrag_ros.coastdown.regimes.watch import LEAD_S
+from shipdrag_ros.coastdown.examination import Examined, estimate_examined
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.estimation import estimate_final
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8, concatenate
 from shipdrag_ros.ship import Ship
@@ -59,7 +57,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     run
         From `open_runs`.
     parameters
-        For the validation; the regimes too look at some record before the window.
+        For the validation, which needs some record before the window.
     window
         Begin and end [s from the start of the bag]; it ends with the bag at
         the latest.
@@ -89,8 +87,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     start_ns = span[0] + round(start_s * SECOND_NS)
     # of what is not there, nothing
     end_ns = span[1] if end_s >= length_s else span[0] + round(end_s * SECOND_NS)
-    margin_s = max(parameters.frozen_s + parameters.late_s, float(LEAD_S))
-    margin_ns = round(margin_s * SECOND_NS) + _SET_CLOCK_NS
+    margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
     around = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
     block = concatenate([item for item in around if isinstance(item, Block)])
     inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
@@ -110,7 +107,9 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     """
     Estimate r(v) from a window, as of a coastdown that has ended.
 
-    A person's claim is judged like any other: what is no coastdown is cut.
+    A person's claim is examined like any other: what is no coastdown is cut. What came
+    before is not known to be steady sailing; it helps to examine, and teaches the
+    estimate nothing.
     """
     used = samples.reasons == Reason.ACCEPTED
     accepted, inside = samples.block[used], samples.inside[used]
@@ -118,16 +117,25 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     parts = [part for part in parts_of_one_clock(accepted) if inside[part].any()]
     if len(parts) > 1:
         failure = 'a clock was set in the window; choose one before or after'
-        given = EndedCoastdown(
-            start_ns, end_ns, None, EndedBy.GIVEN, None, failure, withdrawn=True
-        )
+        found = Examined(start_ns, end_ns, (), None, failure, refused=True, stretch=())
     else:
         accepted = accepted[parts[0]] if parts else accepted[:0]
-        given = estimate_given(accepted, start_ns, end_ns, ship, parameters, estimate_final)
-    heading = _heading(accepted, given.start_ns)
-    if heading is None:
-        return given
-    return replace(given, heading_rad=rep103_yaw(heading, parameters.heading_convention))
+        before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
+        window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
+        found = estimate_examined(window, ship, parameters, estimate_final)
+    heading = _heading(accepted, found.start_ns)
+    return EndedCoastdown(
+        found.start_ns,
+        found.end_ns,
+        None,
+        EndedBy.GIVEN,
+        found.estimate,
+        found.failure,
+        None if heading is None else rep103_yaw(heading, parameters.heading_convention),
+        withdrawn=found.refused,
+        cuts=found.cuts,
+        stretch=found.stretch,
+    )
 
 
 def parts_of_one_clock(accepted: Block) -> list[slice]:

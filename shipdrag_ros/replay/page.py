@@ -141,10 +141,16 @@ def _line(coastdown: EndedCoastdown, run: RunResult, speed_m_s: float) -> str:
 
 def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
     """Draw what there are data for."""
+    if coastdown.stretch:
+        yield picture(
+            pictures.cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
+            'Speed over the whole stretch. Hatched: what was cut, and why; only the rest is '
+            'taken for a coastdown.',
+        )
     if coastdown.regimes is not None:
         hatched = ' Hatched: what was cut, and why.' if coastdown.cuts else ''
         yield picture(
-            pictures.regimes_picture(coastdown, coastdown.regimes, run.span_ns, run.ship.mass_kg),
+            pictures.cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
             f'Speed, and below it how probable each thing is that she may have done.{hatched}',
         )
     estimate = coastdown.estimate

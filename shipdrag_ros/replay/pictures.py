@@ -27,17 +27,13 @@ _SHOWN = 0.02
 _NARROW = 0.02  # of the time axis: no room for a label
 
 
-def regimes_picture(
-    coastdown: EndedCoastdown, regimes: Regimes, span_ns: StretchSpan | None, mass_kg: float
-) -> Figure:
+def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg: float) -> Figure:
     """
     Draw the speed with what was cut hatched and named, and under it what she did.
 
     Parameters
     ----------
     coastdown
-    regimes
-        What she did about it.
     span_ns
         Of the record, from whose start times are counted.
     mass_kg
@@ -54,10 +50,17 @@ def regimes_picture(
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis, strip = figure.subplots(2, sharex=True, height_ratios=(3, 1))
-        time_s = np.array([seconds(time_ns) for time_ns in regimes.time_ns.tolist()])
-        axis.plot(time_s, regimes.speed_m_s / unit, color=BLUE)
-        _probabilities(strip, time_s, regimes)
+        regimes = coastdown.regimes
+        if regimes is None:
+            axis = lowest = figure.subplots()
+            time_s = np.array([seconds(time_ns) for time_ns, _ in coastdown.stretch])
+            speed_m_s = np.array([speed for _, speed in coastdown.stretch])
+        else:
+            axis, lowest = figure.subplots(2, sharex=True, height_ratios=(3, 1))
+            time_s = np.array([seconds(time_ns) for time_ns in regimes.time_ns.tolist()])
+            speed_m_s = regimes.speed_m_s
+            _probabilities(lowest, time_s, regimes)
+        axis.plot(time_s, speed_m_s / unit, color=BLUE)
         places = blended_transform_factory(axis.transData, axis.transAxes)
         first, last = (seconds(each) for each in stretch(coastdown))
         reasons = list(dict.fromkeys(cut.reason for cut in coastdown.cuts))
@@ -86,7 +89,9 @@ def regimes_picture(
                     bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0},
                 )
         axis.set_xlim(min(first, float(time_s[0])), max(last, float(time_s[-1])))
-        strip.set_xlabel(f'time [s] from the start of the {"record" if from_start else "stretch"}')
+        lowest.set_xlabel(
+            f'time [s] from the start of the {"record" if from_start else "stretch"}'
+        )
         axis.set_ylabel(f'speed [{unit_name}]')
     return figure
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown
-from shipdrag_ros.coastdown.given import estimate_given
-from shipdrag_ros.estimation import estimate_final
+from shipdrag_ros.coastdown.events import Dismissal
+from shipdrag_ros.coastdown.examination import Examined, estimate_examined
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SHAFTS, Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship, Water
@@ -43,31 +43,32 @@ def table(name: str) -> NDArray[np.void]:
     return found
 
 
-def judged(
+def examined(
     ship: Ship,
     time_s: NDArray[np.float64],
     window_s: tuple[float, float],
     values: dict[Channel, NDArray[np.float64]],
     *,
     convention: str = 'rep103',
-) -> EndedCoastdown:
-    """Judge a window of a record, as given by hand, and estimate."""
+) -> Examined:
+    """Examine a window of a record, as given by hand, and estimate."""
     stamps = np.round(time_s * 1e9).astype(np.int64)
     block = in_arrival_order([Block.of(channel, stamps, v) for channel, v in values.items()])
     start_ns, end_ns = (round(each * 1e9) for each in window_s)
+    window = Window.from_block(block, start_ns, end_ns, before_ns=int(stamps[0]))
     parameters = Parameters(froude_min=0.01, heading_convention=convention)
-    return estimate_given(block, start_ns, end_ns, ship, parameters, estimate_final)
+    return estimate_examined(window, ship, parameters, estimate_final)
 
 
-def kept_s(found: EndedCoastdown) -> tuple[float, float]:
+def kept_s(found: Examined) -> tuple[float, float]:
     return found.start_ns / 1e9, found.end_ns / 1e9
 
 
-def reasons(found: EndedCoastdown) -> set[Dismissal]:
+def reasons(found: Examined) -> set[Dismissal]:
     return {cut.reason for cut in found.cuts}
 
 
-def resistance(found: EndedCoastdown, speed: float) -> tuple[float, float]:
+def resistance(found: Examined, speed: float) -> tuple[float, float]:
     """Return r and two standard deviations."""
     assert found.estimate is not None, found.failure
     curve = found.estimate.valid_curve
@@ -83,7 +84,7 @@ def resistance(found: EndedCoastdown, speed: float) -> tuple[float, float]:
 def test_a_car_accelerates_coasts_and_brakes(window_s: tuple[float, float]) -> None:
     record = table('car/shotgoose_RR-Coastdown-1_whole_100hz.csv')
     values = {Channel.SPEED_OVER_GROUND: record['v_mps']}
-    found = judged(Ship.load(SHIPS / 'car.yaml'), record['t_s'], window_s, values)
+    found = examined(Ship.load(SHIPS / 'car.yaml'), record['t_s'], window_s, values)
     assert reasons(found) <= {Dismissal.LEAD_IN, Dismissal.BRAKE}
     assert kept_s(found)[0] == pytest.approx(9.5, abs=0.3)
     assert kept_s(found)[1] == pytest.approx(17.1, abs=0.3)
@@ -107,7 +108,7 @@ def test_a_catamaran_coasts_from_where_both_thrusters_stand(
     number: int, stop_s: float, end_s: float
 ) -> None:
     time_s = table(f'blueboat_{number}_10hz.csv')['t']
-    found = judged(BLUEBOAT, time_s, (0.0, end_s), blueboat(number), convention='compass')
+    found = examined(BLUEBOAT, time_s, (0.0, end_s), blueboat(number), convention='compass')
     assert kept_s(found) == (pytest.approx(stop_s, abs=0.15), end_s)
     assert found.estimate is not None
     assert {Dismissal.SLOW, Dismissal.THRUST} <= reasons(found)
@@ -128,8 +129,8 @@ def test_a_catamaran_that_goes_astern_is_refused() -> None:
         if not log:  # the track has no sign: the heading tells
             surge = values.pop(Channel.SPEED_THROUGH_WATER)
             values[Channel.SPEED_OVER_GROUND] = np.abs(surge)
-        found = judged(BLUEBOAT, time_s, (30.5, 58.7), values, convention='compass')
-        assert found.withdrawn
+        found = examined(BLUEBOAT, time_s, (30.5, 58.7), values, convention='compass')
+        assert found.refused
         assert found.failure is not None
         assert 'the ship goes astern' in found.failure
 
@@ -141,7 +142,7 @@ def test_a_ferry_with_motors_running_in_the_window() -> None:
         Channel.HEADING: record['yaw_rad'],
     } | {shaft: record[f'motor{i}_rpm'] * RPM for i, shaft in enumerate(SHAFTS, start=1)}
     ship = Ship.load(SHIPS / 'ferry.yaml')
-    found = judged(ship, record['t_s'], (279.0, 300.0), values, convention='compass')
+    found = examined(ship, record['t_s'], (279.0, 300.0), values, convention='compass')
     assert kept_s(found) == (pytest.approx(287.4, abs=0.5), pytest.approx(296.6, abs=0.5))
     assert any('440 rpm' in cut.text for cut in found.cuts)
     r, band = resistance(found, 0.116)
@@ -163,8 +164,8 @@ def esso_osaka(name: str) -> tuple[NDArray[np.float64], dict[Channel, NDArray[np
 @pytest.mark.parametrize('window_s', [(180.0, 683.0), (630.0, 683.0), (651.0, 683.0)])
 def test_a_crash_stop_and_a_caught_hull_leave_no_coastdown(window_s: tuple[float, float]) -> None:
     time_s, values = esso_osaka('180s')
-    found = judged(ESSO_OSAKA, time_s, window_s, values)
-    assert found.withdrawn
+    found = examined(ESSO_OSAKA, time_s, window_s, values)
+    assert found.refused
     assert found.failure is not None
     assert 'astern' in found.failure
     assert Dismissal.BRAKE in reasons(found)
@@ -173,7 +174,7 @@ def test_a_crash_stop_and_a_caught_hull_leave_no_coastdown(window_s: tuple[float
 @pytest.mark.parametrize('window_s', [(2067.0, 2092.0), (2050.0, 2093.0)])
 def test_a_tanker_that_turns_while_it_coasts(window_s: tuple[float, float]) -> None:
     time_s, values = esso_osaka('2030s')
-    found = judged(ESSO_OSAKA, time_s, window_s, values)
+    found = examined(ESSO_OSAKA, time_s, window_s, values)
     assert Dismissal.TURN in reasons(found)
     r, band = resistance(found, 0.17)
     assert abs(r - 0.0026) < np.hypot(0.0002, band)
