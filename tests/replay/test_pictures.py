@@ -42,7 +42,8 @@ def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdo
         {name: 1.0 - share if name == 'gliding' else 0.0 * share for name in OUT}
         | {'driven': share},
     )
-    axis, strip = pictures.regimes_picture(replace(coastdown, cuts=cuts), regimes, None, 2e7).axes
+    shown = replace(coastdown, cuts=cuts, regimes=regimes)
+    axis, strip = pictures.cut_picture(shown, None, 2e7).axes
     assert [text.get_text() for text in axis.texts] == [cuts[0].reason.value]
     assert len(axis.patches) == len(cuts)
     assert axis.get_xlim() == pytest.approx((0.0, length_ns * 1e-9))
