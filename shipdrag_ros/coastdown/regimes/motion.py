@@ -348,7 +348,8 @@ def _driving(
     else:
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
-    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    # with fewer turns a metre it drives nothing
+    f[REVS] = min(max(f[REVS], 1.0 / _S), max(1.0 / at, 1.3) if several else 1.3)
     if not settled:  # on its way to the level, or one of several that turns as before
         least = 0.0 if several else min(0.8 * math.exp(x[OPEN] - log_first), 0.9)
         density = 0.5 * density + (0.5 / (1.1 - least) if least < nu < 1.1 else 0.0)

@@ -174,10 +174,11 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
     """
     found, step_s = found.part(found.what == GLIDE), setting.step_s
     likely = _over_time(found.weight, found.gone_s, found.end_s, len(speed), step_s)
-    all_of = []
+    all_of: list[SmoothedGlide] = []
     for first, last in _stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())
-        if peak < n.HOLD[1]:
+        # a glide that was not over at a doubt goes on after it
+        if peak < n.HOLD[1] or (all_of and first * step_s < all_of[-1].end_s):
             continue
         shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.gone_s, first * step_s)
         one = shared > 0.5 * (last - first) * step_s
