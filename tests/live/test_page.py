@@ -114,8 +114,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     viewer.wait_for('#verdict', agreed)  # as the node says it; the curve is latched
     viewer.wait_for('#curve-say', 'clean hull')
     viewer.page.click('#engine-stopped')
-    # the node's own answer: the rules, which judge unless told otherwise, weigh no such thing
-    assert 'regimes: filter' in viewer.wait_for('#marked', 'recorded')
+    assert 'weighed with the readings' in viewer.wait_for('#marked', 'weighed')
 
     assert node.stop() == 0
     viewer.wait_for('#headline', 'NODE SILENT', within_s=240.0)

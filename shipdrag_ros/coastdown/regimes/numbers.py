@@ -126,7 +126,6 @@ BRAKE_LEVEL = _number('BRAKE_LEVEL', 2.0, '1/h', 'braked to a level')
 TURN_OUT = _number('TURN_OUT', 40.0, '1/h', 'turning to what was before')
 SETTLED_S = _number('SETTLED_S', 900.0, 's', 'a level that is held so long is sailing')
 LEVEL_LEAST_S = _number('LEVEL_LEAST_S', 30.0, 's', 'before the next switch')
-GLIDES_FIRST = _number('GLIDES_FIRST', 0.3, '1', 'of a window that is given: it begins in a glide')
 
 # shapes of switches
 RUN_DOWN_S = _grid('RUN_DOWN_S', (3.0, 10.0, 24.0, 60.0), 's', 'fuel cut, pitch, controlled')
