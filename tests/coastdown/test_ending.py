@@ -162,16 +162,14 @@ def test_an_engaged_engine_shows_in_the_shaft_at_once(
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
         orders=(STOP, EngineOrder(400.0, shaft=shaft, thrust=0.1)),
-        duration_s=420.0,
+        duration_s=440.0,
     )
     coastdown = the_coastdown(watch(block))
     assert coastdown.ended_by is by
     assert 395.0 <= end_s(coastdown) <= 405.0
 
 
-def test_what_pushes_while_the_shaft_is_seen_to_stand_is_no_glide(
-    watch, record, sensors
-) -> None:
+def test_what_pushes_while_the_shaft_is_seen_to_stand_is_no_glide(watch, record, sensors) -> None:
     pushed = (STOP, EngineOrder(400.0, shaft=0.0, thrust=0.5))
     with_shaft = (sensors['log'], sensors['shaft'])
     coastdown = ended(watch(record(sensors=with_shaft, orders=pushed, duration_s=700.0)))[0]

@@ -185,9 +185,11 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         if not one.any():
             continue
         glide = _one(found.part(one), peak)
-        end_s = min(glide.end_s, _even_s(speed, glide, step_s))
-        if end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
-            all_of.append(glide._replace(end_s=end_s))
+        even_s = _even_s(speed, glide, step_s)
+        if even_s < glide.end_s:
+            glide = glide._replace(end_s=even_s, after=LEVEL)
+        if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
+            all_of.append(glide)
     return all_of
 
 
