@@ -13,11 +13,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings, seconds
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
 _IDLE = 0.1  # of the fastest shaft or the largest pitch: a hundredth of the thrust
@@ -32,6 +32,7 @@ _RISES = 1.3  # a shaft that the water turns does not go faster again
 _JOIN = 0.05  # of the window: pauses of the thrust no longer than this are part of it
 _DIAMETER = 0.05  # of a propeller, of the length, where it is not stated
 _SLIP = 0.1  # of the ship's speed: a screw that goes forward by less can drive nothing
+_RUN_DOWNS, _ONSET_S = 5.0, 30.0
 _PUSHES = 0.7  # of those: with fewer a propeller hardly pushes
 
 
@@ -76,6 +77,28 @@ def thrust(window: Window, ship: Ship) -> list[NotCoastdown]:
             reason = Dismissal.ASTERN if is_astern else Dismissal.THRUST
             found.append(cut_of(window, start_s, end_s, reason, text))
     return found
+
+
+def start_of(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
+    """
+    Return the start of a window that was given, and whether what comes before may be steady.
+
+    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
+    good as before any other. What was cut before that, the engine drove.
+
+    Parameters
+    ----------
+    coastdown
+        As it was judged.
+    ship
+        For how long the thrust runs down.
+    """
+    cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
+    if not cuts or any(cut.reason is not Dismissal.THRUST for cut in cuts):
+        return coastdown.start_ns, not cuts
+    constant_s = 0.0 if ship.propulsion is None else ship.propulsion.run_down_s
+    gone_ns = round((_ONSET_S + _RUN_DOWNS * constant_s) * SECOND_NS)
+    return max(min(cut.start_ns for cut in cuts), coastdown.start_ns - gone_ns), True
 
 
 def _joined(window: Window, number: int) -> tuple[Float64, Float64, NDArray[np.bool_]]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.coastdown import Monitor, validate
+from shipdrag_ros.coastdown.driving import start_of
 from shipdrag_ros.coastdown.events import (
     Dismissal,
     EndedBy,
@@ -80,18 +81,18 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     found = []
     for coastdown in coastdowns:
         if not coastdown.withdrawn:
-            start_ns, steady = begins(coastdown)
+            start_ns, steady = begins(coastdown, result.ship)
             window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
             found.append((coastdown, window))
     return found
 
 
-def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
+def begins(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
     """
     Return when the thrust began to fall, and whether what comes before is steady sailing.
     """
     if coastdown.stop_ns is None:
-        return coastdown.start_ns, False
+        return start_of(coastdown, ship)
     return coastdown.stop_ns, True
 
 
@@ -104,7 +105,7 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
     Window or None
         None where there is none.
     """
-    start_ns, steady = begins(coastdown)
+    start_ns, steady = begins(coastdown, result.ship)
     acted: list[WholeGlide | NotCoastdown] = [
         cut for cut in coastdown.cuts if cut.reason in (Dismissal.BRAKE, Dismissal.TURN)
     ]
