@@ -106,7 +106,7 @@ def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
     assert onset.start_ns < onset.detected_ns
     (coastdown,) = [event for event in events if isinstance(event, EndedCoastdown)]
     # by the clock of the log, or of the shaft
-    assert -5.0 - slow_s <= after_s(coastdown.start_ns, 900.0) <= 10.0
+    assert -5.0 - slow_s <= after_s(coastdown.start_ns, 900.0) <= 15.0
     assert coastdown.ended_by is EndedBy.RECORD_END
 
 
@@ -135,7 +135,7 @@ def test_a_shaft_that_holds_its_speed_asks_for_more(watch, record, sensors) -> N
     # the propeller is driven at half of its speed
     driven = record(
         sensors=(sensors['log'], sensors['shaft']),
-        orders=(EngineOrder(0.0, shaft=0.4, thrust=0.5),),
+        orders=(EngineOrder(0.0, shaft=0.5, thrust=0.25),),
     )
     events = watch(driven)
     # what is announced at first is withdrawn as the speed settles
@@ -167,7 +167,7 @@ def test_a_stuck_shaft_loses_nothing(watch, record) -> None:
     for value in (0.0, 11.0, -11.0):
         stuck = watch(with_shaft(block, block.stamp_ns, np.full(len(block), value)))
         (found,), (expected,) = standing(stuck), standing(alone)
-        assert abs(found.start_ns - expected.start_ns) <= 12 * S
+        assert abs(found.start_ns - expected.start_ns) <= 15 * S
         assert found.end_ns == expected.end_ns
 
 

@@ -261,7 +261,7 @@ class RegimeFilter:
         since = math.ceil(max((since_s - self._zero_s) / self._width, 0.0))
         table = np.array(self._out)
         doubted = since + np.flatnonzero(table[since:, P_EVEN] < _DOUBTED)
-        if not len(doubted) or table[doubted[-1], SPEED] >= table[doubted[0], SPEED]:
+        if not len(doubted) or table[doubted, SPEED].argmin() == 0:
             return None
         first, last = int(doubted[0]), int(doubted[-1]) + 1
         reason, text = _WHY[slowed_by(self._spans, table[:, SPEED], first, self._width)]
