@@ -438,7 +438,7 @@ class Monitor:
         ]
         was = None if dated else regimes.dismissal(since_s)
         if was is not None:
-            if ended_by is not None and regimes.gliding > float(numbers.HOLD[0]):
+            if ended_by is not None and not regimes.even:
                 was = cut_short(was, ended_by, regimes.gliding)
             self._reported_s = was.end_ns / SECOND_NS
             events += self._dismissals.take(was)

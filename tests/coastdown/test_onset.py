@@ -255,7 +255,7 @@ def test_what_is_dismissed_is_told_with_figures(watch, record, sensors) -> None:
         turns=(Turn(0.0, 150.0, 0.015, drag_area_m2=12.0),),
     )
     assert Dismissal.TURN in {one.reason for one in dismissed(watch(turn))}
-    short = dismissed(watch(record(duration_s=60.0)))
+    short = dismissed(watch(record(duration_s=35.0)))
     assert [one.reason for one in short] == [Dismissal.GAP]
 
 
