@@ -22,7 +22,7 @@ _SHORT.maxstring = _SHORT.maxother = 60
 
 M_S_PER_KNOT = 1852.0 / 3600.0
 _UNITS_M_S = {'m/s': 1.0, 'knots': M_S_PER_KNOT, 'km/h': 1.0 / 3.6, 'mph': 0.44704}
-_UNIT_RATIOS = {
+UNIT_RATIOS = {
     of / other: f'{shown} over {meant}'
     for meant, of in _UNITS_M_S.items()
     for shown, other in _UNITS_M_S.items()
@@ -236,7 +236,7 @@ def mistaken_units(ratio: float) -> str:
         return ''
     return ' and '.join(
         f'{words} ({each:.2f})'
-        for each, words in _UNIT_RATIOS.items()
+        for each, words in UNIT_RATIOS.items()
         if abs(math.log(ratio / each)) < min(_UNITS_NEAR, _UNITS_NEARER * abs(math.log(each)))
     )
 

@@ -12,13 +12,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.fields import declare, number
 
-_WIDER, _WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
+WIDER, WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
 
 
 class Shape(StrEnum):
@@ -69,7 +70,7 @@ class Prior:
                 return math.log(2.0 / b) + _log_normal(value / b) if value >= 0.0 else -math.inf
             case Shape.HEAVY_TAILED:
                 z = (value - a) / b
-                narrow = math.log(1.0 - _WIDER_CHANCE) + _log_normal(z) - math.log(b)
+                narrow = math.log(1.0 - WIDER_CHANCE) + _log_normal(z) - math.log(b)
                 return narrow + float(np.logaddexp(0.0, _log_odds_wider(z)))
             case Shape.LOG_NORMAL:
                 if value * a <= 0.0:
@@ -100,7 +101,7 @@ class Prior:
             case Shape.HALF_NORMAL:
                 return float(abs(rng.normal(0.0, b)))
             case Shape.HEAVY_TAILED:
-                wider = _WIDER if rng.random() < _WIDER_CHANCE else 1.0
+                wider = WIDER if rng.random() < WIDER_CHANCE else 1.0
                 return float(rng.normal(a, wider * b))
             case Shape.LOG_NORMAL:
                 return float(a * math.exp(b * rng.standard_normal()))
@@ -142,7 +143,7 @@ class Prior:
         Raises
         ------
         ValueError
-            If the prior is a choice or uniform.
+            If the prior is a choice.
         """
         a, b = self.first, self.second
         match self.shape:
@@ -150,7 +151,10 @@ class Prior:
                 return value / b
             case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
                 return math.log(max(value / a, 1e-300)) / b
-            case Shape.CHOICE | Shape.UNIFORM:
+            case Shape.UNIFORM:
+                share = min(max((value - a) / (b - a), 1e-12), 1.0 - 1e-12)
+                return NormalDist().inv_cdf(share)
+            case Shape.CHOICE:
                 raise ValueError(f'a prior that is {self} has no z of a value')
             case _:
                 return (value - a) / b
@@ -189,7 +193,7 @@ class Prior:
                 return 0.0
             case Shape.HEAVY_TAILED:
                 wider = 1.0 / (1.0 + math.exp(-min(_log_odds_wider(z), 700.0)))
-                return 1.0 - wider * (1.0 - 1.0 / _WIDER**2)
+                return 1.0 - wider * (1.0 - 1.0 / WIDER**2)
             case _:
                 return 1.0
 
@@ -394,5 +398,5 @@ def _log_normal(standard: float) -> float:
 
 def _log_odds_wider(z: float) -> float:
     """Return the logarithm of the odds that what is z off is of the wider normal."""
-    before = math.log(_WIDER_CHANCE / (_WIDER * (1.0 - _WIDER_CHANCE)))
-    return before + 0.5 * z * z * (1.0 - 1.0 / _WIDER**2)
+    before = math.log(WIDER_CHANCE / (WIDER * (1.0 - WIDER_CHANCE)))
+    return before + 0.5 * z * z * (1.0 - 1.0 / WIDER**2)

@@ -134,7 +134,7 @@ def _run(line: list[str]) -> int:
 def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
     if not folders:
         return nullcontext()
-    from shipdrag_ros.learning.folder import read_folders
+    from shipdrag_ros.ship.term import read_folders
     from shipdrag_ros.simulation.effects import using
 
     return using(read_folders(folders))

@@ -152,10 +152,11 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     output.say(diagnosis_words.sentence(found))
     if found.runs_differ:
         output.say(diagnosis_words.differing(found))
-    if ship is not None:
+    if ship is not None and not found.question:
         for line in estimate_words.in_service(found.estimates, ship):
             output.say(line)
-    output.say(diagnosis_words.examined(found))
+    if found.examined:
+        output.say(diagnosis_words.examined(found))
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
     weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))

@@ -9,7 +9,8 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_effects, add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.learning.folder import read_term
+from shipdrag_ros.errors import EffectFileError
+from shipdrag_ros.ship import LearntTerm
 from shipdrag_ros.ship.expression import unit_text
 from shipdrag_ros.simulation.effects import LIBRARY, OWN
 
@@ -43,13 +44,22 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(files: list[Path], output: Output) -> int:
-    document = []
+    document, refused = [], []
     for path in files:
-        term = read_term(path)  # the first that cannot be used is the error
+        try:
+            term = LearntTerm.load(path)
+        except EffectFileError as error:
+            refused.append({'file': str(path), 'problems': error.problems})
+            continue
         unit = unit_text(term.units[0])
         output.say(f'{path}: {term.name} can be used: {term.term.expression} [{unit}]')
         document.append({'file': str(path), 'name': term.name, 'channel': term.term.channel})
-    output.json({'effects': document})
+    output.json({'effects': document, 'refused': refused})
+    if refused:
+        raise EffectFileError(
+            f'{len(refused)} of {len(files)} file(s) cannot be used',
+            [f'{each["file"]}: {problem}' for each in refused for problem in each['problems']],
+        )
     return 0
 
 

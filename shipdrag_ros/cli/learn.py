@@ -13,6 +13,7 @@ from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.term import check_name
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,8 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Look for one form, of a force by speed, time or heading, that explains what several '
-        'coastdowns of one ship share and the library has no name for. It is written as a term '
+        'Look for one form that explains what several coastdowns of one ship share and the '
+        'library has no name for: a force by speed, time, heading, date or depth, or an error of '
+        'the log by speed or time. It is written as a term '
         'with units, which --effects takes, where the evidence of all runs is for it, beside '
         'something smooth without a formula, and each half of the runs shows it. Else nothing is '
         'written, and it is said what is known and which run would decide.'
@@ -63,11 +65,11 @@ def run(options: argparse.Namespace) -> int:
     """
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
-    from shipdrag_ros.learning.folder import check_name
     from shipdrag_ros.library.learning import learn_from
 
     output = Output(options.json)
-    name = check_name(options.name or options.out.stem)
+    name = options.name or options.out.stem
+    check_name(name)
     given = None if options.ship is None else Ship.load(options.ship)
     bags = _bags(options.bags)
     runs = open_windowed(bags, remap=dict(options.remap), output=output)

@@ -36,10 +36,10 @@ from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
-from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.doubted import averaged
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
@@ -96,8 +96,8 @@ class Monitor:
     ) -> None:
         self._ship = ship
         self._parameters = parameters
-        self._estimator = None if estimate is None else shielded(estimate)
-        self._final_estimator = shielded(final)
+        self._estimator = None if estimate is None else shielded(averaged(estimate))
+        self._final_estimator = shielded(averaged(final))
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
             Limits.of(parameters),
@@ -168,7 +168,7 @@ class Monitor:
         """
         bins = self._memory.bins
         heading = heading_doubt(bins, self._parameters.heading_convention)
-        found = self._vouching.texts | unit_doubts(bins)
+        found = self._vouching.texts
         return found | ({'heading': heading} if heading else {})
 
     def contradictions(self) -> dict[str, str]:
@@ -176,6 +176,12 @@ class Monitor:
         Say which inputs contradicted another at any time.
         """
         return self._vouching.ever
+
+    def left_out(self) -> dict[str, str]:
+        """
+        Say which inputs were left out at any time, as another contradicted them.
+        """
+        return self._vouching.left_out
 
     def health(self) -> dict[str, InputHealth]:
         """
@@ -207,9 +213,9 @@ class Monitor:
             if stop == WalkEvent.FULL:
                 self._make_room()
             elif stop == WalkEvent.UPDATE:
-                events.append(self._update(int(stamp_ns[at])))
+                events += self._vouching.explained([self._update(int(stamp_ns[at]))])
             elif stop == WalkEvent.BIN:
-                events += self._follow()
+                events += self._vouching.explained(self._follow())
             elif stop == WalkEvent.LOOK:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
@@ -482,9 +488,11 @@ class Monitor:
             capacity=CAPACITY,
         )
         kept = self._vouching.kept(kept)
-        return Window.from_block(
+        window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
+        notes = (*window.notes, *self._vouching.notes(start_ns))
+        return replace(window, notes=notes, log_doubt=self._vouching.log_doubt)
 
     # how a coastdown ends
 
@@ -502,10 +510,11 @@ class Monitor:
         ):
             events += self._decide(regimes, number)
         if self._regimes is None:
-            return events
+            return self._vouching.explained(events)
         if self._running is not None:
             events += self._end_glide(regimes, number, ended_by, end_ns)
-        return events + self._rest(regimes, number, ended_by, end_ns)
+        events += self._rest(regimes, number, ended_by, end_ns)
+        return self._vouching.explained(events)
 
     def _stand_down(self) -> None:
         """Watch for an onset again, once the ship has been steady."""

@@ -4,13 +4,15 @@ Log and track vouch for each other: do all of them still measure the ship?
 
 The last minute of every speed is compared under these hypotheses, by Bayes' rule: some of
 the sources measure one ship, and log and ground differ by a current; the others say nothing
-about her. Each is a mixture of Gaussians of fixed covariance, so that an evidence is a sum.
+about her, or she is in them in a wrong scale, which the whole record shows. Each is a mixture of
+Gaussians of fixed covariance, so that an evidence is a sum.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations, product
 from typing import NamedTuple
@@ -26,6 +28,8 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     smoothing,
 )
+from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
+from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, means, scaled
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
@@ -45,20 +49,19 @@ _QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
 _NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean of a log or a speed over ground
 _TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # radar: 4 to 10 m
 _SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
-_CURRENT = ((0.4, 0.7), (1.0, 0.3))  # with it what a scale of some per cent makes
-_DRIFT = 0.01  # its change in a second, in open water
-_SWING, _SWING_S = 1.5, 40.0  # its change while she turns, or crosses an eddy: times the current
-_TURNS = 0.1  # probability of that
+_DRIFT = 0.01  # change of a current in a second, in open water
+_SWING_S = 40.0  # in which it is another one while she turns, or crosses an eddy
 _ASTERN = 0.005  # share of minutes
 # Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
 _ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
 _WANDERS = ((0.0, 0.3), (0.3, 0.7))
 _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
-_NONSENSE = (0.02, 0.003, 0.003, 0.003)  # share of minutes: a log fouls, a fix hardly ever
-_KM = 0.1  # of a track that says nothing: it is in km
-_STILL = 0.5  # the same of a source that said nothing just before
+_WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
+_IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
+_STILL = 0.5  # the same of a source that was wrong just before
 
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
+_KM = Scaled(_MEANS * math.log(1e3), 1e-3, _MEAN_S * _MEANS)
 _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
 _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
@@ -88,16 +91,16 @@ def _nothing() -> SpeedMixture:
 def _one_ship(logs: int, grounds: int, tracks: int, length_m: float) -> SpeedMixture:
     """Return what sources read that measure her, in the order of the arguments."""
     parts, count = [], logs + grounds + tracks
-    swings = ((0.0, 1.0 - _TURNS), (_SWING, _TURNS))
-    currents = list(product(_CURRENT, swings)) if 0 < logs < count else [((0.0, 1.0), (0.0, 1.0))]
+    water = ((_SAME, 1.0 - TURNS), (_TURN, TURNS))
+    currents = list(product(CURRENT, water)) if 0 < logs < count else [((0.0, 1.0), (_SAME, 1.0))]
     drift = _DRIFT**2 * _WALK * (len(currents) > 1)
     ground = np.zeros((count, count))
     ground[logs:, logs:] = 1.0
-    for (level, a), (inertia, b), ((current, c), (swing, d)) in product(
+    for (level, a), (inertia, b), ((current, c), (kind, d)) in product(
         _LEVEL, (*_INERTIA, (_QUICK_M_M_S / length_m, _QUICK)), currents
     ):
         shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
-        shared += np.kron(ground, current**2 * (_SAME + swing**2 * _TURN) + drift)
+        shared += np.kron(ground, current**2 * kind + drift)
         for (log, e), (track, f) in product(_NOISE, _TRACK_NOISE if tracks else _NOISE):
             own = np.kron(np.diag([log**2] * logs + [track**2] * (count - logs)), _WHITE)
             own += np.kron(np.eye(count), _OWN)
@@ -112,6 +115,8 @@ def _evidence(mixture: SpeedMixture, speed: Float64) -> float:
 
 def _log_sum(logs: list[float]) -> float:
     most = max(logs)
+    if most == -math.inf:
+        return most
     return most + math.log(math.fsum(math.exp(each - most) for each in logs))
 
 
@@ -133,12 +138,33 @@ def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     )
 
 
+class Soundness(NamedTuple):
+    """
+    What each source probably is.
+
+    Attributes
+    ----------
+    sets
+        Probability of each set of sources to be those that measure the ship.
+    scaled
+        Probability of each source to be the ship in a wrong scale.
+    """
+
+    sets: dict[tuple[int, ...], float]
+    scaled: dict[int, float]
+
+    def wrong(self, source: int) -> float:
+        """Return the probability that a source does not measure the ship."""
+        return math.fsum(each for sound, each in self.sets.items() if source not in sound)
+
+
 def sound_probabilities(
     speeds: Mapping[int, Float64],
     craft: Craft,
     *,
     doubted: Collection[int] = (),
-) -> dict[tuple[int, ...], float]:
+    scales: Mapping[tuple[int, int], Scaled] | None = None,
+) -> Soundness:
     """
     Return the probability of each set of sources to be those that measure the ship.
 
@@ -150,25 +176,54 @@ def sound_probabilities(
         How fast she may change her speed, and about how fast she goes astern.
     doubted
         Sources that said nothing of her just before.
+    scales
+        What the record says of each, the first, being another, the second, in a wrong scale.
     """
     names, found = sorted(speeds), {}
+    in_a_scale: dict[int, list[float]] = {name: [] for name in names}
     for count in range(len(names) + 1):
         for sound in combinations(names, count):
             part = {name: speeds[name] for name in sound}
-            logs = [_measured(part, craft)] if sound else []
+            logs, ratio = [_measured(part, craft)] if sound else [], {}
             for name in names:
-                share = _STILL if name in doubted else _NONSENSE[name]
+                share = _STILL if name in doubted else _WRONG_SHARE[name]
                 logs.append(math.log(1.0 - share if name in sound else share))
                 if name not in sound:
-                    each = [_evidence(_nothing(), speeds[name])]
-                    if name == _METRES and sound:
-                        scaled = {**part, name: 1e3 * speeds[name]}
-                        beside = _measured(dict(sorted(scaled.items())), craft)
-                        each.append(math.log(_KM) + _MEANS * math.log(1e3) + beside - logs[0])
+                    nothing = _evidence(_nothing(), speeds[name])
+                    beside = _beside(name, part, speeds[name], scales or {}, craft)
+                    each = [
+                        math.log(1.0 - _IN_A_SCALE[name]) + nothing,
+                        math.log(_IN_A_SCALE[name]) + beside - (logs[0] if sound else 0.0),
+                    ]
+                    ratio[name] = each[1] - _log_sum(each)
                     logs.append(_log_sum(each))
             found[sound] = math.fsum(logs)
+            for name, share in ratio.items():
+                in_a_scale[name].append(found[sound] + share)
     total = _log_sum(list(found.values()))
-    return {sound: math.exp(each - total) for sound, each in found.items()}
+    return Soundness(
+        {sound: math.exp(each - total) for sound, each in found.items()},
+        {name: math.exp(_log_sum(logs) - total) for name, logs in in_a_scale.items()},
+    )
+
+
+def _beside(
+    name: int,
+    sound: Mapping[int, Float64],
+    speed: Float64,
+    scales: Mapping[tuple[int, int], Scaled],
+    craft: Craft,
+) -> float:
+    """Return the log evidence of sound sources and of one that is the ship in a wrong scale."""
+    if name == _METRES and sound:
+        scaled_up = {**sound, name: speed / _KM.scale}
+        return _KM.log_odds + _measured(dict(sorted(scaled_up.items())), craft)
+    # a track has no scale, and no current is between it and a speed over ground
+    for other in sorted(sound, reverse=name != _LOG):
+        if (name, other) in scales:
+            both = dict(sorted({**sound, name: speed}.items()))
+            return scales[name, other].log_odds + _measured(both, craft)
+    return -math.inf
 
 
 class Craft(NamedTuple):
@@ -176,6 +231,20 @@ class Craft(NamedTuple):
 
     length_m: float
     slow_m_s: float
+
+
+class Contradiction(NamedTuple):
+    """
+    What is said of a source until a second: why it is doubted, and what to do.
+    """
+
+    until: int
+    why: str
+    remedy: str
+
+    @property
+    def text(self) -> str:
+        return f'{self.why}: {self.remedy}'
 
 
 class Vouching:
@@ -198,20 +267,64 @@ class Vouching:
         self._craft = craft
         self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
         self._now = NEVER
-        self._said: dict[str, tuple[int, str]] = {}
+        self._said: dict[str, Contradiction] = {}
+        self._scaled = (NEVER, 0.0)  # when it was last known whether the log is, and how probable
 
     @property
     def texts(self) -> dict[str, str]:
         """What to say of each input that is doubted."""
-        return {name: text for name, (until, text) in self._said.items() if until > self._now}
+        return {name: one.text for name, one in self._said.items() if one.until > self._now}
 
     @property
     def ever(self) -> dict[str, str]:
         """The last that was said of each input that was not used; of none: of all."""
-        unused = {Channel(source).input for source in np.flatnonzero(self.until > NEVER).tolist()}
-        return {
-            name: text for name, (_, text) in self._said.items() if name in unused or not unused
-        }
+        return self.left_out or {name: one.text for name, one in self._said.items()}
+
+    @property
+    def log_doubt(self) -> float:
+        """Probability that the log is in a wrong scale, though it is used."""
+        when, doubt = self._scaled
+        known = when > self._now - EDGES[-1] and self.until[_LOG] <= self._now
+        return doubt if known else 0.0
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """The last that was said of each input that was not used."""
+        return {name: one.text for name, one in self._unused(NEVER).items()}
+
+    def _unused(self, since: int) -> dict[str, Contradiction]:
+        sources = np.flatnonzero(self.until > since).tolist()
+        return {name: self._said[name] for name in {Channel(each).input: None for each in sources}}
+
+    def notes(self, start_ns: int) -> tuple[str, ...]:
+        """Say of each input that is not used from a time on [ns] that it is left out, and why."""
+        unused = self._unused(start_ns // SECOND_NS)
+        return tuple(f'without {name}: {one.text}' for name, one in unused.items())
+
+    def explained(self, events: list[Event]) -> list[Event]:
+        """Say in what failed that an input is left out, why, and what to do."""
+        unused = self._unused(self._now)
+        if not unused:
+            return events
+        why = '; '.join(
+            f'the {name.replace("_", " ")} is left out: {one.why}' for name, one in unused.items()
+        )
+        remedy = '; '.join(one.remedy for one in unused.values())
+
+        def told(text: str) -> str:
+            return f'{why}. By what is left, {text}. To do: {remedy}'
+
+        def of(event: Event) -> Event:
+            if isinstance(event, NotCoastdown):
+                return replace(event, text=told(event.text))
+            if isinstance(event, NoEstimate):
+                return replace(event, reason=told(event.reason))
+            if isinstance(event, EndedCoastdown) and event.failure:
+                cuts = tuple(replace(cut, text=told(cut.text)) for cut in event.cuts)
+                return replace(event, failure=told(event.failure), cuts=cuts)
+            return event
+
+        return [of(event) for event in events]
 
     def sound(self, bins: Bins) -> Bins:
         """Return bins in which the sources that are not used were never read."""
@@ -268,16 +381,12 @@ class Vouching:
         if float(np.ptp(table, axis=0).max()) < _AGREE_M_S:
             return
         doubted = [source for source in speeds if self.until[source] > number]
-        probability = sound_probabilities(
-            speeds,
-            self._craft,
-            doubted=doubted,
-        )
-        wrong = {
-            source: math.fsum(each for sound, each in probability.items() if source not in sound)
-            for source in speeds
-        }
-        contradiction = probability[tuple(speeds)] < 1.0 - _WRONG
+        scales = _scales(bins, speeds, last, lag)
+        found = sound_probabilities(speeds, self._craft, doubted=doubted, scales=scales)
+        if any(one == _LOG for one, _ in scales):
+            self._scaled = (number, found.scaled[_LOG])
+        wrong = {source: found.wrong(source) for source in speeds}
+        contradiction = found.sets[tuple(speeds)] < 1.0 - _WRONG
         left = len(speeds) - len(doubted)
         for source, each in wrong.items():
             if source not in doubted and left < 2:
@@ -291,13 +400,42 @@ class Vouching:
                     begins if NEVER in (begins, self._since[source]) else self._since[source]
                 )
                 lasts = begins == number >= self._since[source] + _LASTS_S
+                # while a scale is known from the whole record
+                lasts = lasts or found.scaled[source] > _WRONG
             if lasts:
                 left -= source not in doubted
                 self.until[source] = number + _HOLD_S
-            if lasts or (contradiction and each > 0.5 * max(wrong.values())):
+            if lasts or (contradiction and each == max(wrong.values())):
                 used = {other: bool(self.until[other] <= number) for other in speeds}
-                text = _doubt(source, speeds, wrong, used, number)
-                self._said[Channel(source).input] = (number + _HOLD_S, text)
+                name = Channel(source).input
+                one = self._said.get(name)
+                if contradiction or one is None:  # else what was said is the best that is known
+                    one = _doubt(source, speeds, found, used, scales, number)
+                self._said[name] = one._replace(until=number + _HOLD_S)
+
+
+def _scales(
+    bins: Bins, sources: Collection[int], last: int, lag: int
+) -> dict[tuple[int, int], Scaled]:
+    """Say of each speed whether it is another one in a wrong scale."""
+    read = {
+        source: means(bins, source, last + lag * (source >= FIRST_TRACK)) for source in sources
+    }
+    found = {}
+    for one, other in combinations(read, 2):
+        if one >= FIRST_TRACK:
+            continue
+        count = min(len(read[one]), len(read[other]))
+        both = np.array([read[one][:count], read[other][:count]])
+        # as long as she makes way ahead, through the water and faster than a current may run:
+        # a speed over ground has no sign
+        way = (both > 0.0).all(axis=0) & (both[1] > CURRENT[-1][0])
+        count = count if way.all() else int(np.argmin(way))
+        if count:
+            found[one, other] = both_ways = scaled(*both[:, :count])
+            if other < FIRST_TRACK:  # which of two is wrong is known beforehand alone
+                found[other, one] = both_ways._replace(scale=1.0 / both_ways.scale)
+    return found
 
 
 def _means(bins: Bins, source: int, last: int) -> Float64:
@@ -313,21 +451,36 @@ def _means(bins: Bins, source: int, last: int) -> Float64:
 def _doubt(
     source: int,
     speeds: Mapping[int, Float64],
-    wrong: Mapping[int, float],
+    found: Soundness,
     used: Mapping[int, bool],
+    scales: Mapping[tuple[int, int], Scaled],
     number: int,
-) -> str:
+) -> Contradiction:
     """Say what contradicts what, who is wrong, and what to do."""
     others = [each for each in speeds if each != source]
-    best = min(others, key=lambda each: (not used[each], wrong[each]))
+    best = min(others, key=lambda each: (not used[each], found.wrong(each)))
     mine, other = float(speeds[source].mean()), float(speeds[best].mean())
-    units = mistaken_units(mine / other) if other else ''
     instead = ', which is used instead' if used[best] and not used[source] else ''
-    text = (
+    units = mistaken_units(mine / other) if other else ''
+    near = f' (near {units})' if units else ''
+    alone = all(each >= FIRST_TRACK for each in others)
+    less = '; of a speed over ground less is needed than of positions alone' if alone else ''
+    why = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '
         f'{float(speeds[source].std()):.2f} m/s, the {Channel(best).input.replace("_", " ")} '
         f'{other:.2f} ± {float(speeds[best].std()):.2f} m/s{instead}: with a probability of '
-        f'{min(wrong[source], 0.99):.2f} it says nothing of the ship: look at its sensor, axis, '
-        'sign and unit'
     )
-    return f'{text} (near {units})' if units else text
+    if (source, best) in scales and found.scaled[source] > 0.5 * found.wrong(source):
+        scale = scales[source, best]
+        return Contradiction(
+            number,
+            f'{why}{min(found.scaled[source], 0.99):.2f}, by {scale.span_s} s, it reads about '
+            f'{scale.scale:.2f} times the speed{near}',
+            'look at the unit that its driver converts from and at its calibration; if they are '
+            f'right, a current of {abs(other - mine):.1f} m/s runs, which turns show{less}',
+        )
+    return Contradiction(
+        number,
+        f'{why}{min(found.wrong(source), 0.99):.2f} it says nothing of the ship{near}',
+        f'look at its sensor, axis, sign and unit{less}',
+    )

@@ -24,6 +24,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
 from shipdrag_ros.simulation.columns import RUN_DOWNS
+from shipdrag_ros.simulation.surge import turning
 
 _BIN_S = 60.0
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
@@ -208,7 +209,7 @@ class Context:
         stall, free, fraction, decay_s = np.array(
             [(a.stall_m_s, a.free_shaft, a.residual_fraction, a.residual_decay_s) for a in actions]
         ).T[:, :, None]
-        turned = free * speed / self.stop.speed_m_s * (speed > stall)
+        turned = free * speed / self.stop.speed_m_s * turning(speed, stall)
         if not self.turns:
             turned[stall[:, 0] == 0.0] = 0.0
         driven = fraction * np.exp(-after / np.maximum(decay_s, 1e-3))

@@ -63,7 +63,7 @@ def write_diagnosis(
 def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     """Show the verdict, what the ship needs, and what would decide."""
     sentence, *rest = found.summary()
-    needs = () if ship is None else in_service(found.estimates, ship)
+    needs = () if ship is None or found.question else in_service(found.estimates, ship)
     yield Section(
         lead=[sentence, *needs[:1]],
         text=rest,

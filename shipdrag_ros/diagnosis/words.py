@@ -177,8 +177,10 @@ def differing(found: DiagnosisResult) -> str:
 
 def examined(found: DiagnosisResult) -> str:
     """
-    Say what was examined, and what was not.
+    Say what was examined, and what was not; '' where nothing was, as the verdict waits.
     """
+    if not found.examined:
+        return ''
     parts = {FORCE: 'the force on the ship', LOG_TRACK: 'the log against the way over ground'}
     seen = [words for part, words in parts.items() if part in found.examined]
     unseen = [words for part, words in parts.items() if part not in found.examined]

@@ -70,6 +70,8 @@ class Window:
         Of the water [m].
     notes
         What was left out, a sentence each.
+    log_doubt
+        Probability that the log is in a wrong scale.
     before
         The record that ends where this window starts, positions in the same
         plane; None where there is none.
@@ -92,6 +94,7 @@ class Window:
     wind_apparent: Series
     depth: Series
     notes: tuple[str, ...] = ()
+    log_doubt: float = 0.0
     before: Window | None = None
 
     @property
@@ -121,7 +124,7 @@ class Window:
         changes: dict[str, Any] = {
             name: tuple(map(cut, found)) if isinstance(found, tuple) else cut(found)
             for name, found in vars(self).items()
-            if name not in ('start_ns', 'end_ns', 'notes', 'before')
+            if name not in ('start_ns', 'end_ns', 'notes', 'log_doubt', 'before')
         }
         before = self.before if start_ns == self.start_ns else None
         return replace(self, start_ns=start_ns, end_ns=end_ns, before=before, **changes)

@@ -20,7 +20,7 @@ from shipdrag_ros.parameter import Prior, Shape, either_sign, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
-from shipdrag_ros.ship.term import TermForm, TermParameter
+from shipdrag_ros.ship.declared import TermForm, TermParameter
 from shipdrag_ros.simulation.declared import effect_of
 from shipdrag_ros.simulation.effect import Effect
 
@@ -157,7 +157,14 @@ def _form(
     scope = 'earth' if variable in _OF_EARTH else 'sensor' if channel == 'log' else 'hull'
     term = LearntTerm(
         name=f'form_{number}_{channel}_{variable}_{shape}',
-        term=TermForm(channel, scope, variable, shape, expression, valid),
+        term=TermForm(
+            channel=channel,
+            expression=expression,
+            scope=scope,
+            variable=variable,
+            shape=shape,
+            valid=valid,
+        ),
         parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
     )
     return LearnableForm((channel, variable, shape), term, tuple(parameters.values()), odds)

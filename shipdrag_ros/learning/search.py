@@ -33,7 +33,8 @@ from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit, TermParameter
+from shipdrag_ros.ship.declared import TermParameter
+from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
@@ -67,8 +68,11 @@ class Learnt:
     where
         In which channel, when and at which speeds model and data disagree; None where they do
         not.
+    likeliest
+        Channel, variable and shape of the likeliest form alone, written or not; None without one.
     largest_percent
-        Of the resistance, or of a reading of the log, by the likeliest form; NaN without one.
+        How large that is where it is largest: a force, of the resistance; an error of the log, of
+        its reading. NaN without one.
     runs
         Names of the runs that were used.
     notes
@@ -80,6 +84,7 @@ class Learnt:
     next_run: str
     probability: dict[str, float]
     where: Where | None
+    likeliest: tuple[str, str, str] | None
     largest_percent: float
     runs: tuple[str, ...]
     notes: tuple[str, ...]
@@ -282,6 +287,7 @@ class _Judged:
             '' if term else self._next_run(kinds),
             kinds,
             self._where(kinds),
+            None if best is None else case.forms[best[0]].kind,
             math.nan if best is None else self._percent(best),
             tuple(run.name for run in case.seen),
             self.notes,

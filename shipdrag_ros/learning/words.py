@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +49,11 @@ def lines(found: Learnt) -> list[str]:
         said.append(f'It is {found.term.term.expression} [{unit}].')
         if found.term.looks_like:
             said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')
-    if math.isfinite(found.largest_percent):
+    if found.likeliest is not None:
+        of = 'the resistance' if found.likeliest[0] == 'force' else 'a reading of the log'
         said.append(
-            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance, or of '
-            'a reading of the log.'
+            f'The likeliest form, a {kind_text(found.likeliest)}, is up to '
+            f'{found.largest_percent:.0f} % of {of}.'
         )
     if found.next_run:
         said.append(f'What would decide: {found.next_run}.')
@@ -115,6 +115,7 @@ def document(found: Learnt) -> dict[str, Any]:
         'next_run': found.next_run or None,
         'probability': found.probability,
         'where': place,
+        'likeliest': found.likeliest and kind_text(found.likeliest),
         'largest_percent': found.largest_percent,
         'runs': list(found.runs),
         'notes': list(found.notes),
@@ -129,4 +130,5 @@ def write_report(path: Path, found: Learnt) -> None:
     sections = [Section('What explains the runs', text=lines(found), tables=shown)]
     if found.term is not None:
         sections.append(Section('The term', tables=_term_tables(found.term)))
-    write_page(path, 'Learnt effect', sections, sentence=sentence(found))
+    title = 'No effect is learnt' if found.term is None else 'Learnt effect'
+    write_page(path, title, sections, sentence=sentence(found))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shipdrag_ros.learning.folder import check_name
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library.diagnosing import coasts_of
@@ -21,6 +20,7 @@ from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.term import check_name
 
 
 @says_it_in_python

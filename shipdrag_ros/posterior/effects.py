@@ -27,6 +27,7 @@ from shipdrag_ros.simulation.effects import effects_of
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
+_PLACES = (-1.4, 0.0, 1.4)  # the same of a speed at which something changes
 _SIZES = tuple(np.linspace(-1.6, 1.6, 17).tolist())  # where an effect has nothing else
 _EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # shares of the longest run
 _MOST, _JUMP = 4.0, 0.8  # of z that is tried, and of z, from the linear response
@@ -193,7 +194,9 @@ def _starts(quantity: Parameter, longest_s: float, free: Sequence[Parameter]) ->
         return (_INSIDE,)
     if shape is not Shape.LOG_NORMAL:
         return (0.0,)
-    return _SIZES if len(free) == 1 else _APART
+    if len(free) == 1:
+        return _SIZES
+    return _PLACES if quantity.unit == 'm/s' else _APART
 
 
 def retardation_of(action: Action, frame: Frame, speed_m_s: Float64) -> tuple[Float64, float]:

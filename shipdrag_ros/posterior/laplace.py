@@ -39,7 +39,7 @@ _ROUNDS = 20  # linearisations about the mean of the mixture
 _CLOSE = 0.05  # of chi^2, from one step to the next
 _STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
 _UNLIKELY, _QUICK = -7.0, -5.0  # log odds to the likeliest family; less is left out
-_LEAST = 1e-3  # weight of a model; less is left out of the spread
+_LEAST = 1e-3  # of the weight of the likeliest model; less is left out of mean and spread
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
 _SHORTEST = 1.0 / 32.0  # part of a step to the mean of the mixture
@@ -111,10 +111,10 @@ def mix(
                 weight[k, q] = prior[k] * of_family_q / alike
     weight /= weight.sum()
     mean, second = np.zeros(p), np.zeros((p, p))
-    kept = 0.0
+    kept, least = 0.0, _LEAST * weight.max()
     for k in range(s):
         for q in range(f):
-            if weight[k, q] < _LEAST:
+            if weight[k, q] < least:
                 continue
             kept += weight[k, q]
             _, step, lower, scale = of_family(products[k], families.mean[q], families.precision[q])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shipdrag_ros.parameter import Prior, half_normal, heavy_tailed, log_normal, normal
+from shipdrag_ros.parameter import Prior, half_normal, log_normal, normal
 
 
 @dataclass(frozen=True)
@@ -52,30 +52,17 @@ class Declared:
 _REALITY = 'records of many craft, as a range'
 
 # the law of the hull
-FRICTION = Declared(
-    'theta_f',
-    'friction over that of the ship file, less one; sd of the file in place of this one',
-    heavy_tailed(0.02),
-    '',
-    'a good model test',
-)
-WAVE = Declared(
-    'theta_w',
-    'wave part over that of the ship file, less one; sd of the file in place of this one',
-    heavy_tailed(0.10),
-    '',
-    'a good model test',
-)
 GENERIC_FRICTION = Declared(
     'theta_f',
-    'the same without a baseline: ITTC-57, k = 0.2, wetted surface from length and volume',
+    'friction over ITTC-57 with k = 0.2, less one, without a baseline; wetted surface from '
+    'length and volume',
     normal(0.6, mean=0.4),
     '',
     'form factors 0.1 to 0.5, roughness, dragged propeller, appendages',
 )
 GENERIC_WAVE = Declared(
     'theta_w',
-    'the same without a baseline: C_W = 0.0008 (Fr / 0.22)^4',
+    'wave part over C_W = 0.0008 (Fr / 0.22)^4, less one, without a baseline',
     normal(1.0),
     '',
     'C_W of 25 model tests at Fr 0.22: 0 to 0.002',
@@ -221,12 +208,8 @@ SHIP_DRY = 1e-3
 """Size of forces of a ship that water does not make, of r at the stop."""
 UNFILTERED_CHANCE = 0.5
 """Of a log."""
-WIDER, WIDER_CHANCE = 3.0, 0.1
-"""A baseline is so many times worse than stated, so often."""
 
 TABLE: tuple[Declared, ...] = (
-    FRICTION,
-    WAVE,
     GENERIC_FRICTION,
     GENERIC_WAVE,
     GENERIC_HUMPS,

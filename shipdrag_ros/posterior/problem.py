@@ -19,6 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -345,7 +346,7 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     else:
         sds = max(base.relative_sd, EXACT), EXACT
     with_it = wave_with_friction(ship)  # what is more of friction alone is not of the waves
-    tails = (1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)
+    tails = (1.0, 1.0 - WIDER_CHANCE), (WIDER, WIDER_CHANCE)
     for (wide, chance), (size, part) in product(tails, priors.HALF_NORMAL):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
         yield _Hull(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -49,9 +50,13 @@ def why_no_coastdown(result: ReplayResult) -> str:
     str
         Part of a sentence.
     """
-    still = _stood_still(result)
-    why = _why(result)
-    return f'{still}; {why}' if still else why
+    still, why = _stood_still(result), _why(result)
+    left_out = [
+        f'the {name.replace("_", " ")} is left out: {text}'
+        for name, text in result.left_out.items()
+        if text not in why
+    ]
+    return '; '.join([*left_out, still, why] if still else [*left_out, why])
 
 
 def _why(result: ReplayResult) -> str:
@@ -64,7 +69,9 @@ def _why(result: ReplayResult) -> str:
     block, _ = accepted_samples(result.run)
     if not len(block):
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
-    name, fall = _largest_fall(block)
+    name, fall = _largest_fall(
+        block, [each for each in MOTION_INPUTS if each not in result.left_out]
+    )
     if not name:
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
     if fall is None:
@@ -128,13 +135,13 @@ def _dismissed(result: ReplayResult) -> str:
     return '; '.join(parts)
 
 
-def _largest_fall(block: Block) -> tuple[str, _SpeedLoss | None]:
+def _largest_fall(block: Block, names: Iterable[str]) -> tuple[str, _SpeedLoss | None]:
     """Return by which input, and the largest fall of its speed; '' where there is no input."""
     try:
         window = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
     except ValueError:  # a clock was set within the record
         return 'a clock that was set', None
-    for name in MOTION_INPUTS:
+    for name in names:
         series = getattr(window, name)
         if not len(series):
             continue

@@ -84,6 +84,8 @@ class ReplayResult:
         The longest that the ship was steady; None where no coastdown was looked for.
     contradictions
         What was said of inputs that contradict another, by input.
+    left_out
+        The same of those that were not used for it.
     """
 
     run: Run
@@ -95,6 +97,7 @@ class ReplayResult:
     recorded: Recorded
     steady_lead_s: float | None = None
     contradictions: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def whole_glides(self) -> tuple[WholeGlide, ...]:
@@ -261,6 +264,7 @@ def _as_on_board(
         comparison.finish(),
         monitor.steady_lead_s,
         monitor.contradictions(),
+        monitor.left_out(),
     )
 
 

@@ -382,31 +382,25 @@ class Values:
 
     def binary(self, operator: str, left: Float64, right: Float64) -> Float64:
         """Return what numpy does."""
-        made: dict[str, Callable[[Float64, Float64], Float64]] = {
-            '+': np.add,
-            '-': np.subtract,
-            '*': np.multiply,
-            '/': np.divide,
-        }
-        return made[operator](left, right)
+        return _NUMPY[operator](left, right)
 
-    def power(self, base: Float64, exponent: float) -> Float64:
+    def power(self, base: Float64, exponent: Float64 | float) -> Float64:
         """Return what numpy does."""
         return np.power(base, exponent)
 
-    def power_of(self, base: Float64, exponent: Float64) -> Float64:
-        """Return what numpy does."""
-        return np.power(base, exponent)
+    power_of = power
 
     def call(self, name: str, values: list[Float64]) -> Float64:
         """Return a function of the list."""
-        if name == 'step':
-            return np.asarray(0.5 * (1.0 + np.tanh(values[0] / values[1])), np.float64)
-        found: Float64 = _NUMPY[name](*values)
-        return found
+        return _NUMPY[name](*values)
 
 
 _NUMPY: dict[str, Callable[..., Float64]] = {
+    '+': np.add,
+    '-': np.subtract,
+    '*': np.multiply,
+    '/': np.divide,
+    'step': lambda x, width: np.asarray(0.5 * (1.0 + np.tanh(x / width)), np.float64),
     'min': np.minimum,
     'max': np.maximum,
     'abs': np.abs,

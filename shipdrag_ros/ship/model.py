@@ -46,7 +46,7 @@ from shipdrag_ros.ship.sections import (
     StatedEffect,
     Water,
 )
-from shipdrag_ros.ship.term import LearntTerm, learnt_term
+from shipdrag_ros.ship.term import LearntTerm, learnt_terms
 
 AIR_DENSITY_KG_M3 = 1.225
 _SIZES = ('length_m', 'displaced_volume_m3', 'breadth_m', 'draught_m', 'wetted_surface_m2')
@@ -96,9 +96,7 @@ class Ship:
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
     )
     learnt: tuple[LearntTerm, ...] = declare(
-        list_of(learnt_term()),
-        'effects that the library lacks, as `learn` writes them',
-        default=(),
+        learnt_terms(), 'effects that the library lacks, as `learn` writes them', default=()
     )
     economics: Economics | None = declare(
         section(Economics), 'prices, for a trend over months', default=None

@@ -17,8 +17,8 @@ from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
 from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, log_normal, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
+from shipdrag_ros.ship.declared import TermParameter, TermPart, worth
 from shipdrag_ros.ship.expression import PURE, Formula
-from shipdrag_ros.ship.term import TermParameter, TermPart, worth
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
     AREAS,
@@ -95,7 +95,7 @@ def effect_of(term: LearntTerm) -> Effect:
 
 def _parameter(name: str, declared: TermParameter, *, is_size: bool) -> Parameter:
     value = math.nan if declared.value is None else declared.value
-    low, high = declared.bounds or (-1e9 if declared.either_sign else 0.0, 1e9)
+    low, high = declared.accepted
     return Parameter(
         value,
         name=name,

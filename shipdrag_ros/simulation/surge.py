@@ -33,6 +33,7 @@ from shipdrag_ros.simulation.terms import (
     top_m_s,
 )
 
+_LULL = 0.1  # of the stall speed, within which a shaft stops
 _WINDMILLING = 0.7  # of the shaft speed that drives the ship as fast: no torque, a higher advance
 _QUIET_STEP_S = 1.0  # before the first order or turn nothing happens but the disturbances
 
@@ -263,6 +264,20 @@ def _check_range(law: SurgeLaw, time: Float64, speed: Float64) -> None:
         )
 
 
+def turning(speed_m_s: Float64, stall_m_s: Float64 | float) -> Float64:
+    """
+    Return the revs of a shaft whose friction is constant over those without friction.
+
+    Torque is a parabola of the revs, largest at half of the free ones; below the stall the shaft
+    stands, and some way above it, for it stops from a chance lull on.
+    """
+    stall = np.maximum(stall_m_s, 1e-9)
+    load = np.minimum(stall / np.maximum(speed_m_s, 1e-9), 1.0)
+    stands = 0.5 * (1.0 - np.tanh((speed_m_s / stall - 1.0) / _LULL))
+    found: Float64 = 0.5 * (1.0 + np.sqrt(1.0 - load**2)) * (1.0 - stands)
+    return found
+
+
 def _shaft_rad_s(
     ship: Ship, scenario: Scenario, action: Action, time: Float64, speed: Float64
 ) -> Float64:
@@ -271,7 +286,8 @@ def _shaft_rad_s(
     if action.residual_fraction:
         residual = scenario.shaft_fraction(time, run_down_s=action.residual_decay_s)
         fraction += action.residual_fraction * (residual - fraction)
-    turns = (speed > action.stall_m_s) if action.stall_m_s > 0.0 else np.zeros(len(speed))
-    turned = _WINDMILLING * speed / scenario.speed_m_s * turns
+    turned = np.zeros(len(speed))
+    if action.stall_m_s > 0.0:
+        turned = _WINDMILLING * speed / scenario.speed_m_s * turning(speed, action.stall_m_s)
     # an engine that turns the shaft faster, or astern, is stronger than the flow
     return scenario.shaft_rad_s * np.where(np.abs(fraction) < turned, turned, fraction)

@@ -63,6 +63,19 @@ def test_the_example_of_the_page_works_as_typed(
     assert capsys.readouterr().out.startswith('Model and data agree')
 
 
+def test_while_the_verdict_waits_no_figure_stands_beside_the_question(
+    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = simulated(tmp_path / 'knots.mcap', ship_file, '--effect', 'log_scale=0.944')
+    capsys.readouterr()
+    assert main(['diagnose', str(bag)]) == 0
+    said = capsys.readouterr().out
+    assert 'is the unit of one of them wrong?' in said.splitlines()[0]
+    assert 'The verdict waits for the answer.' in said.splitlines()[0]
+    for words in ('over the clean hull', 'resistance', 'Examined', 'How probable'):
+        assert words not in said
+
+
 def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(
     ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

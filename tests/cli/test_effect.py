@@ -4,16 +4,33 @@
 from __future__ import annotations
 
 import json
+import math
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, reject, settings
+from hypothesis import strategies as st
 
+import shipdrag_ros as sd
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags.run import open_runs
 from shipdrag_ros.cli import main
+from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.fleet.store import read_coastdowns
 from shipdrag_ros.ship import LearntTerm, Ship
-from shipdrag_ros.simulation.effects import LIBRARY, carrying, effects_of, using
+from shipdrag_ros.simulation import Scenario, simulate
+from shipdrag_ros.simulation.effects import (
+    LIBRARY,
+    carrying,
+    declared,
+    effects_of,
+    parse,
+    using,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml'
@@ -34,6 +51,95 @@ def test_a_wrong_file_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[
     said = capsys.readouterr().err
     assert said.startswith('ERROR:')
     assert '__import__' in said or 'YAML' in said
+
+
+def test_all_files_are_reported_whichever_is_bad(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad, empty = tmp_path / 'bad.yaml', tmp_path / 'none.yaml'
+    bad.write_text(WEED.read_text().replace('unit: 1', 'unit: m', 1))
+    assert main(['effect', 'check', str(bad), str(empty), str(WEED), '--json']) == 1
+    told = capsys.readouterr()
+    document = json.loads(told.out)
+    assert [each['name'] for each in document['effects']] == ['weed']
+    assert [each['file'] for each in document['refused']] == [str(bad), str(empty)]
+    assert '2 of 3 file(s) cannot be used' in told.err
+    assert 'bad.yaml: term.expression' in told.err
+    assert 'none.yaml: cannot be read' in told.err
+
+
+_SIZES = st.one_of(
+    st.just(0.0),
+    st.tuples(st.sampled_from([1.0, -1.0]), st.floats(-9.0, 8.0)).map(lambda x: x[0] * 10 ** x[1]),
+)
+_PARAMETERS = st.fixed_dictionaries(
+    {},
+    optional={
+        'value': _SIZES,
+        'sd': _SIZES.map(abs),
+        'prior': st.tuples(
+            st.sampled_from(['normal', 'half-normal', 'log-normal', 'either-sign', 'uniform']),
+            st.one_of(st.just(0.0), st.floats(-2.0, 2.0), _SIZES),
+            st.one_of(st.floats(0.1, 3.0), _SIZES),
+        ).map(list),
+        'bounds': st.one_of(st.just([-9.0, 9.0]), st.lists(_SIZES, min_size=2, max_size=2)),
+    },
+)
+_ACTING = (
+    ('force', 'speed', '0.5*rho*A*nabla**(2/3)*u**2'),
+    ('force', 'speed', 'A*R_F*step(b*sqrt(g*L) - u, 0.03*sqrt(g*L))'),
+    ('force', 'time', '0.5*rho*A*nabla**(2/3)*u**2*exp(-t/(b*sqrt(L/g)))'),
+    ('water', 'time', 'A*sqrt(g*L)*t/t_end'),
+    ('air', 'speed', 'A*sqrt(g*L)'),
+    ('log', 'speed', 'A'),
+    ('log', 'time', 'A*u*exp(-t/(b*sqrt(L/g)))'),
+    ('ground', 'speed', 'A'),
+    ('inertia', 'speed', 'A*rho*nabla'),
+    ('clock', 'speed', 'A*sqrt(L/g)'),
+    ('filter', 'speed', 'A*sqrt(L/g)'),
+    ('shaft', 'speed', 'A*sqrt(g*L)'),
+    ('depth', 'speed', 'A*L'),
+)
+
+
+@pytest.fixture(scope='module')
+def record() -> sd.Record:
+    return sd.simulate(Ship.example(), duration_s=300.0, lead_in_s=400.0)
+
+
+@given(
+    acting=st.sampled_from(_ACTING),
+    scope=st.sampled_from(['hull', 'earth', 'sensor', 'run']),
+    parameters=st.tuples(_PARAMETERS, _PARAMETERS),
+)
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+def test_what_passes_is_taken_by_simulate_and_diagnose(
+    record: sd.Record,
+    acting: tuple[str, str, str],
+    scope: str,
+    parameters: tuple[dict[str, Any], dict[str, Any]],
+) -> None:
+    channel, variable, expression = acting
+    form = {'channel': channel, 'scope': scope, 'variable': variable, 'expression': expression}
+    form |= {'shape': 'constant' if variable == 'speed' else 'ramp', 'valid': {}}
+    form['valid'] = {'u': [0.5, 8.0], 't': [0.0, 3000.0]}
+    named = {'A': parameters[0]} | ({'b': parameters[1]} if 'b*' in expression else {})
+    text = strict_yaml.dump({'name': 'any', 'term': form, 'parameters': named})
+    try:
+        term = LearntTerm.from_yaml(text)
+    except EffectFileError:
+        reject()
+    sizes = [
+        repr(q.prior.at(0.0) or q.prior.at(1.0)) if math.isnan(q.value) else repr(q.value)
+        for q in declared(term).parameters
+    ]
+    ship = Ship.example()
+    scenario = Scenario(speed_m_s=6.0, duration_s=300.0, lead_in_s=60.0)
+    with using([term]):
+        with suppress(SimulationError):  # what nothing is wrong with may still be too much
+            truth = simulate(ship, scenario, effects=[parse('any=' + ',b='.join(sizes))])
+            assert np.isfinite(truth.speed_through_water_m_s).all()
+        assert sd.diagnose(record, ship=ship).verdict
 
 
 def test_a_name_that_is_taken_is_an_error_of_its_file(

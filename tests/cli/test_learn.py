@@ -27,8 +27,11 @@ def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixt
     assert document['learnt'] is None
     assert document['reason']
     assert 'is not written' in said.err
+    assert document['likeliest'] in said.err
+    of = 'the resistance' if document['likeliest'].startswith('force') else 'a reading of the log'
+    assert f'{document["largest_percent"]:.0f} % of {of}.' in said.err
     assert not out.exists()
-    assert page.exists()
+    assert '<h1>No effect is learnt' in page.read_text()
 
 
 @pytest.mark.parametrize('name', ['fouling', 'Kelp', '../kelp'])

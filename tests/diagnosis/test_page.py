@@ -25,6 +25,7 @@ from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.page import write_diagnosis
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.score import Score
+from shipdrag_ros.diagnosis.units import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameter import Parameter
@@ -157,6 +158,19 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
     fitted = written(replace(sailing, baseline='fitted_here'), score=SCORE)
     assert 'not scored' in fitted.text
     assert 'the runs are compared with all hulls of her length and volume' in fitted.text
+
+
+def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(
+    found: DiagnosisResult, written: Callable[..., Any]
+) -> None:
+    asks = waiting(
+        'is the unit of one of them wrong?', baseline='stated', estimates=found.estimates
+    )
+    text = written(asks).text
+    assert 'is the unit of one of them wrong?' in text
+    assert 'over the clean hull' not in text
+    assert 'Examined' not in text
+    assert 'over the clean hull' in written(found).text
 
 
 def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:

@@ -627,10 +627,14 @@ def spoilt(fault: str, random_: random.Random, second: int, value: float) -> flo
         'constant': 3.0,
         'reversed': -value,
         'in knots': value * 3600.0 / 1852.0,
+        '0.5 times': value * 0.5,
+        '1.6 times': value * 1.6,
     }.get(fault, value)
 
 
-def hear(bench: Bench, doubted: str, beside: str, fault: str) -> tuple[int | None, bool]:
+def hear(
+    bench: Bench, doubted: str, beside: str, fault: str, *, current_m_s: float = 0.0
+) -> tuple[int | None, bool]:
     """Sail for 7 min, stop the engine, glide for 6: when not green, was the stop found?"""
     node = bench.node(ros=('-p', 'use_sim_time:=true', '-p', 'record:=false'))
     noise, wrong = random.Random(1), random.Random(2)
@@ -641,7 +645,7 @@ def hear(bench: Bench, doubted: str, beside: str, fault: str) -> tuple[int | Non
         bench.peer.clock.publish(clock)
         bench.peer.spin(0.25 if second < 145 else 0.02)  # /diagnostics comes once a second
         true = coasting(second - 420.0) + 0.02 * math.sin(0.2 * second)
-        way += true
+        way += true + current_m_s
         at_ns = (1_700_000_000 + second) * 10**9 - 10**8
         for name in (doubted, beside):
             value, said = true + noise.gauss(0.0, 0.02), fault if name == doubted else ''
@@ -661,7 +665,7 @@ def hear(bench: Bench, doubted: str, beside: str, fault: str) -> tuple[int | Non
     return named, found
 
 
-def nonsense(bench: Bench, *faults: str, doubted: str, beside: str) -> Found:
+def nonsense(bench: Bench, *faults: str, doubted: str, beside: str, within_s: int = 70) -> Found:
     """Return what becomes of faults of one source while another is sound."""
     said, good = [], True
     for fault in faults:
@@ -669,7 +673,7 @@ def nonsense(bench: Bench, *faults: str, doubted: str, beside: str) -> Found:
         bench.peer = Stranger()
         named, found = hear(bench, doubted, beside, fault)
         # that it stands still is known after `frozen_s`: 3 m/s may be a current of 2 before
-        good = good and named is not None and named <= (130 if fault == 'constant' else 70)
+        good = good and named is not None and named <= (130 if fault == 'constant' else within_s)
         good = good and found
         said.append(
             f'{fault}: {"never" if named is None else f"{named} s"}, '
@@ -685,6 +689,18 @@ def a_log_that_says_nothing(bench: Bench) -> Found:
 
 def a_log_that_says_nothing_beside_positions(bench: Bench) -> Found:
     return nonsense(bench, 'random', 'zero', doubted='speed_through_water', beside='position')
+
+
+def a_log_in_a_wrong_scale(bench: Bench) -> Found:
+    where = {'doubted': 'speed_through_water', 'beside': 'position'}
+    good, first = nonsense(bench, 'in knots', **where)
+    # what a current of 2.5 or 3 m/s may be, too, shows once she slows
+    found, second = nonsense(bench, '0.5 times', '1.6 times', **where, within_s=420 + 180)
+    bench.peer.close()
+    bench.peer = Stranger()
+    named, _ = hear(bench, 'speed_through_water', 'position', 'sound', current_m_s=2.0)
+    third = f'sound in 2 m/s: {"never" if named is None else f"{named} s"}'
+    return good and found and named is None, f'{first}; {second}; {third}'
 
 
 def a_track_that_says_nothing(bench: Bench) -> Found:
@@ -890,6 +906,10 @@ LINES: dict[str, tuple[str, Callable[[Bench], Found]]] = {
     '1 a log that says nothing, the position is sound': (
         GOAL,
         a_log_that_says_nothing_beside_positions,
+    ),
+    '1 a log in a wrong scale, the position is sound': (
+        'in knots: not green within 60 s and two ticks; less: 180 s after the stop; sound: never',
+        a_log_in_a_wrong_scale,
     ),
     '1 a track that says nothing, the log is sound': (GOAL, a_track_that_says_nothing),
     '3 a node with --keep-bytes in the folder of another': (

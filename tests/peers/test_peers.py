@@ -164,6 +164,19 @@ def test_a_log_in_knots_is_not_green_and_the_remedy_is_named(
     assert all(s.level[0] != OK for s in stranger.said('state', since=since))
 
 
+def test_a_log_in_a_wrong_scale_is_named_once_she_slows_and_the_positions_find_the_stop(
+    tmp_path: Path,
+) -> None:
+    bench = Bench(tmp_path)
+    try:
+        good, text = nonsense(
+            bench, '0.5 times', doubted='speed_through_water', beside='position', within_s=600
+        )
+    finally:
+        bench.close()
+    assert good, text
+
+
 def test_a_log_that_says_nothing_is_named_and_what_is_sound_finds_the_stop(
     tmp_path: Path,
 ) -> None:

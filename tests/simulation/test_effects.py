@@ -100,21 +100,28 @@ def test_fouling_of_a_tabulated_baseline_uses_the_usual_surface_and_form():
     np.testing.assert_allclose(with_surface, expected, rtol=1e-9)
 
 
-def test_a_windmilling_propeller_drags_more_once_it_stalls():
+def test_a_windmilling_propeller_drags_more_towards_the_stall_and_as_a_locked_one_below_it():
     action = run(quadratic(), 'windmilling_propeller=0.1,stall_speed_m_s=3').action
     pressure = 0.5 * 1025.0 * DISC
-    np.testing.assert_allclose(action.resistance_n(5.0), pressure * 0.1 * 25.0, rtol=1e-6)
-    np.testing.assert_allclose(action.resistance_n(2.0), pressure * 0.42 * 4.0, rtol=1e-4)
-    np.testing.assert_allclose(action.resistance_n(3.0), pressure * 0.26 * 9.0, rtol=1e-9)
+    friction = (0.42 - 0.1) * 3.0**2  # a constant force while it turns
+    np.testing.assert_allclose(action.resistance_n(5.0), pressure * (0.1 * 25.0 + friction))
+    np.testing.assert_allclose(action.resistance_n(2.0), pressure * 0.42 * 4.0)
+    standing = 'windmilling_propeller=0.1,stall_speed_m_s=3,locked_coefficient=0.3'
+    np.testing.assert_allclose(
+        run(quadratic(), standing).action.resistance_n(2.0), pressure * 0.3 * 4.0
+    )
 
 
-def test_the_flow_turns_a_windmilling_shaft_until_it_stalls():
+def test_the_flow_turns_a_windmilling_shaft_ever_less_until_it_stalls():
     truth = run(CARGO, 'windmilling_propeller=0.1,stall_speed_m_s=4', scenario=SCENARIO)
     late = truth.time_s > 60.0
     u = truth.speed_through_water_m_s[late]
-    shaft = truth.shaft_rad_s[late]
-    np.testing.assert_allclose(shaft[u > 4.0], 0.7 * 11.5 * u[u > 4.0] / 8.0, rtol=1e-9)
-    assert np.all(shaft[u < 4.0] < 1e-3)
+    share = truth.shaft_rad_s[late] / (0.7 * 11.5 * u / 8.0)
+    assert np.all(np.diff(share) < 1e-12)
+    # a parabola of torque: (v_s / v)^2 = 4 share (1 - share)
+    fast = u > 1.4 * 4.0
+    np.testing.assert_allclose((4.0 / u[fast]) ** 2, 4.0 * (share * (1 - share))[fast], atol=0.01)
+    assert np.all(share[u < 3.0] < 0.01)
 
 
 def test_an_engine_that_turns_the_shaft_is_stronger_than_the_flow():

@@ -338,6 +338,8 @@ def test_all_impossible_effects_are_told_at_once():
         StatedEffect('log_scale', {'scale': Parameter(9.0, 0.0)}),
         StatedEffect('log_lag', {'lag_s': Parameter(np.nan, 0.0)}),
         StatedEffect('log_lag', {'lag_s': Parameter(1.0, 0.0)}),
+        StatedEffect('locked_propeller', {}),
+        StatedEffect('residual_thrust', {}),
     ]
     with pytest.raises(SimulationError) as told:
         action_of(Frame(bare, SCENARIO, 0.0), stated)
@@ -349,6 +351,7 @@ def test_all_impossible_effects_are_told_at_once():
         'factor is missing',
         'lag_s is nan',
         'log_lag is given 2 times',
+        'locked_propeller and residual_thrust cannot be there at the same time',
     ):
         assert part in str(told.value)
 

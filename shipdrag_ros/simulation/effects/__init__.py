@@ -20,6 +20,7 @@ from types import MappingProxyType
 from shipdrag_ros.errors import EffectFileError, SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
+from shipdrag_ros.ship.term import check_name
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import effect_of, effects_in
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
@@ -63,13 +64,6 @@ _TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
 _effect_of = lru_cache(256)(effect_of)
 
 
-def taken(name: str) -> list[str]:
-    """
-    Return what is wrong with a name that the library has.
-    """
-    return [f'name: {name!r} is an effect of the library; give it another'] if name in OWN else []
-
-
 def declared(term: LearntTerm) -> Effect:
     """
     Return a learnt term as an effect; of two terms of one name, `find` knows the later.
@@ -77,10 +71,9 @@ def declared(term: LearntTerm) -> Effect:
     Raises
     ------
     EffectFileError
-        If its name is that of an effect of the library.
+        If it may not be called so.
     """
-    if why := taken(term.name):
-        raise EffectFileError(term.name, why)
+    check_name(term.name)
     _TERMS[term.name] = term
     return _effect_of(term)
 
@@ -102,9 +95,8 @@ def using(terms: Sequence[LearntTerm]) -> Iterator[None]:
     ...     pass
     """
     effects = {term.name: declared(term) for term in terms}
-    taken = [name for name in effects if name in _EVERY]
-    if taken:
-        raise EffectFileError(taken[0], ['name: there is an effect of this name; give another'])
+    if known := [name for name in effects if name in _EVERY]:
+        raise EffectFileError(known[0], ['name: there is an effect of this name; give another'])
     _EVERY.update(effects)
     try:
         yield
@@ -250,6 +242,10 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
             problems.append(f'{name} is given {names.count(name)} times, expected once')
+    there = [known[name] for name in dict.fromkeys(names) if name in known]
+    for one, other in combinations(there, 2):
+        if not one.goes_with(other):
+            problems.append(f'{one.name} and {other.name} cannot be there at the same time')
     for item in stated:
         if item.name not in known:
             problems.append(f'{item.name!r} is not known; known are {", ".join(known)}')

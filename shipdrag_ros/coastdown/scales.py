@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Does one speed read another one in a wrong scale?
+
+A scale stays: it is one unknown for the whole record, however long that is. A current has a
+size that its prior bounds, and changes slowly. While she keeps her speed the two look alike;
+where she changes it, a scale changes the difference with her speed, and a current does not.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import COUNT, PER_UNIT, SPEED, Bins
+from shipdrag_ros.display import UNIT_RATIOS
+from shipdrag_ros.samples import Float64, Int64
+
+# Edges of means, seconds before the newest: short where it is new, so that a short glide is seen
+EDGES: Int64 = np.array([0, 10, 22, 38, 60, 90, 130, 185, 260, 360, 500, 680, 920, 1250])
+_WIDTH = np.diff(EDGES)
+_MIDDLE = 0.5 * (EDGES[1:] + EDGES[:-1])
+
+CURRENT = ((0.4, 0.7), (1.0, 0.3))  # between log and ground [m/s]
+TURNS = 0.1  # probability that she turns in it
+_TURN_S = 60.0
+_ANOTHER = 0.2  # probability that it is another one before some time, after a turn
+_DRIFT = ((0.002, 0.5), (0.01, 0.5))  # its change in a second [m/s]; grows with the root of time
+_PLACE = ((1.0, 0.5), (8.0, 0.5))  # of a way made good [m]
+_JITTER, _OFFSET = 0.2, 0.1  # of a log in one second, and always [m/s]
+_LEAST = 0.03  # of a way made good that lasts long [m/s]
+_SOUND = ((0.02, 0.8), (0.06, 0.2))  # of ln scale: a Doppler log, a paddle wheel
+_WIDE, _UNITS, _UNIT = (
+    0.5,
+    0.5,
+    0.04,
+)  # of one that is wrong; share of mistaken units, and their sd
+
+_NEAR, _FAR = np.arange(-0.2, 0.21, 0.025), np.arange(0.26, 1.7, 0.06)
+_LN = np.concatenate([-_FAR[::-1], _NEAR, _FAR])
+_SCALE = np.exp(_LN)
+
+
+def _normal(away: Float64, sd: float) -> Float64:
+    return np.asarray(np.exp(-0.5 * (away / sd) ** 2) / sd, np.float64)
+
+
+def _share(density: Float64) -> Float64:
+    density = density * np.gradient(_LN)
+    return np.asarray(np.log(np.maximum(density / density.sum(), 1e-300)), np.float64)
+
+
+_IS_SOUND = _share(np.sum([part * _normal(_LN, sd) for sd, part in _SOUND], axis=0))
+_IS_WRONG = _share(
+    (1.0 - _UNITS) * _normal(_LN, _WIDE)
+    + _UNITS * np.mean([_normal(_LN - math.log(each), _UNIT) for each in UNIT_RATIOS], axis=0)
+)
+
+
+class Scaled(NamedTuple):
+    """
+    How much more probable it is that a speed is in a wrong scale than that it is sound.
+
+    Attributes
+    ----------
+    log_odds
+        Logarithm of the ratio of the evidences.
+    scale
+        The most probable one, reading over truth.
+    span_s
+        What it was learnt from [s].
+    """
+
+    log_odds: float
+    scale: float
+    span_s: int
+
+
+@lru_cache
+def _settings(count: int) -> tuple[Float64, Float64, Float64, Float64]:
+    """Return whitening, what a log adds to unit variances, factors as logarithms, currents."""
+    white, added, factors, currents = [], [], [], []
+    middle, width = _MIDDLE[:count], _WIDTH[:count]
+    apart, since = np.subtract.outer(middle, middle), middle[-1] - middle
+    same = np.ones((count, count))
+    walk = np.minimum.outer(since, since)
+    steady = 1.0 - TURNS - _ANOTHER
+    kinds = [(same, drift, steady * part) for drift, part in _DRIFT]
+    kinds.append((np.exp(-np.abs(apart) / _TURN_S), _DRIFT[-1][0], TURNS))
+    for first in range(1, count):
+        newer = np.arange(count) < first
+        one = (newer[:, None] == newer).astype(np.float64)
+        kinds.append((one, _DRIFT[-1][0], _ANOTHER / (count - 1)))
+    of_log = np.diag(_JITTER**2 / width) + _OFFSET**2 * same
+    for (size, a), (kind, drift, b), (place, c) in product(CURRENT, kinds, _PLACE):
+        water = size**2 * kind + drift**2 * walk
+        ground = water + np.diag((place / width) ** 2 + _LEAST**2)
+        lower = np.linalg.cholesky(ground)
+        inverse = np.linalg.inv(lower)
+        more, vectors = np.linalg.eigh(inverse @ of_log @ inverse.T)
+        white.append(vectors.T @ inverse)
+        added.append(np.maximum(more, 0.0))
+        currents.append([size])
+        factors.append(math.log(a * b * c) - np.log(np.diag(lower)).sum())
+    return np.array(white), np.array(added), np.array(factors), np.array(currents)
+
+
+def scaled(reading: Float64, truth: Float64) -> Scaled:
+    """
+    Compare a reading with another one of the same ship; a current may be between them.
+
+    Parameters
+    ----------
+    reading, truth : (n,)
+        Means over the spans of `EDGES` [m/s], the newest first, n at most all.
+    """
+    white, added, factors, currents = _settings(len(reading))
+    one, two = white @ truth, white @ reading
+    # over ground a current from abeam adds more, the slower she is
+    abeam = currents**2 / (2.0 * np.maximum(truth, currents))
+    beside = (white @ abeam[:, :, None])[:, :, 0]
+    inverse = 1.0 / _SCALE[:, None, None]
+    precision = 1.0 / (1.0 + inverse**2 * added)
+    away = one - inverse * two
+    scaled_away = away * precision
+    along, size = (scaled_away * beside).sum(axis=-1), 1.0 + (beside**2 * precision).sum(axis=-1)
+    square = (away * scaled_away - np.log(precision)).sum(axis=-1)
+    logs = square - along**2 / size + np.log(size)
+    each = np.logaddexp.reduce(factors - 0.5 * logs, axis=1)
+    wrong = each + _IS_WRONG
+    log_odds = np.logaddexp.reduce(wrong) - np.logaddexp.reduce(each + _IS_SOUND)
+    scale = float(_SCALE[int(np.argmax(wrong))])
+    return Scaled(float(log_odds), scale, int(EDGES[len(reading)]))
+
+
+def means(bins: Bins, source: int, last: int) -> Float64:
+    """
+    Return means of a speed [m/s] over the spans of `EDGES`, up to the first with a gap.
+
+    Parameters
+    ----------
+    bins
+        What is kept.
+    source
+        Of the speed.
+    last
+        The second with which the newest ends.
+    """
+    totals, newest = bins.speeds[source], int(bins.closed[source])
+    edges = last - EDGES[len(totals) > EDGES]
+    each = -np.diff(totals[np.minimum(edges, newest) & (len(totals) - 1)], axis=0)
+    there = 2 * each[:, COUNT] > -np.diff(edges)
+    count = len(there) if there.all() else int(np.argmin(there))
+    return np.asarray(each[:count, SPEED] / (PER_UNIT * each[:count, COUNT]), np.float64)
