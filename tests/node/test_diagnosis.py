@@ -139,11 +139,12 @@ def test_monitor_hands_out_what_a_replay_reads_again() -> None:
     block = record()
     ended, window = coastdown_of(block)
     assert window.before is not None
+    assert ended.stop_ns is not None
     whole = Window.from_block(
         block,
-        ended.start_ns,
+        ended.stop_ns,
         ended.end_ns,
-        before_ns=ended.start_ns - round(PARAMETERS.steady_s * 1e9),
+        before_ns=ended.stop_ns - round(PARAMETERS.steady_s * 1e9),
     )
     for one, other in ((window, whole), (window.before, whole.before)):
         for name in STANDARD_INPUTS:
