@@ -394,7 +394,7 @@ class Vouching:
                 self._since[source] = NEVER  # the others say nothing of her: it is all there is
                 continue
             if source in doubted:
-                lasts = each > 1.0 - _WRONG
+                lasts = each > 0.5  # as long as it is more probable than not
             else:  # a radar that takes another mark is odd for the length of its filter
                 begins = NEVER if not (contradiction and each > _UNUSED) else number
                 self._since[source] = (
