@@ -156,6 +156,22 @@ def test_a_dated_version_without_a_tag_is_released(
     assert all(each['if'] == "steps.version.outputs.tag != ''" for each in later)
 
 
+def test_checksums_are_of_all_that_is_released(tmp_path: Path) -> None:
+    text = (ROOT / '.github' / 'workflows' / 'release.yml').read_text(encoding='utf-8')
+    (job,) = yaml.safe_load(text)['jobs'].values()
+    (step,) = (step for step in job['steps'] if step.get('id') == 'checksums')
+    dist = tmp_path / 'dist'
+    dist.mkdir()
+    for name in ('a.whl', 'a b.tar.gz', '-.json'):
+        (dist / name).write_text(name)
+    subprocess.run(['bash', '-e', '-c', step['run']], cwd=tmp_path, check=True)
+    check = ['sha256sum', '-c', 'SHA256SUMS']
+    said = subprocess.run(check, cwd=dist, check=True, capture_output=True, text=True).stdout
+    assert sorted(said.splitlines()) == ['-.json: OK', 'a b.tar.gz: OK', 'a.whl: OK']
+    (dist / 'a.whl').write_text('another')
+    assert subprocess.run(check, cwd=dist, check=False, capture_output=True).returncode == 1
+
+
 def test_the_sdist_holds_what_colcon_needs(built: Path) -> None:
     (sdist,) = built.glob('*.tar.gz')
     with tarfile.open(sdist) as file:
