@@ -82,7 +82,12 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
 
     with Rehearsal(lambda _: None) as rehearsal:
         rehearsal.wait_for_node(block, alive=lambda: None, timeout_s=240.0)
-        rehearsal.play(block, speed=140.0, progress=note)
+        # a node that compiles is silent for some seconds: steady sailing is waited for
+        stop_ns = int(block.stamp_ns[0]) + 410 * 10**9
+        rehearsal.play(block[block.stamp_ns < stop_ns], speed=140.0, progress=note)
+        viewer.wait_for('#headline', 'STEADY')
+        note(0.0)
+        rehearsal.play(block[block.stamp_ns >= stop_ns], speed=140.0, progress=note)
         viewer.wait_for('#headline', 'COASTDOWN COMPLETE')
         # on a busy machine they may come after the last sample
         rehearsal.listen(until=lambda: rehearsal.estimates > 10, timeout_s=240.0)
