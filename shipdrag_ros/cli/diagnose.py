@@ -155,8 +155,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     if ship is not None and not found.question:
         for line in estimate_words.in_service(found.estimates, ship):
             output.say(line)
-    if found.examined:
-        output.say(diagnosis_words.examined(found))
+    if said := diagnosis_words.examined(found):
+        output.say(said)
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
     weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))

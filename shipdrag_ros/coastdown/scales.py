@@ -34,11 +34,8 @@ _PLACE = ((1.0, 0.5), (8.0, 0.5))  # of a way made good [m]
 _JITTER, _OFFSET = 0.2, 0.1  # of a log in one second, and always [m/s]
 _LEAST = 0.03  # of a way made good that lasts long [m/s]
 _SOUND = ((0.02, 0.8), (0.06, 0.2))  # of ln scale: a Doppler log, a paddle wheel
-_WIDE, _UNITS, _UNIT = (
-    0.5,
-    0.5,
-    0.04,
-)  # of one that is wrong; share of mistaken units, and their sd
+_WIDE = 0.5  # the same of one that is wrong ...
+_UNITS, _UNIT = 0.5, 0.04  # ... but for the share that is in another unit, and its sd
 
 _NEAR, _FAR = np.arange(-0.2, 0.21, 0.025), np.arange(0.26, 1.7, 0.06)
 _LN = np.concatenate([-_FAR[::-1], _NEAR, _FAR])
