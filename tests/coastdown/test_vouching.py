@@ -48,6 +48,13 @@ def test_what_says_nothing_is_not_green_within_a_minute_and_the_stop_is_found(fa
         assert stops == pytest.approx([LEAD_S], abs=30.0)
 
 
+def test_a_log_with_a_wrong_sign_stays_doubted_while_she_slows() -> None:
+    for speed in (np.linspace(4.5, 3.5, 10), np.linspace(3.0, 2.4, 10)):
+        speeds = {LOG: -speed, GROUND: speed + 0.02 * RNG.standard_normal(10)}
+        found = sound_probabilities(speeds, CRAFT, doubted=[LOG])
+        assert found.wrong(LOG) > 0.5
+
+
 def test_a_constant_log_is_known_as_frozen_and_the_stop_is_found() -> None:
     first, _, _, stops = judged(faulty('constant', SOUND))
     assert first == 121
