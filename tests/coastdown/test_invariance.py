@@ -19,6 +19,7 @@ from shipdrag_ros.coastdown.events import (
     Onset,
     Reset,
     Update,
+    WholeGlide,
 )
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
@@ -32,7 +33,6 @@ INPUTS = (LOG, Channel.SPEED_OVER_GROUND, Channel.POSITION, Channel.HEADING, Cha
 QUICK = Parameters(
     steady_s=300.0,
     slope_window_s=20.0,
-    confirm_s=40.0,
     window_s=150.0,
     update_s=7.0,
     data_stop_s=20.0,
@@ -244,7 +244,7 @@ def test_a_monitor_that_starts_later_says_the_same(
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
 
     def known(events) -> list:
-        spans = Onset | EndedCoastdown | NotCoastdown
+        spans = Onset | EndedCoastdown | NotCoastdown | WholeGlide
         return [
             event
             for event in events
@@ -261,4 +261,6 @@ def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:
     moved = in_arrival_order([replace(eventful, receive_ns=eventful.receive_ns + late)])
     events, health = run(ship, [moved])
     assert health['heading'].clock_offset_s == pytest.approx(1.0)
-    assert sum(isinstance(event, Onset) for event in events) == 2
+    # two stops, and the glide that goes on after the turn
+    ended = [event for event in events if isinstance(event, EndedCoastdown)]
+    assert [event.ended_by for event in ended][1:] == [EndedBy.TURN, EndedBy.RECORD_END]

@@ -71,7 +71,7 @@ def test_the_window_of_a_coastdown_is_without_what_says_nothing() -> None:
     (ended,) = [event for event in events if hasattr(event, 'stands')]
     window = monitor.ended_window(ended)
     assert not len(window.speed_through_water)
-    assert len(window.speed_over_ground) > 800
+    assert len(window.speed_over_ground) > 550
 
 
 def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -> None:
@@ -83,7 +83,7 @@ def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -
     events = [*monitor.update(block), *monitor.finish()]
     (ended,) = [event for event in events if hasattr(event, 'stands')]
     window = monitor.ended_window(ended)
-    assert len(window.speed_through_water) > 800
+    assert len(window.speed_through_water) > 550
     assert window.before is not None
     used_ns = window.before.speed_through_water.time_ns
     assert START_NS + 500 * SECOND_NS < used_ns[0] < START_NS + 700 * SECOND_NS

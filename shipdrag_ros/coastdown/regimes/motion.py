@@ -77,6 +77,7 @@ _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
 _ROOT = math.sqrt(2.0 * math.pi)
+_REVERSED = -0.05  # of the steady revs
 
 
 @compiled(inline=True, uncounted=True)
@@ -347,7 +348,8 @@ def _driving(
     else:
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
-    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    # with fewer turns a metre it drives nothing
+    f[REVS] = min(max(f[REVS], 1.0 / _S), max(1.0 / at, 1.3) if several else 1.3)
     if not settled:  # on its way to the level, or one of several that turns as before
         least = 0.0 if several else min(0.8 * math.exp(x[OPEN] - log_first), 0.9)
         density = 0.5 * density + (0.5 / (1.1 - least) if least < nu < 1.1 else 0.0)
@@ -410,7 +412,7 @@ def _shaft(
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
-    if low < -0.05:
+    if low < _REVERSED:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
     if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
@@ -488,7 +490,8 @@ def _by_shafts(
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
     shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
-    gained = n.SHAFT_TEMPER * shown
+    # a slow error of revs does not turn their sign
+    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
     if young and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
