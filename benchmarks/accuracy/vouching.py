@@ -44,7 +44,7 @@ from shipdrag_ros.sources.reading import read_any
 
 PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'vouching.txt'
 START_NS = 1_700_000_000 * SECOND_NS
-LEAD_S, COAST_S = 1200, 900
+LEAD_S, COAST_S = 1200, 600
 LASTS_S = LEAD_S + COAST_S - 60
 SCALES = {
     '0.4 times': 0.4, '0.5 times': 0.5, '0.6 times': 0.6, '0.7 times': 0.7, '1.4 times': 1.4,

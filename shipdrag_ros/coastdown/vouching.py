@@ -58,6 +58,7 @@ _WANDERS = ((0.0, 0.3), (0.3, 0.7))
 _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
+_REVERSED = 0.1  # of logs in a wrong scale: a wrong sign
 _STILL = 0.5  # the same of a source that was wrong just before
 
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
@@ -215,6 +216,9 @@ def _beside(
     craft: Craft,
 ) -> float:
     """Return the log evidence of sound sources and of one that is the ship in a wrong scale."""
+    found = -math.inf
+    if name == _LOG and sound:
+        found = math.log(_REVERSED) + _measured({_LOG: -speed, **sound}, craft)
     if name == _METRES and sound:
         scaled_up = {**sound, name: speed / _KM.scale}
         return _KM.log_odds + _measured(dict(sorted(scaled_up.items())), craft)
@@ -222,8 +226,8 @@ def _beside(
     for other in sorted(sound, reverse=name != _LOG):
         if (name, other) in scales:
             both = dict(sorted({**sound, name: speed}.items()))
-            return scales[name, other].log_odds + _measured(both, craft)
-    return -math.inf
+            return _log_sum([scales[name, other].log_odds + _measured(both, craft), found])
+    return found
 
 
 class Craft(NamedTuple):
