@@ -18,6 +18,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     CURRENT,
     DRIVEN,
+    EDDY,
     FIRST_A,
     FREE,
     GLIDE,
@@ -38,6 +39,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOW,
     MEAN_LAG,
     MEAN_U,
+    N_EDDY,
+    N_EDDY_S,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -180,6 +183,7 @@ def predict(
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
     keep_c = math.exp(-dt / (n.CURRENT_S * pace))
+    keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
     slowing = mean_u = mean_lag = 0.0
@@ -209,6 +213,7 @@ def predict(
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
             p[CURRENT, k] *= keep_c
+            p[EDDY, k] *= keep_e
         for k in range(STATES):
             new = (
                 l_l * p[k, LN_U] + l_a * p[k, LN_A] + l_o * p[k, OPEN]
@@ -221,6 +226,7 @@ def predict(
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
             p[k, CURRENT] *= keep_c
+            p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
@@ -231,6 +237,7 @@ def predict(
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * a * max(a, f[FIRST_A])
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
         lagged = keep_f * x[LAG] - u * change
@@ -242,6 +249,7 @@ def predict(
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
         x[CURRENT] *= keep_c
+        x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
     f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
@@ -530,7 +538,7 @@ def weigh(
             continue
         if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
             wide = 1.5 * math.hypot(noise[N_LOG], noise[N_WANDER])
-            wide = wide if which == LOG else noise[N_GROUND]
+            wide = wide if which == LOG else math.hypot(noise[N_GROUND], noise[N_EDDY])
             gained += _untrue(f, STAYS, said[which], wide, bad)
             continue
         u = math.exp(x[LN_U])
@@ -544,8 +552,8 @@ def weigh(
             h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
             expected += x[WANDER] + longer * lags
         else:
-            h[CURRENT] = 1.0
-            expected += x[CURRENT] - setting.pace * _GROUND_LAG_S * slowing
+            h[CURRENT] = h[EDDY] = 1.0
+            expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):

@@ -14,6 +14,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     GROUND,
     LOG,
+    N_EDDY,
+    N_EDDY_S,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -75,7 +77,7 @@ class NoiseFilters(NamedTuple):
         """
         Return filters that have seen nothing.
         """
-        first = np.array([0.08, 0.03, 60.0, 0.1, 0.1, 10.0, 0.6, 0.01])
+        first = np.array([0.08, 0.03, 60.0, 0.03, 60.0, 0.1, 0.1, 10.0, 0.6, 0.01])
         return cls(
             np.zeros((3, FILTERS, _STATES)),
             np.zeros((3, FILTERS, _STATES, _STATES)),
@@ -266,9 +268,8 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
             out[N_WANDER], out[N_WANDER_S] = math.exp(b / total), math.exp(t / total)
             out[N_LOG] = white
         elif which == 1:
-            out[N_GROUND] = math.sqrt(white**2 + math.exp(2.0 * b / total))
-            if noise.seen[0] < 8:
-                out[N_GROUND] = white
+            out[N_EDDY], out[N_EDDY_S] = math.exp(b / total), math.exp(t / total)
+            out[N_GROUND] = white
         else:
             out[N_FIX], out[N_WALK] = white, math.exp(q / total)
     if noise.rate[1] > 8.0:
