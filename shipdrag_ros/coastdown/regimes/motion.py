@@ -234,7 +234,7 @@ def predict(
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         # the wind that she meets falls less than her own way
-        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * a * max(a, f[FIRST_A])
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * max(a, f[FIRST_A]) ** 2
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
