@@ -158,15 +158,14 @@ class RunningCoastdown:
         start_ns = self.onset.start_ns
         if was is None:
             was = NotCoastdown(start_ns, end_ns, Dismissal.OTHER, 'nothing slowed her after all')
-        failure = f'withdrawn: {was.text}'
-        cut = NotCoastdown(start_ns, end_ns, was.reason, failure)
+        cut = NotCoastdown(start_ns, end_ns, was.reason, was.text)
         ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,
             ended_by or EndedBy.ENGINE,
             None,
-            failure,
+            was.text,
             self._heading_rad,
             withdrawn=True,
             cuts=(cut,),

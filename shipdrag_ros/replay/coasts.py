@@ -106,6 +106,8 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
         None where there is none.
     """
     start_ns, steady = begins(coastdown, result.ship)
+    # what acted from the stop on leaves all that was before it
+    steady = steady or any(cut.start_ns < coastdown.start_ns for cut in coastdown.cuts)
     acted: list[WholeGlide | NotCoastdown] = [
         cut for cut in coastdown.cuts if cut.reason in (Dismissal.BRAKE, Dismissal.TURN)
     ]
