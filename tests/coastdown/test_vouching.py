@@ -65,6 +65,19 @@ def test_nothing_is_said_of_a_sound_record_and_the_words_name_what_to_do() -> No
         assert words in text
 
 
+@pytest.mark.parametrize('heard', [[LOG], [GROUND], [LOG, GROUND]])
+def test_a_ship_that_wanders_by_the_sea_glides_in_one_piece(heard: list[int]) -> None:
+    whole = 0
+    for seed in range(3):
+        block = faulty('none', SOUND, seed=seed)
+        monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+        events = [*monitor.update(block[np.isin(block.channel, heard)]), *monitor.finish()]
+        (ended,) = [event for event in events if hasattr(event, 'stands')]
+        start_s, end_s = ((at - START_NS) / SECOND_NS for at in (ended.start_ns, ended.end_ns))
+        whole += abs(start_s - LEAD_S) < 10.0 and end_s > LEAD_S + 400.0
+    assert whole == 3
+
+
 def test_the_window_of_a_coastdown_is_without_what_says_nothing() -> None:
     monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
     events = [*monitor.update(faulty('random', SOUND)), *monitor.finish()]

@@ -233,8 +233,10 @@ def predict(
             p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
-        # the wind that she meets falls less than her own way
-        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * max(a, f[FIRST_A]) ** 2
+        # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
+        first = f[FIRST_A]
+        gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
