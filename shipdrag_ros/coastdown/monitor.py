@@ -158,7 +158,8 @@ class Monitor:
 
         A monitor that has seen this much of a sequence says the same from then
         on as one that has seen all of it, unless a coastdown longer than
-        `window_s`, or a sensor that froze longer ago, reaches back beyond it.
+        `window_s`, a sensor that froze longer ago, or manoeuvres without five
+        minutes of even power between them, reach back beyond it.
         """
         return self._history_ns
 
@@ -315,9 +316,12 @@ class Monitor:
             forget_speeds(bins, source)
             self._memory.steadiness.forget(source)
         watch.look[0] = (number // LOOK_S + 1) * LOOK_S
+        newly = (self._vouching.until > number) & (watch.doubted <= number)
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
             self._fall_back(now_ns)
+        if watched != NEVER and newly.any() and self._running is None:
+            self._wake(int(watch.source[0]), number)  # the record is judged without it
 
     def _make_room(self) -> None:
         store = make_room(

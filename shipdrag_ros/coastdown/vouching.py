@@ -58,7 +58,7 @@ _WANDERS = ((0.0, 0.3), (0.3, 0.7))
 _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
-_REVERSED = 0.1  # of logs in a wrong scale: a wrong sign
+_REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
 _STILL = 0.5  # the same of a source that was wrong just before
 
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
