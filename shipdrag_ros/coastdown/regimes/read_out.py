@@ -23,6 +23,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     COUNT,
     DRIVEN,
+    ENGINE,
     GLIDE,
     GLIDE_TURN,
     HELD,
@@ -137,7 +138,7 @@ def _over_time(
     return np.cumsum(edges)[:-1]
 
 
-def _probability(found: Spans, bins: int, step_s: float) -> Float64:
+def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
     return _over_time(found.weight, found.begin_s, found.end_s, bins, step_s)
 
 
@@ -145,16 +146,17 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     """
     Return the probability of each regime in each bin since the start, given all that came.
     """
-    engaged = (found.what == LEVEL) & found.again
+    powered = (found.what == LEVEL) | (found.what == ENGINE)
+    engaged = powered & found.again
     chosen = {
-        P_DRIVEN: (found.what == DRIVEN) | ((found.what == LEVEL) & ~engaged),
+        P_DRIVEN: (found.what == DRIVEN) | (powered & ~engaged),
         P_BRAKED: found.what == BRAKE,
         P_TURNING: (found.what == TURN) | (found.what == GLIDE_TURN),
         P_ENGAGED: engaged,
     }
     glide = found.part(found.what == GLIDE)
     of = {
-        number: _probability(found.part(which), bins, step_s) for number, which in chosen.items()
+        number: probability_of(found.part(which), bins, step_s) for number, which in chosen.items()
     }
     of[P_RUN_DOWN] = _over_time(glide.weight, glide.begin_s, glide.gone_s, bins, step_s)
     of[P_GLIDING] = _over_time(glide.weight, glide.gone_s, glide.end_s, bins, step_s)
@@ -203,16 +205,16 @@ def _one(found: Spans, peak: float) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
     stop, start, begin, end = (
-        _median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
+        median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
-    codes = np.arange(-1, GLIDE_TURN + 1)
+    codes = np.arange(-1, ENGINE + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
     return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, peak, after)
 
 
-def _median(value: Float64, share: Float64) -> float:
+def median(value: Float64, share: Float64) -> float:
     order = np.argsort(value, kind='stable')
     place = np.searchsorted(np.cumsum(share[order]), 0.5)
     return float(value[order[min(int(place), len(order) - 1)]])
@@ -236,7 +238,7 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     Return the stretches [s] without thrust in which something but the water acted.
     """
     likely, acted = (
-        _probability(found.part(np.isin(found.what, codes)), bins, step_s)
+        probability_of(found.part(np.isin(found.what, codes)), bins, step_s)
         for codes in (_UNPOWERED, _ACTED)
     )
     return [
@@ -253,7 +255,7 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int:
     lost = -np.diff(speed[first:], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
     losses = [
-        float(_probability(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
+        float(probability_of(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
         for code in codes
     ]
     return codes[int(np.argmax(losses))]
