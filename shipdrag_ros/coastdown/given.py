@@ -17,7 +17,7 @@ import numpy as np
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.given import BRAKES, ENGINES, GLIDES, TURNS, Reading, read
-from shipdrag_ros.coastdown.regimes.state import SHAFTS
+from shipdrag_ros.coastdown.regimes.state import RATE, RUDDER, SHAFTS
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -128,13 +128,15 @@ def judge(window: Window, ship: Ship, parameters: Parameters) -> Judgement:
     reading = read(window, ship, parameters)
     if reading is None or len(reading.binned.said) - reading.binned.before < _SHORTEST:
         return whole
-    return _Judge(window, reading).judgement(parameters.data_stop_s)
+    slow = float(ship.speed(parameters.froude_min))
+    return _Judge(window, reading, slow, parameters.turn_rad).judgement(parameters.data_stop_s)
 
 
 class _Judge:
     """One window and what the bank makes of it."""
 
-    def __init__(self, window: Window, reading: Reading) -> None:
+    def __init__(self, window: Window, reading: Reading, slow: float, turn_rad: float) -> None:
+        self._slow, self._turn_rad, self._turns = slow, turn_rad, False
         self._window = window
         self._reading = reading
         self._binned = reading.binned
@@ -164,7 +166,7 @@ class _Judge:
         ]
         cuts = _fitted(cuts, start_ns, end_ns)
         notes = ()
-        if TURNS in which and any(reading.stretches(TURNS)):
+        if self._turns and TURNS in which and any(reading.stretches(TURNS)):
             part = float(reading.probability[TURNS, kept[0] : kept[1]].mean())
             notes = (
                 f'she turns in {part:.0%} of it: the drag of drifting and turning is part of r',
@@ -181,18 +183,32 @@ class _Judge:
                 part
                 for span in reading.stretches(*which)
                 for part in _without(span, gaps)
-                if part[1] - part[0] >= _SHORTEST
+                if part[1] - part[0] >= _SHORTEST and self._worth(part) > 0.0
             ]
-            best = max(parts, key=reading.lost, default=None)
+            best = max(parts, key=self._worth, default=None)
             return best, 0.0 if best is None else reading.lost(best)
 
         both, lost = most(GLIDES, TURNS)
-        if both is None or lost <= 0.0:
+        if both is None:
             return None, ()
         alone, lost_alone = most(GLIDES)
-        if lost_alone >= _MOST * lost:
+        self._turns = self._swing(both) > self._turn_rad
+        if self._turns and lost_alone >= _MOST * lost:
             return alone, (GLIDES,)
         return both, (GLIDES, TURNS)
+
+    def _swing(self, span: _SPAN) -> float:
+        """Return the angle over which the heading swings in some bins [rad]."""
+        turned = np.nan_to_num(self._binned.said[span[0] : span[1], RATE]) * self._binned.step_s
+        rudder = self._binned.said[span[0] : span[1], RUDDER]
+        return float(np.ptp(np.cumsum(turned))) if not np.isfinite(rudder).any() else np.inf
+
+    def _worth(self, span: _SPAN) -> float:
+        """Return the time that is kept, times the part of the speed that is lost in it."""
+        first = float(np.nanmean(self._binned.speed[span[0] : span[0] + 3]))
+        if not first > self._slow:
+            return -1.0
+        return (span[1] - span[0]) * self._reading.lost(span) / first
 
     def _gaps(self, data_stop_s: float) -> list[_SPAN]:
         """Return the bins of stretches in which nothing shows the motion for long."""
@@ -233,6 +249,8 @@ class _Judge:
     def _why(self, first: int, last: int, regime: int, kept: _SPAN | None) -> tuple[Dismissal, str]:
         """Name the reason of a cut."""
         speed = self._binned.speed[first:last]
+        if 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
+            return Dismissal.SLOW, f'she is all but at rest, at {np.nanmax(speed):.2g} m/s'
         if regime == ENGINES:
             turning = self._binned.said[first:last, SHAFTS : SHAFTS + 4]
             revs = np.nan_to_num(turning / np.maximum(self._most_revs, 1e-9))

@@ -195,7 +195,7 @@ def _first(
         w[COUNT], w[GLIDED] = 1, 1
         all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
         if setting.engine > 0.0:
-            p[OPEN, OPEN] = n.WIND_SD**2
+            p[OPEN, OPEN] = n.ANY_WIND_SD**2
             p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
 
 

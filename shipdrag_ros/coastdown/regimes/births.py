@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -123,12 +122,13 @@ def _born(
 
 
 @compiled(uncounted=True)
-def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
+def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
-    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    wind = n.ANY_WIND_SD if setting.engine > 0.0 else n.WIND_SD
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
-    _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+    _free(bank, j, OPEN, 0.0, wind * wind)
 
 
 @compiled(uncounted=True)
@@ -137,7 +137,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, ENGINE):
         j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
         if j >= 0:
-            _glide(bank, j, setting.hull)
+            _glide(bank, j, setting)
         return
     learnt, any_ = bank.whole[i, REGIME] == LEVEL, bank.whole[i, REGIME] == ENGINE
     known = not any_ or bank.whole[i, GLIDED] == 1
@@ -147,7 +147,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else 1 if any_ else STUCK):
             part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
             if not known:
-                part *= n.ODD_SHARE[odd]
+                part *= 0.0 if kind >= HELD and odd > 0 else n.ODD_SHARE[odd]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
@@ -166,7 +166,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
-            _glide(bank, j, setting.hull)
+            _glide(bank, j, setting)
 
 
 @compiled(uncounted=True)
@@ -227,7 +227,7 @@ def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
         j = _born(bank, i, now_s, chance / brakes, BRAKE, 1.0)
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
-                _glide(bank, j, setting.hull)
+                _glide(bank, j, setting)
                 bank.number[j, REVS] = np.nan
                 bank.whole[j, KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
@@ -304,6 +304,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             w[REGIME] = regime = DRIVEN
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+        if any_ and regime != GLIDE and age_s < n.LEVEL_LEAST_S * setting.pace:
+            continue
         left = 0.0  # hazard of all that it may switch to
         if regime in (DRIVEN, LEVEL, ENGINE):
             if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
@@ -330,8 +332,9 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             _on(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
             if steered:
-                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-                left += n.GLIDE_TURN
+                turns = float(n.MANOEUVRE if any_ else n.GLIDE_TURN)
+                _turns(bank, i, setting, now_s, turns * hours, GLIDE_TURN)
+                left += turns
             _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, (n.BRAKE_GLIDE + (told if any_ else 0.0)) * hours)
@@ -342,6 +345,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
                 _back(bank, i, setting, now_s, n.TURN_OUT * hours)
             else:
                 _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+                if any_:
+                    _engines(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = float(n.TURN_OUT)
         f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 

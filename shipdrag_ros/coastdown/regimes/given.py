@@ -109,7 +109,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
         engine=max(math.exp(hull_level(hull, math.log(binned.top))), binned.swing),
         told_s=binned.before * binned.step_s,
     )
-    wanders = n.WANDER[::2] * binned.top / math.exp(hull.sails)  # of a small craft less
+    wanders = n.WANDER[:3] * binned.top / math.exp(hull.sails)  # of a small craft less
     runs = []
     for gust, wander, wander_s in product(n.ANY_GUST, wanders, n.WANDER_S):
         noise = binned.noise.copy()
@@ -136,13 +136,15 @@ def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, S
     bank.noise.used[:] = noise
     bank.revs[:] = _most(binned.said[:, SHAFTS : SHAFTS + 4])
     bank.first[:] = math.log(binned.top), 60.0, np.nan
+    unheard = int(np.argmax(np.isfinite(binned.speed)))  # bins before the first of the bank
+    setting = setting._replace(told_s=setting.told_s - unheard * binned.step_s)
     evidence = 0.0
     for k, said in enumerate(binned.said):
         bank.said[:] = said
         step(bank, setting)
         if k >= binned.before and bank.histories.clock[0] > 0:
             evidence += float(bank.out[FIT])
-    return evidence, spans_of(bank, setting)
+    return evidence, spans_of(bank, setting).later(unheard * binned.step_s)
 
 
 def _most(turning: NDArray[np.float64]) -> Float64:

@@ -415,7 +415,7 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
             return (stands + below + _off(nu, last)) / 3.0
         return 0.5 * (stands + below)
     f[REVS] = nu
-    moves = 0.1 if kind == HELD else 0.01
+    moves = 0.1 if kind == HELD and scaled else 0.01
     return (1.0 - moves) * _off(nu, revs) + moves
 
 
@@ -439,7 +439,10 @@ def _shaft(
     if regime == ENGINE:  # at any revs, mostly at those of before
         before = f[REVS]
         f[REVS] = nu
-        return math.log(1.0 if np.isnan(before) else 0.9 * _off(nu, before) + 0.1)
+        stands = nu < n.CREEPS  # then another pushes, unheard
+        if np.isnan(before) or (stands and before >= n.CREEPS):
+            return math.log(n.BAD if stands else 1.0)
+        return math.log(0.9 * _off(nu, before) + 0.1)
     if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
         if several and regime != LEVEL:  # they turn alike

@@ -100,6 +100,18 @@ class Spans(NamedTuple):
             self.again[chosen],
         )
 
+    def later(self, by_s: float) -> Spans:
+        """
+        Return them by a clock that began earlier; the first ones began with it.
+        """
+        first = self.begin_s == 0.0
+        times = (each + by_s for each in (self.date_s, self.gone_s))
+        date_s, gone_s = (np.where(first & (each == by_s), 0.0, each) for each in times)
+        begin_s = np.where(first, 0.0, self.begin_s + by_s)
+        return self._replace(
+            begin_s=begin_s, date_s=date_s, gone_s=gone_s, end_s=self.end_s + by_s
+        )
+
 
 def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     """
