@@ -25,7 +25,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 
-_MOST = 0.5  # of the speed lost without thrust
+_MOST = 0.75  # of the speed lost without thrust
 _SHORTEST = round(float(n.SHORTEST_S) / float(n.BIN_S))  # bins
 _SPAN = tuple[int, int]
 
@@ -156,6 +156,7 @@ class _Judge:
                 window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
             )
         first, last = reading.dates(kept, *which)
+        kept = kept[0], self._to_rest(kept[1])
         start_ns = window.start_ns if kept[0] <= self._binned.before else self._ns(first)
         end_ns = window.end_ns if kept[1] >= len(self._binned.said) else self._ns(last)
         if first > self._binned.before + 1:
@@ -196,6 +197,12 @@ class _Judge:
         if self._turns and lost_alone >= _MOST * lost:
             return alone, (GLIDES,)
         return both, (GLIDES, TURNS)
+
+    def _to_rest(self, end: int) -> int:
+        """Return the last bin, where she is all but at rest from there on: that tells nothing."""
+        rest = np.abs(self._binned.speed[end:]) < self._slow
+        stops = self._reading.probability[:, end:].argmax(axis=0) == BRAKES
+        return len(self._binned.said) if np.all(rest & ~stops) else end
 
     def _swing(self, span: _SPAN) -> float:
         """Return the angle over which the heading swings in some bins [rad]."""
@@ -281,7 +288,7 @@ class _Judge:
         all_ = np.nan_to_num(self._binned.said[:, SHAFTS : SHAFTS + 4])
         usual = np.sign(np.median(np.where(np.abs(all_) > 0.5 * self._most_revs, all_, 0), axis=0))
         against = np.nan_to_num(turning) * usual < -n.CREEPS * self._most_revs
-        return bool(against.any(axis=1).mean() > _MOST)
+        return bool(against.any(axis=1).mean() > 0.5)
 
     def _shown(self) -> tuple[tuple[int, float], ...]:
         """Return the speed of the window, for a picture."""

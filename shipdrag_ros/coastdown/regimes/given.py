@@ -111,7 +111,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
     )
     wanders = n.WANDER[:3] * binned.top / math.exp(hull.sails)  # of a small craft less
     runs = []
-    for gust, wander, wander_s in product(n.ANY_GUST, wanders, n.WANDER_S):
+    for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S):
         noise = binned.noise.copy()
         noise[N_GUST], noise[N_WANDER], noise[N_WANDER_S] = gust, wander, wander_s
         runs.append(_run(binned, setting, noise))

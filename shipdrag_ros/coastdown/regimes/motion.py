@@ -397,7 +397,7 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
-            return _as_usual(f, nu, u_part, 0.05, 0.3)
+            return _as_usual(f, nu, u_part, 0.05, 0.3 if scaled else 0.05)
         if not scaled:
             f[REVS] = nu / u_part
             return 1.0 / u_part if nu < u_part + n.SHAFT_SD[0] else 0.0

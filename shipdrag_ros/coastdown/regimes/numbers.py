@@ -152,7 +152,6 @@ ODD = _grid('ODD', (0.0, -2.0, 2.5), 'ln', 'over that: a hull ahead, on wheels, 
 ODD_SHARE = _grid('ODD_SHARE', (0.8, 0.1, 0.1), '1', 'of these')
 ANY_EXPONENT = _grid('ANY_EXPONENT', (0.0, 0.9), '1', 'over that of friction: wheels to waves')
 ANY_WIND_SD = _number('ANY_WIND_SD', 0.15, 'of the first resistance', 'slow craft, wheels')
-ANY_GUST = _grid('ANY_GUST', (0.03, 0.15, 0.7), 'of the resistance', 'small craft pitch')
 ENGINE = _grid('ENGINE', (0.02, 0.15, 1.0), 'of the resistance', 'what is left of its force: sd')
 
 RUDDER = _grid('RUDDER', (0.08, 0.5), 'rad', 'angle of one that keeps a course, that turns: sd')
