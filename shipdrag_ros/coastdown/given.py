@@ -22,7 +22,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
 _MOST = 0.75  # of the speed lost without thrust
@@ -166,7 +166,7 @@ class _Judge:
             *self._cuts(kept[1], len(self._binned.said), gaps, kept),
         ]
         cuts = _fitted(cuts, start_ns, end_ns)
-        notes = ()
+        notes: tuple[str, ...] = ()
         if self._turns and TURNS in which and any(reading.stretches(TURNS)):
             part = float(reading.probability[TURNS, kept[0] : kept[1]].mean())
             notes = (
@@ -253,7 +253,9 @@ class _Judge:
         end_ns = self._window.end_ns if last == len(binned.said) else self._ns(last)
         return NotCoastdown(self._ns(first), end_ns, reason, text)
 
-    def _why(self, first: int, last: int, regime: int, kept: _SPAN | None) -> tuple[Dismissal, str]:
+    def _why(
+        self, first: int, last: int, regime: int, kept: _SPAN | None
+    ) -> tuple[Dismissal, str]:
         """Name the reason of a cut."""
         speed = self._binned.speed[first:last]
         if 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
@@ -261,14 +263,19 @@ class _Judge:
         if regime == ENGINES:
             turning = self._binned.said[first:last, SHAFTS : SHAFTS + 4]
             revs = np.nan_to_num(turning / np.maximum(self._most_revs, 1e-9))
-            if np.nanmean(speed) < 0.0:
+            if np.nansum(speed) < 0.0:
                 fastest = -float(np.nanmin(speed))
                 return Dismissal.ASTERN, f'the ship goes astern, at up to {fastest:.2g} m/s'
             if self._reversed(turning):
                 return Dismissal.ASTERN, 'the propeller is reversed'
             if np.abs(revs).max(initial=0.0) > n.CREEPS:
                 return Dismissal.THRUST, 'the shaft turns as if it drove her'
-            if kept is None or last <= kept[0]:
+            before = kept is None or last <= kept[0]
+            if kept is not None:  # beside the glide next to it
+                near = kept[0] if before else max(kept[1] - _SHORTEST, kept[0])
+                if self._slows(first, last) > self._slows(near, near + _SHORTEST):
+                    return Dismissal.BRAKE, 'something but the water slows her'
+            if before:
                 return Dismissal.LEAD_IN, 'she does not slow as a ship that glides, as if driven'
             return Dismissal.PLATEAU, 'she slows no longer as a ship that glides'
         return {
@@ -277,13 +284,20 @@ class _Judge:
             TURNS: (Dismissal.TURN, 'she turns'),
         }.get(regime, (Dismissal.GAP, 'no speed and no position'))
 
-    @property
-    def _most_revs(self) -> np.ndarray:
-        return np.nanmax(
-            np.nan_to_num(np.abs(self._binned.said[:, SHAFTS : SHAFTS + 4])), axis=0
-        )
+    def _slows(self, first: int, last: int) -> float:
+        """Return the speed that she loses in a bin [m/s]."""
+        speed = self._binned.speed[max(first - 1, 0) : last]
+        there = np.flatnonzero(np.isfinite(speed))
+        if len(there) < 2:
+            return 0.0
+        return float((speed[there[0]] - speed[there[-1]]) / (there[-1] - there[0]))
 
-    def _reversed(self, turning: np.ndarray) -> bool:
+    @property
+    def _most_revs(self) -> Float64:
+        turning = np.nan_to_num(np.abs(self._binned.said[:, SHAFTS : SHAFTS + 4]))
+        return np.asarray(turning.max(axis=0))
+
+    def _reversed(self, turning: Float64) -> bool:
         """Say whether a shaft turns the other way than it mostly does."""
         all_ = np.nan_to_num(self._binned.said[:, SHAFTS : SHAFTS + 4])
         usual = np.sign(np.median(np.where(np.abs(all_) > 0.5 * self._most_revs, all_, 0), axis=0))

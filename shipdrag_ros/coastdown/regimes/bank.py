@@ -51,6 +51,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     SAID,
     SHAFTS,
     SINCE,
+    STANDS,
     STATES,
     STAYS,
     STAYS_WAY,
@@ -122,39 +123,6 @@ class Bank(NamedTuple):
 
 
 @compiled(uncounted=True)
-def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
-    """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
-    hull = setting.hull
-    both = not np.isnan(log) and not np.isnan(track)
-    for liar in range(3 if both else 1):
-        by_log = not np.isnan(log) and liar != THE_LOG
-        speed = log if by_log else track
-        if setting.engine > 0.0 and not np.isnan(speed):
-            speed = max(abs(speed), math.exp(hull.first - 1.0))
-        if not speed > 0.0:
-            continue
-        off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        liars = (n.LIES_FIRST if liar > 0 else 1.0) * math.exp(-0.5 * off * off)
-        if setting.engine > 0.0:
-            for kind in range(len(n.ENGINE)):
-                chance = liars * (1.0 - setting.glides) / len(n.ENGINE)
-                _first(bank.histories, setting, speed, by_log, chance, liar, ENGINE, kind)
-            shown = len(n.DRAGGED) if setting.shafts > 0 else 1
-            for kind in range(shown):
-                chance = liars * setting.glides * (n.DRAGGED_SHARE[kind] if shown > 1 else 1.0)
-                for odd in range(len(n.ODD)):
-                    j = bank.histories.used[0]
-                    part = n.ODD_SHARE[odd] * chance
-                    _first(bank.histories, setting, speed, by_log, part, liar, GLIDE, kind)
-                    bank.histories.mean[j, LN_A] += n.ODD[odd] + n.DRAGGED[kind]
-                    bank.histories.spread[j, LN_A, LN_A] += n.DRAGGED_SD[kind] ** 2
-            continue
-        chance = liars * (1.0 - setting.glides)
-        _first(bank.histories, setting, speed, by_log, chance, liar, DRIVEN, 0)
-        _first(bank.histories, setting, speed, by_log, liars * setting.glides, liar, GLIDE, 0)
-
-
-@compiled(uncounted=True)
 def _first(
     all_: Histories, setting: BankSetting, speed: float, by_log: bool, chance: float, liar: int,
     regime: int, kind: int,
@@ -193,10 +161,55 @@ def _first(
         p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
     else:
         w[COUNT], w[GLIDED] = 1, 1
-        all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
+        all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, regime, 0.0
         if setting.engine > 0.0:
             p[OPEN, OPEN] = n.ANY_WIND_SD**2
             p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
+
+
+@compiled(uncounted=True)
+def _begin_anyhow(
+    all_: Histories, setting: BankSetting, speed: float, by_log: bool, chance: float, liar: int
+) -> None:
+    """Give birth to a ship that does anything, and to one that glides as a person says."""
+    rest = chance * (1.0 - setting.glides)
+    for kind in range(len(n.ENGINE)):
+        part = (1.0 - n.BRAKED) * rest / len(n.ENGINE)
+        _first(all_, setting, speed, by_log, part, liar, ENGINE, kind)
+    for size in n.BRAKES:
+        j, part = all_.used[0], n.BRAKED * rest / len(n.BRAKES)
+        _first(all_, setting, speed, by_log, part, liar, BRAKE, STANDS)
+        all_.mean[j, OPEN], all_.spread[j, OPEN, OPEN] = math.log(size), n.BRAKES_SD**2
+    shown = len(n.DRAGGED) if setting.shafts > 0 else 1
+    for kind in range(shown):
+        glides = chance * setting.glides * (n.DRAGGED_SHARE[kind] if shown > 1 else 1.0)
+        for odd in range(len(n.ODD)):
+            j = all_.used[0]
+            _first(all_, setting, speed, by_log, n.ODD_SHARE[odd] * glides, liar, GLIDE, kind)
+            all_.mean[j, LN_A] += n.ODD[odd] + n.DRAGGED[kind]
+            all_.spread[j, LN_A, LN_A] += n.DRAGGED_SD[kind] ** 2
+
+
+@compiled(uncounted=True)
+def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
+    """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
+    hull = setting.hull
+    both = not np.isnan(log) and not np.isnan(track)
+    for liar in range(3 if both else 1):
+        by_log = not np.isnan(log) and liar != THE_LOG
+        speed = log if by_log else track
+        if setting.engine > 0.0 and not np.isnan(speed):
+            speed = max(abs(speed), math.exp(hull.first - 1.0))
+        if not speed > 0.0:
+            continue
+        off = (math.log(speed) - hull.sails) / n.SAILS[1]
+        liars = (n.LIES_FIRST if liar > 0 else 1.0) * math.exp(-0.5 * off * off)
+        if setting.engine > 0.0:
+            _begin_anyhow(bank.histories, setting, speed, by_log, liars, liar)
+            continue
+        chance = liars * (1.0 - setting.glides)
+        _first(bank.histories, setting, speed, by_log, chance, liar, DRIVEN, 0)
+        _first(bank.histories, setting, speed, by_log, liars * setting.glides, liar, GLIDE, 0)
 
 
 @compiled(uncounted=True)

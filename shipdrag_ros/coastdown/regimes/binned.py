@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.state import (
@@ -31,7 +31,7 @@ from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Float64
 
-_BINS, _MOST = 60, 300  # of a window
+_BINS, _MOST = 60, 150  # of a window
 _BEFORE = 60  # at most
 _COURSE = 3  # bins on each side that show a course
 _OPPOSED = -0.7  # cosine of heading and course
@@ -68,7 +68,6 @@ class Binned(NamedTuple):
         size = np.abs(self.speed[np.isfinite(self.speed)])
         return float(np.quantile(size, 0.98)) if len(size) else 0.0
 
-
     @property
     def swing(self) -> float:
         """The largest change of speed, but for a tenth of the record [m/s^2]."""
@@ -83,7 +82,7 @@ class _Bins(NamedTuple):
 
     zero_ns: int
     step_s: float
-    count: int
+    bins: int
     parts: tuple[Window, ...]
 
     def of(self, name: str, number: int | None = None) -> tuple[Float64, Float64]:
@@ -96,16 +95,16 @@ class _Bins(NamedTuple):
         time_ns = np.concatenate([each.time_ns for each in found])
         value = np.concatenate([each.value for each in found])
         place = (time_ns - self.zero_ns) / (SECOND_NS * self.step_s)
-        inside = (place >= 0.0) & (place < self.count)
+        inside = (place >= 0.0) & (place < self.bins)
         return place[inside], value[inside]
 
     def means(self, place: Float64, value: Float64) -> Float64:
         """
         Average the middle third of each bin: single spikes are none of it.
         """
-        out = np.full(self.count, np.nan)
-        edges = np.searchsorted(place, np.arange(self.count + 1))
-        for k, (first, last) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        out = np.full(self.bins, np.nan)
+        edges = np.searchsorted(place, np.arange(self.bins + 1))
+        for k, (first, last) in enumerate(pairwise(edges.tolist())):
             if last > first:
                 some = np.sort(value[first:last])
                 off = (last - first) // 3
@@ -149,7 +148,7 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     bins = _Bins(zero_ns, step_s, count, parts)
     said, noise = np.full((count, SAID), np.nan), np.zeros(NOISES)
     heading = _heading(bins)
-    course, way = _track(bins, said, noise)
+    course = _track(bins, said, noise)
     yaw = np.array([rep103_yaw(each, parameters.heading_convention) for each in heading])
     with np.errstate(invalid='ignore'):
         opposed = (np.cos(course - yaw) < _OPPOSED) & (step_s > 1.5 * min(apart))
@@ -188,7 +187,7 @@ def _white(value: Float64) -> float:
 
 def _heading(bins: _Bins) -> Float64:
     place, value = bins.of('heading')
-    return bins.means(place, np.unwrap(value)) if len(value) else np.full(bins.count, np.nan)
+    return bins.means(place, np.unwrap(value)) if len(value) else np.full(bins.bins, np.nan)
 
 
 def _turned(angle: Float64) -> Float64:
@@ -196,30 +195,29 @@ def _turned(angle: Float64) -> Float64:
     return np.asarray(np.arctan2(np.sin(turned), np.cos(turned)))
 
 
-def _track(bins: _Bins, said: Float64, noise: Float64) -> tuple[Float64, Float64]:
-    """Put the way of each bin along the course into `said`; return course and way."""
+def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
+    """Put the way of each bin along the course into `said`; return the course."""
     place, value = bins.of('position')
     if not len(place):
-        none = np.full(bins.count, np.nan)
-        return none, none
+        return np.full(bins.bins, np.nan)
     east, north = (bins.means(place, value[:, axis]) for axis in (0, 1))
     noise[N_FIX] = 0.5 * math.hypot(_white(east), _white(north)) * math.sqrt(2.0)
-    course = np.full(bins.count, np.nan)
-    for k in range(bins.count):
-        low, high = max(k - _COURSE, 0), min(k + _COURSE, bins.count - 1)
+    course = np.full(bins.bins, np.nan)
+    for k in range(bins.bins):
+        low, high = max(k - _COURSE, 0), min(k + _COURSE, bins.bins - 1)
         some = np.isfinite(east[low : high + 1])
         if some.sum() >= 2:
             x, y = east[low : high + 1][some], north[low : high + 1][some]
             at = np.flatnonzero(some) - np.flatnonzero(some).mean()
             course[k] = math.atan2(float(at @ y), float(at @ x))
-    way = np.full(bins.count, np.nan)
+    way = np.full(bins.bins, np.nan)
     way[1:] = np.diff(east) * np.cos(course[1:]) + np.diff(north) * np.sin(course[1:])
     said[:, ADVANCE] = way
-    return course, way
+    return course
 
 
 def _shafts(bins: _Bins, said: Float64) -> None:
-    """Put revs times pitch of each shaft into `said`, over the most of all."""
+    """Put revs times pitch of each shaft into `said`."""
     for k in range(len(bins.parts[0].shafts)):
         turning = bins.means(*bins.of('shafts', k))
         place, pitch = bins.of('pitches', k)

@@ -32,7 +32,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-_LIKELY = 0.5
+_G_M_S2 = 9.81
 REGIMES = ((DRIVEN, ENGINE), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
 ENGINES, GLIDES, BRAKES, TURNS = range(4)
 
@@ -56,9 +56,9 @@ class Reading:
 
     def stretches(self, *which: int) -> list[tuple[int, int]]:
         """
-        Return first bins, and those after the last, of the stretches likelier than not to be so.
+        Return first bins, and those after the last, of the stretches that may be so.
         """
-        likely = self.probability[list(which)].sum(axis=0) > _LIKELY
+        likely = self.probability[list(which)].sum(axis=0) > n.HOLD[0]
         likely[: self.binned.before] = False
         edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
         return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
@@ -109,9 +109,10 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
         engine=max(math.exp(hull_level(hull, math.log(binned.top))), binned.swing),
         told_s=binned.before * binned.step_s,
     )
-    wanders = n.WANDER[:3] * binned.top / math.exp(hull.sails)  # of a small craft less
+    # a log errs by a part of the speed: those are of a ship of that length as she sails
+    wanders = n.WANDER * binned.top / (n.SAILS[0] * math.sqrt(_G_M_S2 * n.BIN_LENGTH_M))
     runs = []
-    for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S):
+    for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S[1:]):
         noise = binned.noise.copy()
         noise[N_GUST], noise[N_WANDER], noise[N_WANDER_S] = gust, wander, wander_s
         runs.append(_run(binned, setting, noise))
@@ -152,4 +153,4 @@ def _most(turning: NDArray[np.float64]) -> Float64:
     size = np.nan_to_num(np.abs(turning))
     most = size.max(axis=0)
     fast = np.where(size > 0.5 * most, turning, 0.0)
-    return most * np.where(np.nansum(np.sign(fast), axis=0) < 0.0, -1.0, 1.0)
+    return np.asarray(most * np.where(np.nansum(np.sign(fast), axis=0) < 0.0, -1.0, 1.0))

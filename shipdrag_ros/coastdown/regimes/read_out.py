@@ -102,12 +102,12 @@ class Spans(NamedTuple):
 
     def later(self, by_s: float) -> Spans:
         """
-        Return them by a clock that began earlier; the first ones began with it.
+        Return them by a clock that began earlier; what begins at once began with it.
         """
-        first = self.begin_s == 0.0
-        times = (each + by_s for each in (self.date_s, self.gone_s))
-        date_s, gone_s = (np.where(first & (each == by_s), 0.0, each) for each in times)
-        begin_s = np.where(first, 0.0, self.begin_s + by_s)
+        begin_s, date_s, gone_s = (
+            np.where(each < 0.5 * by_s, 0.0, each + by_s)
+            for each in (self.begin_s, self.date_s, self.gone_s)
+        )
         return self._replace(
             begin_s=begin_s, date_s=date_s, gone_s=gone_s, end_s=self.end_s + by_s
         )

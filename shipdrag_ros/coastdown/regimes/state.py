@@ -138,9 +138,7 @@ class BankSetting(NamedTuple):
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(
-            hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan, step_s / 3600.0, 0.0
-        )
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan, step_s / 3600.0, 0.0)
 
     @classmethod
     def claimed(
