@@ -51,7 +51,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     SAID,
     SHAFTS,
     SINCE,
-    STANDS,
     STATES,
     STAYS,
     STAYS_WAY,
@@ -161,7 +160,7 @@ def _first(
         p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
     else:
         w[COUNT], w[GLIDED] = 1, 1
-        all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, regime, 0.0
+        all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
         if setting.engine > 0.0:
             p[OPEN, OPEN] = n.ANY_WIND_SD**2
             p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
@@ -174,12 +173,7 @@ def _begin_anyhow(
     """Give birth to a ship that does anything, and to one that glides as a person says."""
     rest = chance * (1.0 - setting.glides)
     for kind in range(len(n.ENGINE)):
-        part = (1.0 - n.BRAKED) * rest / len(n.ENGINE)
-        _first(all_, setting, speed, by_log, part, liar, ENGINE, kind)
-    for size in n.BRAKES:
-        j, part = all_.used[0], n.BRAKED * rest / len(n.BRAKES)
-        _first(all_, setting, speed, by_log, part, liar, BRAKE, STANDS)
-        all_.mean[j, OPEN], all_.spread[j, OPEN, OPEN] = math.log(size), n.BRAKES_SD**2
+        _first(all_, setting, speed, by_log, rest / len(n.ENGINE), liar, ENGINE, kind)
     shown = len(n.DRAGGED) if setting.shafts > 0 else 1
     for kind in range(shown):
         glides = chance * setting.glides * (n.DRAGGED_SHARE[kind] if shown > 1 else 1.0)

@@ -32,7 +32,6 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-_G_M_S2 = 9.81
 REGIMES = ((DRIVEN, ENGINE), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
 ENGINES, GLIDES, BRAKES, TURNS = range(4)
 
@@ -109,8 +108,8 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
         engine=max(math.exp(hull_level(hull, math.log(binned.top))), binned.swing),
         told_s=binned.before * binned.step_s,
     )
-    # a log errs by a part of the speed: those are of a ship of that length as she sails
-    wanders = n.WANDER * binned.top / (n.SAILS[0] * math.sqrt(_G_M_S2 * n.BIN_LENGTH_M))
+    # a log errs by a part of the speed at which she sails
+    wanders = n.WANDER * binned.top / math.exp(hull.sails)
     runs = []
     for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S[1:]):
         noise = binned.noise.copy()
