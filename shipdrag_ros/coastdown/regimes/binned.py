@@ -156,8 +156,11 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     said[:, LOG] = bins.means(*bins.of('speed_through_water'))
     said[:, GROUND] = sign * bins.means(*bins.of('speed_over_ground'))
     said[:, ADVANCE] *= sign
-    angle = heading if np.isfinite(heading).any() else course
-    said[1:, RATE] = _turned(angle) / step_s
+    by_compass = bool(np.isfinite(heading).any())
+    at = bins.of('heading')[0] if by_compass else np.empty(0)
+    # the readings of a bin are not always in its middle
+    apart_s = step_s * np.diff(bins.means(at, at)) if by_compass else step_s
+    said[1:, RATE] = _turned(heading if by_compass else course) / apart_s
     said[:, RUDDER] = bins.means(*bins.of('rudder'))
     _shafts(bins, said)
     speed = said[:, LOG]

@@ -130,7 +130,8 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
     ramp = np.where(what == GLIDE, ramp, 0.0)
     gone = np.minimum(at + ramp, end)
-    seen = (setting.shafts > 0) & (all_.whole[:used, KIND, np.newaxis] < HELD)
+    scaled = setting.shafts > 0 and setting.engine == 0.0
+    seen = scaled & (all_.whole[:used, KIND, np.newaxis] < HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
     date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))
