@@ -16,7 +16,14 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.given import BRAKES, ENGINES, GLIDES, TURNS, Reading, read
+from shipdrag_ros.coastdown.regimes.given import (
+    BRAKES,
+    ENGINES,
+    GLIDES,
+    TURNS,
+    WindowRegimes,
+    read,
+)
 from shipdrag_ros.coastdown.regimes.state import RATE, RUDDER, SHAFTS
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
@@ -31,7 +38,7 @@ _SPAN = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Judgement:
+class GivenPart:
     """
     What of a window is a coastdown.
 
@@ -64,7 +71,7 @@ class Examined(NamedTuple):
     `failure` says why there is none.
     """
 
-    judged: Judgement
+    judged: GivenPart
     estimate: Estimate | None
     failure: str | None
 
@@ -105,7 +112,7 @@ def estimate_given(
         return Examined(judged, None, str(error))
 
 
-def judge(window: Window, ship: Ship, parameters: Parameters) -> Judgement:
+def judge(window: Window, ship: Ship, parameters: Parameters) -> GivenPart:
     """
     Find the part of a window that is a coastdown.
 
@@ -124,7 +131,7 @@ def judge(window: Window, ship: Ship, parameters: Parameters) -> Judgement:
     greater part of it, that part is kept too, with a note. What is too short for the bank is
     for the estimator to judge.
     """
-    whole = Judgement(window.start_ns, window.end_ns)
+    whole = GivenPart(window.start_ns, window.end_ns)
     reading = read(window, ship, parameters)
     if reading is None or len(reading.binned.said) - reading.binned.before < _SHORTEST:
         return whole
@@ -135,13 +142,15 @@ def judge(window: Window, ship: Ship, parameters: Parameters) -> Judgement:
 class _Judge:
     """One window and what the bank makes of it."""
 
-    def __init__(self, window: Window, reading: Reading, slow: float, turn_rad: float) -> None:
+    def __init__(
+        self, window: Window, reading: WindowRegimes, slow: float, turn_rad: float
+    ) -> None:
         self._slow, self._turn_rad, self._turns = slow, turn_rad, False
         self._window = window
         self._reading = reading
         self._binned = reading.binned
 
-    def judgement(self, data_stop_s: float) -> Judgement:
+    def judgement(self, data_stop_s: float) -> GivenPart:
         """
         Return what is kept, and why the rest is not.
         """
@@ -152,7 +161,7 @@ class _Judge:
             cuts = self._cuts(self._binned.before, len(self._binned.said), gaps, None)
             why = '; '.join(dict.fromkeys(f'{cut.reason.value}: {cut.text}' for cut in cuts))
             failure = f'nothing of it is a coastdown: {why}'
-            return Judgement(
+            return GivenPart(
                 window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
             )
         first, last = reading.dates(kept, *which)
@@ -173,7 +182,7 @@ class _Judge:
                 f'she turns in {part:.0%} of it: the drag of drifting and turning is part of r',
             )
         shown = self._shown() if cuts else ()
-        return Judgement(start_ns, end_ns, tuple(cuts), None, notes, shown)
+        return GivenPart(start_ns, end_ns, tuple(cuts), None, notes, shown)
 
     def _best(self, gaps: list[_SPAN]) -> tuple[_SPAN | None, tuple[int, ...]]:
         """Return the bins of the coastdown, and the regimes that make it."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal
-from shipdrag_ros.coastdown.given import Judgement, judge
+from shipdrag_ros.coastdown.given import GivenPart, judge
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -43,19 +43,19 @@ def window(*blocks: Block, before_s: float | None = None, end_s: float = LENGTH_
     return Window.from_block(joined, START_NS, START_NS + round(end_s * 1e9), before_ns=before_ns)
 
 
-def judged(*blocks: Block, **parameters: object) -> Judgement:
+def judged(*blocks: Block, **parameters: object) -> GivenPart:
     return judge(window(*blocks), BOAT, Parameters(**parameters))  # type: ignore[arg-type]
 
 
-def kept_s(found: Judgement) -> tuple[float, float]:
+def kept_s(found: GivenPart) -> tuple[float, float]:
     return (found.start_ns - START_NS) / 1e9, (found.end_ns - START_NS) / 1e9
 
 
-def reasons(found: Judgement) -> set[Dismissal]:
+def reasons(found: GivenPart) -> set[Dismissal]:
     return {cut.reason for cut in found.cuts}
 
 
-def is_whole(found: Judgement) -> bool:
+def is_whole(found: GivenPart) -> bool:
     return found.cuts == () and found.failure is None and kept_s(found) == (0.0, LENGTH_S)
 
 
@@ -175,7 +175,7 @@ def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
 class TestSpeedAlone:
     """At any scale of time: a model, a boat."""
 
-    def found(self, speed: np.ndarray, scale: float, noise: float = 0.02) -> Judgement:
+    def found(self, speed: np.ndarray, scale: float, noise: float = 0.02) -> GivenPart:
         time_s = np.linspace(0.0, LENGTH_S, 1 + round(min(LENGTH_S * scale * 100.0, 3000.0)))
         rng = np.random.default_rng(3)
         value = np.interp(time_s, np.linspace(0.0, LENGTH_S, len(speed)), speed)

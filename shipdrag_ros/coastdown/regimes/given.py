@@ -37,7 +37,7 @@ ENGINES, GLIDES, BRAKES, TURNS = range(4)
 
 
 @dataclass(frozen=True)
-class Reading:
+class WindowRegimes:
     """
     What the bank makes of a window.
 
@@ -87,7 +87,7 @@ class Reading:
         return max(float(begin), span[0] - 0.5), min(float(end), span[1] + 0.5)
 
 
-def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
+def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | None:
     """
     Let the bank read a window and the record before it; None where nothing shows a speed.
 
@@ -127,7 +127,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> Reading | None:
         probability_of(joined.part(np.isin(joined.what, codes)), len(binned.said), binned.step_s)
         for codes in REGIMES
     ]
-    return Reading(binned, joined, np.array(probability))
+    return WindowRegimes(binned, joined, np.array(probability))
 
 
 def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, Spans]:
