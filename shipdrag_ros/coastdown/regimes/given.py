@@ -109,7 +109,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
         told_s=binned.before * binned.step_s,
     )
     # a log errs by a part of the speed at which she sails
-    wanders = n.WANDER[:4] * binned.top / math.exp(hull.sails)
+    wanders = n.WANDER * binned.top / math.exp(hull.sails)
     runs = []
     for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S[1:]):
         noise = binned.noise.copy()
