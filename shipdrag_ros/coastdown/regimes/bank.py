@@ -22,12 +22,16 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     CURRENT,
     DRIVEN,
+    ENGINE,
     FIRST_A,
     GLIDE,
     GLIDED,
     GONE,
     GROUND,
+    GUST,
     HIGH,
+    KIND,
+    LAG,
     LEVEL,
     LIAR,
     LN_A,
@@ -43,6 +47,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RATE,
     REGIME,
     REVS,
+    RUDDER,
     SAID,
     SHAFTS,
     SINCE,
@@ -117,58 +122,92 @@ class Bank(NamedTuple):
 
 
 @compiled(uncounted=True)
+def _first(
+    all_: Histories, setting: BankSetting, speed: float, by_log: bool, chance: float, liar: int,
+    regime: int, kind: int,
+) -> None:  # fmt: skip
+    """Give birth to one of the first histories."""
+    if not chance > 0.0:
+        return
+    hull, j = setting.hull, all_.used[0]
+    all_.used[0] = j + 1
+    x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
+    for k in range(STATES):
+        x[k] = 0.0
+        for m in range(STATES):
+            p[k, m] = 0.0
+    for k in range(len(f)):
+        f[k] = 0.0
+    for k in range(len(w)):
+        w[k] = 0
+    x[LN_U] = math.log(speed)
+    p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
+    x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
+    x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
+    p[WAY, WAY] = 1e4
+    p[LONGER, LONGER] = n.LOG_LAG_SD**2
+    p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
+    f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
+    f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
+    f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
+    f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+    w[REGIME], w[LIAR], w[KIND] = regime, liar, kind
+    if regime == ENGINE:
+        p[GUST, GUST] = (n.ENGINE[kind] * setting.engine) ** 2
+    elif regime == DRIVEN:
+        x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
+        # the same error: she is in balance
+        p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
+    else:
+        w[COUNT], w[GLIDED] = 1, 1
+        all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
+        if setting.engine > 0.0:
+            p[OPEN, OPEN] = n.ANY_WIND_SD**2
+            p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
+
+
+@compiled(uncounted=True)
+def _begin_anyhow(
+    all_: Histories, setting: BankSetting, speed: float, by_log: bool, chance: float, liar: int
+) -> None:
+    """Give birth to a ship that does anything, and to one that glides as a person says."""
+    rest = chance * (1.0 - setting.glides)
+    for kind in range(len(n.ENGINE)):
+        _first(all_, setting, speed, by_log, rest / len(n.ENGINE), liar, ENGINE, kind)
+    shown = len(n.DRAGGED) if setting.shafts > 0 else 1
+    for kind in range(shown):
+        glides = chance * setting.glides * (n.DRAGGED_SHARE[kind] if shown > 1 else 1.0)
+        for odd in range(len(n.ODD)):
+            j = all_.used[0]
+            _first(all_, setting, speed, by_log, n.ODD_SHARE[odd] * glides, liar, GLIDE, kind)
+            all_.mean[j, LN_A] += n.ODD[odd] + n.DRAGGED[kind]
+            all_.spread[j, LN_A, LN_A] += n.DRAGGED_SD[kind] ** 2
+
+
+@compiled(uncounted=True)
 def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
-    all_ = bank.histories
     hull = setting.hull
     both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
         by_log = not np.isnan(log) and liar != THE_LOG
         speed = log if by_log else track
+        if setting.engine > 0.0 and not np.isnan(speed):
+            speed = max(abs(speed), math.exp(hull.first - 1.0))
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        for regime in (DRIVEN, GLIDE):
-            chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
-            if liar > 0:
-                chance *= n.LIES_FIRST
-            if not chance > 0.0:
-                continue
-            chance *= math.exp(-0.5 * off * off)
-            j = all_.used[0]
-            all_.used[0] = j + 1
-            x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
-            for k in range(STATES):
-                x[k] = 0.0
-                for m in range(STATES):
-                    p[k, m] = 0.0
-            for k in range(len(f)):
-                f[k] = 0.0
-            for k in range(len(w)):
-                w[k] = 0
-            x[LN_U] = math.log(speed)
-            p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
-            x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
-            x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
-            p[WAY, WAY] = 1e4
-            p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
-            f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
-            f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
-            f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
-            f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
-            w[REGIME], w[LIAR] = regime, liar
-            if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
-                # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
-            else:
-                w[COUNT], w[GLIDED] = 1, 1
-                all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
+        liars = (n.LIES_FIRST if liar > 0 else 1.0) * math.exp(-0.5 * off * off)
+        if setting.engine > 0.0:
+            _begin_anyhow(bank.histories, setting, speed, by_log, liars, liar)
+            continue
+        chance = liars * (1.0 - setting.glides)
+        _first(bank.histories, setting, speed, by_log, chance, liar, DRIVEN, 0)
+        _first(bank.histories, setting, speed, by_log, liars * setting.glides, liar, GLIDE, 0)
 
 
 @compiled(uncounted=True)
-def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
+def _shafts(bank: Bank, step_s: float, even: float, speed: float, scaled: bool) -> None:
     """Put the fastest and the slowest shaft over their steady revs; learn those."""
     said, revs = bank.said, bank.revs
     said[HIGH] = said[LOW] = np.nan
@@ -188,7 +227,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
             revs[k] += gain * (value - revs[k])
             learnt = True
     said[GONE] = np.nan
-    if not np.isnan(said[HIGH]) and speed > 0.0:
+    if not np.isnan(said[HIGH]) and speed > 0.0 and scaled:
         before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
         free = 1.0 / n.NO_THRUST_SEEN
         if before > free >= now:
@@ -248,6 +287,8 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
             out[P_RUN_DOWN if running else P_GLIDING] += share
+        elif regime == ENGINE:
+            out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
         elif regime == BRAKE:
             out[P_BRAKED] += share
         else:
@@ -260,6 +301,8 @@ _SETTING = BankSetting(
     0.0,
     0.0,
     0,
+    0.0,
+    0.0,
     0.0,
     0.0,
 )  # its types are all that counts
@@ -282,17 +325,18 @@ def step(bank: Bank, setting: BankSetting) -> None:
         _sum_up(bank, setting)
         bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
-    _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
+    scaled = setting.engine == 0.0
+    _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED], scaled)
     used = bank.noise.used
     if all_.clock[0] > 1:
-        bear(all_, setting, both, not np.isnan(said[RATE]))
-    before = 0.0
+        bear(all_, setting, both, not (np.isnan(said[RATE]) and np.isnan(said[RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
-        slowing = predict(all_, i, setting, used, advance, bank.work)
+        way = abs(advance) if all_.whole[i, REGIME] == ENGINE else advance  # she may go astern
+        slowing = predict(all_, i, setting, used, way, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
-    thin(all_, setting)
+    bank.out[FIT] = thin(all_, setting)
     _sum_up(bank, setting)
-    listen(bank.noise, setting, said, bank.out[P_STEADY])
-    bank.out[FIT] = before
+    if scaled:
+        listen(bank.noise, setting, said, bank.out[P_STEADY])

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -17,11 +16,13 @@ from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     COUNT,
     DRIVEN,
+    ENGINE,
     FIRST_A,
     FREE,
     GLIDE,
     GLIDE_TURN,
     GLIDED,
+    GUST,
     HELD,
     KEPT,
     KIND,
@@ -121,27 +122,32 @@ def _born(
 
 
 @compiled(uncounted=True)
-def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
+def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
-    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    wind = n.ANY_WIND_SD if setting.engine > 0.0 else n.WIND_SD
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
-    _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+    _free(bank, j, OPEN, 0.0, wind * wind)
 
 
 @compiled(uncounted=True)
 def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
-    if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
+    if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, ENGINE):
         j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
         if j >= 0:
-            _glide(bank, j, setting.hull)
+            _glide(bank, j, setting)
         return
-    learnt = bank.whole[i, REGIME] == LEVEL
-    for k in range(len(n.RUN_DOWN_S)):
+    learnt, any_ = bank.whole[i, REGIME] == LEVEL, bank.whole[i, REGIME] == ENGINE
+    known = not any_ or bank.whole[i, GLIDED] == 1
+    for each in range(len(n.RUN_DOWN_S) * (1 if known else len(n.ODD))):
+        k, odd = each % len(n.RUN_DOWN_S), each // len(n.RUN_DOWN_S)
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
-        for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
+        for kind in range(len(n.DRAGGED) if setting.shafts > 0 else 1 if any_ else STUCK):
             part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
+            if not known:
+                part *= 0.0 if kind >= HELD and odd > 0 else n.ODD_SHARE[odd]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
@@ -149,15 +155,18 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             bank.whole[j, KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan
-            bank.number[j, BEFORE] = x[OPEN]
-            x[LN_A] += n.DRAGGED[kind]
+            if bank.whole[i, REGIME] == ENGINE:
+                _free(bank, j, GUST, 0.0, p[GUST, GUST] * n.ENGINE[0] ** 2)
+            else:
+                bank.number[j, BEFORE] = x[OPEN]
+            x[LN_A] += n.DRAGGED[kind] + (0.0 if known else n.ODD[odd])
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
             x[POWER] += tied * n.DRAGGED[kind]
             p[LN_A, LN_A] += var + (n.KEPT_SD**2 if learnt else 0.0)
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
-            _glide(bank, j, setting.hull)
+            _glide(bank, j, setting)
 
 
 @compiled(uncounted=True)
@@ -185,6 +194,19 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
 
 
 @compiled(uncounted=True)
+def _engines(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let an engine do anything."""
+    for kind in range(len(n.ENGINE)):
+        if bank.whole[i, REGIME] == ENGINE and bank.whole[i, KIND] == kind:
+            continue
+        j = _born(bank, i, now_s, chance / len(n.ENGINE), ENGINE, 1.0)
+        if j >= 0:
+            bank.whole[j, KIND], bank.number[j, REVS] = kind, np.nan
+            _free(bank, j, OPEN, 0.0, 0.0)
+            _free(bank, j, GUST, 0.0, (n.ENGINE[kind] * setting.engine) ** 2)
+
+
+@compiled(uncounted=True)
 def _turns(
     bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, regime: int
 ) -> None:
@@ -200,16 +222,20 @@ def _turns(
 @compiled(uncounted=True)
 def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let something but the water slow her."""
-    for k in range(len(n.BRAKES)):
-        j = _born(bank, i, now_s, chance / len(n.BRAKES), BRAKE, 1.0)
+    brakes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
+    for k in range(brakes):
+        j = _born(bank, i, now_s, chance / brakes, BRAKE, 1.0)
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
-                _glide(bank, j, setting.hull)
+                _glide(bank, j, setting)
                 bank.number[j, REVS] = np.nan
                 bank.whole[j, KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
-            _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+            size = n.BRAKES[k] if k < len(n.BRAKES) else n.STOPPERS[k - len(n.BRAKES)]
+            _free(bank, j, OPEN, math.log(size), n.BRAKES_SD**2)
+            if bank.whole[i, REGIME] == ENGINE:
+                _free(bank, j, GUST, 0.0, 0.0)
 
 
 @compiled(uncounted=True)
@@ -235,6 +261,15 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
 
 
 @compiled(uncounted=True)
+def _on(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let the engine be used again."""
+    if setting.engine > 0.0:
+        _engines(bank, i, setting, now_s, chance)
+    else:
+        _levels(bank, i, setting, now_s, chance)
+
+
+@compiled(uncounted=True)
 def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> None:
     """
     Let every likely history switch at the beginning of this bin.
@@ -247,7 +282,11 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
         The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
-    hours = setting.step_s / 3600.0
+    hours, any_ = setting.hours, setting.engine > 0.0
+    told = 0.0  # hazard of a stop that a person tells
+    if not np.isnan(setting.told_s):
+        off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if any_ else 1.0))
+        told = n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
     parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
@@ -265,42 +304,49 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             w[REGIME] = regime = DRIVEN
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+        if any_ and regime != GLIDE and age_s < n.LEVEL_LEAST_S * setting.pace:
+            continue
         left = 0.0  # hazard of all that it may switch to
-        if regime in (DRIVEN, LEVEL):
+        if regime in (DRIVEN, LEVEL, ENGINE):
             if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
                 continue
             stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
-            if age_s < n.MANOEUVRING_S * setting.pace:
+            if any_ or age_s < n.MANOEUVRING_S * setting.pace:
                 after = w[GLIDED] == 1
                 stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
                 rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
                 stop = n.MANOEUVRE * stops
                 level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
                 turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
-            if not np.isnan(setting.told_s):
-                off = (now_s - setting.told_s) / n.TOLD[1]
-                stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
-            _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-            _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
-            _levels(bank, i, setting, now_s, level * hours)
-            _turns(bank, i, setting, now_s, turn * hours, TURN)
+            braked = n.BRAKED * (stop + (0.0 if any_ else told))
+            stop += told
+            _glides(bank, i, setting, now_s, (stop - braked) * hours)
+            _brakes(bank, i, setting, now_s, braked * hours)
+            if any_:
+                _engines(bank, i, setting, now_s, level * hours)
+            else:
+                _levels(bank, i, setting, now_s, level * hours)
+                _turns(bank, i, setting, now_s, turn * hours, TURN)
             left = stop + level + turn
         elif regime == GLIDE:
-            _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+            _on(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
             if steered:
-                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-                left += n.GLIDE_TURN
+                turns = float(n.MANOEUVRE if any_ else n.GLIDE_TURN)
+                _turns(bank, i, setting, now_s, turns * hours, GLIDE_TURN)
+                left += turns
             _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
         elif regime == BRAKE:
-            _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
-            _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
+            _glides(bank, i, setting, now_s, (n.BRAKE_GLIDE + (told if any_ else 0.0)) * hours)
+            _on(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
             left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
         else:
             if regime == TURN:
                 _back(bank, i, setting, now_s, n.TURN_OUT * hours)
             else:
                 _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+                if any_:
+                    _engines(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = float(n.TURN_OUT)
         f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
@@ -311,7 +357,8 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     w, v = bank.whole[i], bank.whole[j]
     last = w[COUNT] - 1
     if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
-        return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
+        alike = w[LIAR] == v[LIAR] and w[KIND] == v[KIND]
+        return bool(alike and w[COUNT] == 0 and v[COUNT] == 0)
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False
     if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
@@ -323,9 +370,11 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
 
 
 @compiled(uncounted=True)
-def thin(bank: Histories, setting: BankSetting) -> None:
+def thin(bank: Histories, setting: BankSetting) -> float:
     """
     Weigh against the best; merge and keep the likeliest now and then.
+
+    Returns the log predictive density of the bin.
     """
     count = bank.used[0]
     best = -np.inf
@@ -346,11 +395,11 @@ def thin(bank: Histories, setting: BankSetting) -> None:
             _copy(bank, i, kept)
         kept += 1
     bank.used[0] = kept
-    if not due:
-        return
-    _merge(bank, now_s, setting.pace)
-    if bank.used[0] > KEPT:
-        _keep_best(bank)
+    if due:
+        _merge(bank, now_s, setting.pace)
+        if bank.used[0] > KEPT:
+            _keep_best(bank)
+    return float(norm)
 
 
 @compiled(uncounted=True)

@@ -19,6 +19,7 @@ _TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4
 _HUMP = 0.45  # Froude number above which waves make less, not more
 _POINTS = 64
 _SPEEDS = (0.03, 1.2)  # Froude numbers of the table
+_ANY_SPEEDS = (0.014, 1.2)
 
 
 class HullPrior(NamedTuple):
@@ -77,6 +78,35 @@ class HullPrior(NamedTuple):
             math.log(float(ship.speed(float(n.SAILS[0])))),
             _run_down(ship),
         )
+
+    @classmethod
+    def any_body(cls, ship: Ship) -> HullPrior:
+        """
+        Take it for whatever glides: a hull of length and volume has its friction at least.
+        """
+        slow, fast = (math.log(float(ship.speed(each))) for each in _ANY_SPEEDS)
+        log_u = np.linspace(slow, fast, _POINTS)
+        (level, level_sd), (exponent, exponent_sd) = n.ANY_BODY, n.ANY_EXPONENT
+        return cls(
+            slow,
+            float(log_u[1] - log_u[0]),
+            _friction(ship, np.exp(log_u)),
+            float(level),
+            float(level_sd) ** 2,
+            float(exponent),
+            float(exponent_sd) ** 2,
+            ship.length_m,
+            math.log(float(ship.speed(float(n.SAILS[0])))),
+            _run_down(ship),
+        )
+
+
+def hull_level(hull: HullPrior, log_u: float) -> float:
+    """
+    Return ln of the resistance per moving mass [m/s^2] at ln u.
+    """
+    at = hull.first + hull.step * np.arange(len(hull.curve))
+    return float(np.interp(log_u, at, hull.curve)) + hull.level
 
 
 def _run_down(ship: Ship) -> Float64:

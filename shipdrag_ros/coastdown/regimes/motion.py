@@ -19,10 +19,12 @@ from shipdrag_ros.coastdown.regimes.state import (
     CURRENT,
     DRIVEN,
     EDDY,
+    ENGINE,
     FIRST_A,
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GLIDED,
     GONE,
     GROUND,
     GUST,
@@ -58,6 +60,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RATE,
     REGIME,
     REVS,
+    RUDDER,
     SINCE,
     STANDS,
     STATES,
@@ -118,7 +121,7 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes."""
     f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
     if w[REGIME] != LEVEL:
-        return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
+        return bool(w[REGIME] in (DRIVEN, TURN, ENGINE))
     share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
     target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
     free = f[FREE] if w[KIND] == 1 else 0.0
@@ -146,6 +149,8 @@ def _force(
         left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
     elif regime == GLIDE:
         left = 1.0 - _thrust_left(f, now_s)
+    elif regime == ENGINE:
+        return x[GUST], 0.0, 0.0, 0.0, 0.0
     if regime in (TURN, GLIDE_TURN):
         drag = math.exp(min(x[OPEN], 3.0))
         left, by_open = left + drag, -a * drag
@@ -236,6 +241,8 @@ def predict(
         # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
         first = f[FIRST_A]
         gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
+        if regime == ENGINE:
+            gusts = (n.ENGINE[bank.whole[i, KIND]] * setting.engine) ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
@@ -285,7 +292,9 @@ def _take(
         around = share * (1.0 - share) * off * off / total
         for j in range(STATES):
             gain = work[0, j] / total
-            x[j] += share * gain * off
+            # the reading is of u, not of its logarithm
+            ahead = share * gain * off
+            x[j] += math.log1p(ahead) if j == LN_U and ahead > 0.1 else ahead
             for k in range(j + 1):
                 p[j, k] += (around - share) * gain * work[0, k]
                 p[k, j] = p[j, k]
@@ -367,7 +376,9 @@ def _driving(
 
 
 @compiled(uncounted=True)
-def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float) -> float:
+def _running_down(
+    f: Float64, nu: float, u_part: float, left: float, part: float, scaled: bool
+) -> float:
     """
     Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
 
@@ -375,7 +386,7 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
     """
     falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
     if np.isnan(f[FREE]):
-        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
+        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) if scaled else 1.0
         f[FREE] = nu / falls
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
@@ -385,14 +396,20 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
 
 
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
+def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> float:
     """
     Return the density of the revs of a screw that does not drive.
+
+    Where they are not `scaled` by steady sailing, they are so by the most turns a metre there
+    were, and may be as many.
     """
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
-            return _as_usual(f, nu, u_part, 0.05, 0.3)
+            return _as_usual(f, nu, u_part, 0.05, 0.3 if scaled else 0.05)
+        if not scaled:
+            f[REVS] = nu / u_part
+            return 1.0 / u_part if nu < u_part + n.SHAFT_SD[0] else 0.0
         f[REVS] = min(nu / u_part, n.WINDMILL[2])
         wide = math.hypot(n.SHAFT_SD[0], n.WINDMILL[1] * u_part)
         at = n.WINDMILL[0] * u_part
@@ -401,10 +418,13 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         f[REVS] = nu
-        # or anything below its last: it runs down
-        return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
+        # or anything below its last: it runs down, or creeps on
+        below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+        if last < n.CREEPS:
+            return (stands + below + _off(nu, last)) / 3.0
+        return 0.5 * (stands + below)
     f[REVS] = nu
-    moves = 0.1 if kind == HELD else 0.01
+    moves = 0.1 if kind == HELD and scaled else 0.01
     return (1.0 - moves) * _off(nu, revs) + moves
 
 
@@ -417,13 +437,21 @@ def _shaft(
     now_s: float,
     step_s: float,
     several: bool,
+    scaled: bool,
 ) -> float:
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
-        return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
+        return math.log(1.0 if regime in (BRAKE, ENGINE) else n.SHAFT_LIES)
+    if regime == ENGINE:  # at any revs, mostly at those of before
+        before = f[REVS]
+        f[REVS] = nu
+        stands = nu < n.CREEPS  # then another pushes, unheard
+        if np.isnan(before) or (stands and before >= n.CREEPS):
+            return math.log(n.BAD if stands else 1.0)
+        return math.log(0.9 * _off(nu, before) + 0.1)
     if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
         if several and regime != LEVEL:  # they turn alike
@@ -437,9 +465,9 @@ def _shaft(
             # it stopped within the bin, of which the revs are a mean
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0 and kind < HELD:
-            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8)
+            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
         else:
-            density = _dragged(f, kind, nu, u_part)
+            density = _dragged(f, kind, nu, u_part, scaled)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
             density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
@@ -499,11 +527,12 @@ def _by_shafts(
     """Return the log density of the revs, and date the stop and the end of thrust by them."""
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
-    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
+    scaled = setting.engine == 0.0
+    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1, scaled)
     # a slow error of revs does not turn their sign
-    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
+    gained = shown if said[LOW] < _REVERSED or not scaled else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
-    if young and bank.whole[i, KIND] < HELD:
+    if young and scaled and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
         unchanged = math.log(_off(said[LOW], 1.0) + n.SHAFT_LIES)
         gained += (1.0 - n.SHAFT_TEMPER) * min(shown - unchanged, 0.0)
@@ -535,6 +564,7 @@ def weigh(
     gained = 0.0
     bad = float(n.BAD_DENSITY)
     least = setting.hull.first - 1.0  # at rest
+    rest, drift = math.exp(least), math.exp(setting.hull.first)
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
@@ -548,7 +578,11 @@ def weigh(
             h[j] = 0.0
         h[LN_U] = u
         expected = u + f[MEAN_U]
-        sd = noise[N_LOG]
+        sd, value = noise[N_LOG], said[which]
+        if setting.engine > 0.0 and value < 0.0:  # astern: an engine, or a ship at rest
+            value = -value
+            if regime != ENGINE:
+                gained += math.log(n.BAD + (1.0 - n.BAD) * math.exp(-0.5 * (value / drift) ** 2))
         if which == LOG:
             longer, lags = math.exp(min(max(x[LONGER], -3.0), 3.0)), x[LAG] + f[MEAN_LAG]
             h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
@@ -557,7 +591,9 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
+        # a ship at rest is never quite so
+        sd = math.hypot(sd, rest * (rest / u) ** 4)
+        gained += _take(x, p, h, work, value - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
         gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
     if not np.isnan(said[RATE]):
@@ -570,10 +606,13 @@ def weigh(
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
+    if not np.isnan(said[RUDDER]):
+        sd = n.RUDDER[1 if regime in (TURN, GLIDE_TURN) else 0]
+        gained += n.SHAFT_TEMPER * math.log(_normal(said[RUDDER], sd) + n.SHAFT_LIES)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
     f[WEIGHT] += gained
-    if regime in (DRIVEN, TURN):
+    if regime in (DRIVEN, TURN) or (regime == ENGINE and bank.whole[i, GLIDED] == 0):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])

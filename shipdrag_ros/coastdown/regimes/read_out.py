@@ -23,6 +23,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     COUNT,
     DRIVEN,
+    ENGINE,
     GLIDE,
     GLIDE_TURN,
     HELD,
@@ -99,6 +100,18 @@ class Spans(NamedTuple):
             self.again[chosen],
         )
 
+    def later(self, by_s: float) -> Spans:
+        """
+        Return them by a clock that began earlier; what begins at once began with it.
+        """
+        begin_s, date_s, gone_s = (
+            np.where(each < 0.5 * by_s, 0.0, each + by_s)
+            for each in (self.begin_s, self.date_s, self.gone_s)
+        )
+        return self._replace(
+            begin_s=begin_s, date_s=date_s, gone_s=gone_s, end_s=self.end_s + by_s
+        )
+
 
 def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     """
@@ -117,7 +130,8 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
     ramp = np.where(what == GLIDE, ramp, 0.0)
     gone = np.minimum(at + ramp, end)
-    seen = (setting.shafts > 0) & (all_.whole[:used, KIND, np.newaxis] < HELD)
+    scaled = setting.shafts > 0 and setting.engine == 0.0
+    seen = scaled & (all_.whole[:used, KIND, np.newaxis] < HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
     date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))
@@ -137,7 +151,7 @@ def _over_time(
     return np.cumsum(edges)[:-1]
 
 
-def _probability(found: Spans, bins: int, step_s: float) -> Float64:
+def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
     return _over_time(found.weight, found.begin_s, found.end_s, bins, step_s)
 
 
@@ -145,16 +159,17 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     """
     Return the probability of each regime in each bin since the start, given all that came.
     """
-    engaged = (found.what == LEVEL) & found.again
+    powered = (found.what == LEVEL) | (found.what == ENGINE)
+    engaged = powered & found.again
     chosen = {
-        P_DRIVEN: (found.what == DRIVEN) | ((found.what == LEVEL) & ~engaged),
+        P_DRIVEN: (found.what == DRIVEN) | (powered & ~engaged),
         P_BRAKED: found.what == BRAKE,
         P_TURNING: (found.what == TURN) | (found.what == GLIDE_TURN),
         P_ENGAGED: engaged,
     }
     glide = found.part(found.what == GLIDE)
     of = {
-        number: _probability(found.part(which), bins, step_s) for number, which in chosen.items()
+        number: probability_of(found.part(which), bins, step_s) for number, which in chosen.items()
     }
     of[P_RUN_DOWN] = _over_time(glide.weight, glide.begin_s, glide.gone_s, bins, step_s)
     of[P_GLIDING] = _over_time(glide.weight, glide.gone_s, glide.end_s, bins, step_s)
@@ -203,16 +218,16 @@ def _one(found: Spans, peak: float) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
     stop, start, begin, end = (
-        _median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
+        median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
-    codes = np.arange(-1, GLIDE_TURN + 1)
+    codes = np.arange(-1, ENGINE + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
     return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, peak, after)
 
 
-def _median(value: Float64, share: Float64) -> float:
+def median(value: Float64, share: Float64) -> float:
     order = np.argsort(value, kind='stable')
     place = np.searchsorted(np.cumsum(share[order]), 0.5)
     return float(value[order[min(int(place), len(order) - 1)]])
@@ -236,7 +251,7 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     Return the stretches [s] without thrust in which something but the water acted.
     """
     likely, acted = (
-        _probability(found.part(np.isin(found.what, codes)), bins, step_s)
+        probability_of(found.part(np.isin(found.what, codes)), bins, step_s)
         for codes in (_UNPOWERED, _ACTED)
     )
     return [
@@ -253,7 +268,7 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int:
     lost = -np.diff(speed[first:], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
     losses = [
-        float(_probability(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
+        float(probability_of(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
         for code in codes
     ]
     return codes[int(np.argmax(losses))]

@@ -22,7 +22,7 @@ SWITCHES = 12  # that a history remembers
 LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(11)
 STATES = 11
 
-DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
+DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN, ENGINE = range(7)  # the last: at any level
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
@@ -42,8 +42,9 @@ WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
+RUDDER = 11  # angle [rad]
 GONE = 10  # when revs over speed fell through those without thrust [s since the start]
-SAID = 11
+SAID = 12
 
 # noise in use: gust over resistance, sd and time of the slow error of log and speed over ground,
 # white noise of log, speed over ground and fixes, their walk, sd of the rate of turn
@@ -114,6 +115,11 @@ class BankSetting(NamedTuple):
         Probability that the record begins in a glide.
     told_s
         When a person says that the engine was stopped [s since the start]; NaN where nobody does.
+    hours
+        For which the hazards hold in a bin.
+    engine
+        Force of an engine at any level, over the mass [m/s^2]; 0 where she is known to sail evenly
+        at first.
     """
 
     hull: HullPrior
@@ -122,6 +128,8 @@ class BankSetting(NamedTuple):
     shafts: int
     glides: float
     told_s: float
+    hours: float
+    engine: float
 
     @classmethod
     def of(
@@ -130,4 +138,18 @@ class BankSetting(NamedTuple):
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan, step_s / 3600.0, 0.0)
+
+    @classmethod
+    def claimed(
+        cls, hull: HullPrior, step_s: float, *, shafts: int, engine: float, told_s: float
+    ) -> BankSetting:
+        """
+        Return that of a record of which a person says that she glides in it, from `told_s` on.
+
+        Before that she may do anything.
+        """
+        # a window is as long as a person finds it worth, and manoeuvres with it
+        pace, hours = step_s / n.BIN_S, n.BIN_S / 3600.0
+        glides = float(n.TOLD[0]) if told_s <= 0.0 else 0.0
+        return cls(hull, step_s, pace, shafts, glides, told_s, hours, engine)
