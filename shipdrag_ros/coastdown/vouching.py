@@ -59,7 +59,7 @@ _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
 _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
-_STILL = 0.5  # the same of a source that was wrong just before
+_STILL = 0.5  # share of minutes of a source that was wrong just before
 
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
 _KM = Scaled(_MEANS * math.log(1e3), 1e-3, _MEAN_S * _MEANS)
@@ -216,12 +216,12 @@ def _beside(
     craft: Craft,
 ) -> float:
     """Return the log evidence of sound sources and of one that is the ship in a wrong scale."""
-    found = -math.inf
-    if name == _LOG and sound:
-        found = math.log(_REVERSED) + _measured({_LOG: -speed, **sound}, craft)
     if name == _METRES and sound:
         scaled_up = {**sound, name: speed / _KM.scale}
         return _KM.log_odds + _measured(dict(sorted(scaled_up.items())), craft)
+    found = -math.inf
+    if name == _LOG and sound:
+        found = math.log(_REVERSED) + _measured({_LOG: -speed, **sound}, craft)
     # a track has no scale, and no current is between it and a speed over ground
     for other in sorted(sound, reverse=name != _LOG):
         if (name, other) in scales:
