@@ -112,6 +112,17 @@ def test_a_glide_that_was_dismissed_is_something(tmp_path: Path) -> None:
     assert 'about as fast as after an engine stop' in ' '.join(found['notes'])
 
 
+def test_a_bag_without_a_coastdown_is_told_of_beside_a_glide_with_more_in_it(
+    tmp_path: Path,
+) -> None:
+    bags = [sailed(tmp_path / f'{force.__name__}.mcap', force) for force in (belt_of_ice, tug)]
+    answer = tmp_path / 'answer.json'
+    assert main(['diagnose', *map(str, bags), '--json', str(answer)]) == 0
+    notes = ' '.join(json.loads(answer.read_text(encoding='utf-8'))['notes'])
+    assert 'all of each glide is compared with the model' in notes
+    assert f"no coastdown was found in '{bags[1]}'" in notes
+
+
 def test_without_a_baseline_no_glide_is_held_against_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
