@@ -26,7 +26,7 @@ from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
-FILTER = Parameters(regimes='filter', update_s=60.0)
+FILTER = Parameters(update_s=60.0)
 LOG = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03, coloured=GaussMarkov(0.01, 30.0))
 SHAFT = Sensor(channel=Channel.SHAFT, sd=0.05)
 TRACK = Sensor(channel=Channel.POSITION, sd=1.0)

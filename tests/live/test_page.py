@@ -64,7 +64,6 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         'use_sim_time': True,
         'steady_s': 400.0,
         'slope_window_s': 30.0,
-        'confirm_s': 60.0,
         'froude_min': 0.12,  # an early end
     }
     file = tmp_path / 'parameters.yaml'
@@ -124,8 +123,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     viewer.wait_for('#verdict', agreed)  # as the node says it; the curve is latched
     viewer.wait_for('#curve-say', 'clean hull')
     viewer.page.click('#engine-stopped')
-    # the node's own answer: the rules, which judge unless told otherwise, weigh no such thing
-    assert 'regimes: filter' in viewer.wait_for('#marked', 'recorded')
+    assert 'weighed with the readings' in viewer.wait_for('#marked', 'weighed')
 
     assert node.stop() == 0
     viewer.wait_for('#headline', 'NODE SILENT', within_s=240.0)

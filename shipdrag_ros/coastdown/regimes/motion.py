@@ -18,6 +18,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     CURRENT,
     DRIVEN,
+    EDDY,
     FIRST_A,
     FREE,
     GLIDE,
@@ -38,6 +39,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOW,
     MEAN_LAG,
     MEAN_U,
+    N_EDDY,
+    N_EDDY_S,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -77,6 +80,7 @@ _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
 _ROOT = math.sqrt(2.0 * math.pi)
+_REVERSED = -0.05  # of the steady revs
 
 
 @compiled(inline=True, uncounted=True)
@@ -179,6 +183,7 @@ def predict(
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
     keep_c = math.exp(-dt / (n.CURRENT_S * pace))
+    keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
     slowing = mean_u = mean_lag = 0.0
@@ -208,6 +213,7 @@ def predict(
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
             p[CURRENT, k] *= keep_c
+            p[EDDY, k] *= keep_e
         for k in range(STATES):
             new = (
                 l_l * p[k, LN_U] + l_a * p[k, LN_A] + l_o * p[k, OPEN]
@@ -220,16 +226,20 @@ def predict(
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
             p[k, CURRENT] *= keep_c
+            p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
             p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
-        # the wind that she meets falls less than her own way
-        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * a * max(a, f[FIRST_A])
+        # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
+        first = f[FIRST_A]
+        gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
         lagged = keep_f * x[LAG] - u * change
@@ -241,6 +251,7 @@ def predict(
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
         x[CURRENT] *= keep_c
+        x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
     f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
@@ -347,7 +358,8 @@ def _driving(
     else:
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
-    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    # with fewer turns a metre it drives nothing
+    f[REVS] = min(max(f[REVS], 1.0 / _S), max(1.0 / at, 1.3) if several else 1.3)
     if not settled:  # on its way to the level, or one of several that turns as before
         least = 0.0 if several else min(0.8 * math.exp(x[OPEN] - log_first), 0.9)
         density = 0.5 * density + (0.5 / (1.1 - least) if least < nu < 1.1 else 0.0)
@@ -410,7 +422,7 @@ def _shaft(
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
-    if low < -0.05:
+    if low < _REVERSED:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
     if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
@@ -488,7 +500,8 @@ def _by_shafts(
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
     shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
-    gained = n.SHAFT_TEMPER * shown
+    # a slow error of revs does not turn their sign
+    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
     if young and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
@@ -527,7 +540,7 @@ def weigh(
             continue
         if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
             wide = 1.5 * math.hypot(noise[N_LOG], noise[N_WANDER])
-            wide = wide if which == LOG else noise[N_GROUND]
+            wide = wide if which == LOG else math.hypot(noise[N_GROUND], noise[N_EDDY])
             gained += _untrue(f, STAYS, said[which], wide, bad)
             continue
         u = math.exp(x[LN_U])
@@ -541,8 +554,8 @@ def weigh(
             h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
             expected += x[WANDER] + longer * lags
         else:
-            h[CURRENT] = 1.0
-            expected += x[CURRENT] - setting.pace * _GROUND_LAG_S * slowing
+            h[CURRENT] = h[EDDY] = 1.0
+            expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
