@@ -214,7 +214,9 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
     pushed = bank.what[i, last] == LEVEL
     if pushed == pushes(bank, i, now_s):
         return
-    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+    if pushed and bank.ramp[i, last] == 0.0:  # by the level as it is known now, not yet
+        w[COUNT] = last
+    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
         bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
         w[GLIDED] = 1
     elif not pushed and w[COUNT] < SWITCHES:

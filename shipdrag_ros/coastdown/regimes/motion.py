@@ -80,6 +80,8 @@ _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
 _ROOT = math.sqrt(2.0 * math.pi)
+_WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
+_LONGEST = 2.0
 _REVERSED = -0.05  # of the steady revs
 
 
@@ -269,7 +271,7 @@ def _take(
     bad: float,
     least: float,
 ) -> float:
-    """Update by one reading, good or bad; return its log density."""
+    """Update by one reading, as usual, of more scatter, or bad; return its log density."""
     total = variance
     for j in range(STATES):
         row = 0.0
@@ -278,16 +280,18 @@ def _take(
                 row += p[j, k] * h[k]
         work[0, j] = row
         total += h[j] * row
-    good = (1.0 - n.BAD) * math.exp(-0.5 * off * off / total) / (_ROOT * math.sqrt(total))
-    density = good + n.BAD * bad
-    share = good / density
-    if share > 1e-6:
-        around = share * (1.0 - share) * off * off / total
+    wider = total + (_WIDER * _WIDER - 1.0) * variance
+    usual = (1.0 - n.BAD - _WIDE) * math.exp(-0.5 * off * off / total) / math.sqrt(total)
+    wide = _WIDE * math.exp(-0.5 * off * off / wider) / math.sqrt(wider)
+    density = (usual + wide) / _ROOT + n.BAD * bad
+    usual, wide = usual / (_ROOT * density), wide / (_ROOT * density)
+    if usual + wide > 1e-6:
+        gain = usual / total + wide / wider
+        around = (usual / total**2 + wide / wider**2 - gain * gain) * off * off
         for j in range(STATES):
-            gain = work[0, j] / total
-            x[j] += share * gain * off
+            x[j] += gain * work[0, j] * off
             for k in range(j + 1):
-                p[j, k] += (around - share) * gain * work[0, k]
+                p[j, k] += (around - gain) * work[0, j] * work[0, k]
                 p[k, j] = p[j, k]
         x[LN_U] = max(x[LN_U], least)
     return math.log(density)
@@ -469,6 +473,15 @@ def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> Non
         bank.at[i, w[COUNT] - 1], bank.ramp[i, w[COUNT] - 1] = f[SINCE], f[RAMP_S]
 
 
+@compiled(inline=True, uncounted=True)
+def _forget(x: Float64, p: Float64, which: int, mean: float, var: float) -> None:
+    """Give a state its prior again."""
+    x[which] = mean
+    for k in range(STATES):
+        p[which, k] = p[k, which] = 0.0
+    p[which, which] = var
+
+
 @compiled(uncounted=True)
 def _by_way(
     bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
@@ -485,10 +498,8 @@ def _by_way(
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
     gained = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull.first - 1.0)
-    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
-        for k in range(STATES):
-            p[WAY, k] = p[k, WAY] = 0.0
-        p[WAY, WAY] = 1e4
+    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
+        _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
     return gained
 
 
@@ -510,15 +521,6 @@ def _by_shafts(
     _thrust_seen(bank, i, said[GONE], now_s - 1.5 * step_s)
     _stop_seen(bank, i, said[HIGH], now_s, step_s)
     return float(gained)
-
-
-@compiled(inline=True, uncounted=True)
-def _forget(x: Float64, p: Float64, which: int, mean: float, var: float) -> None:
-    """Give a state its prior again."""
-    x[which] = mean
-    for k in range(STATES):
-        p[which, k] = p[k, which] = 0.0
-    p[which, which] = var
 
 
 @compiled(uncounted=True)
@@ -550,8 +552,9 @@ def weigh(
         expected = u + f[MEAN_U]
         sd = noise[N_LOG]
         if which == LOG:
-            longer, lags = math.exp(min(max(x[LONGER], -3.0), 3.0)), x[LAG] + f[MEAN_LAG]
-            h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
+            longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
+            h[WANDER], h[LAG] = 1.0, longer
+            h[LONGER] = longer * lags if x[LONGER] < _LONGEST else 0.0
             expected += x[WANDER] + longer * lags
         else:
             h[CURRENT] = h[EDDY] = 1.0

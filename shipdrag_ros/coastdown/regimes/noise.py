@@ -29,6 +29,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_WANDER,
     N_WANDER_S,
     NOISES,
+    RANGES,
     RATE,
     BankSetting,
 )  # fmt: skip
@@ -58,6 +59,9 @@ class NoiseFilters(NamedTuple):
         Last readings; mean size of their differences.
     seen : (4,) int64
         Readings.
+    coarse : (2, 2)
+        Of log and speed over ground: share of bins in which every second reads the same, and mean
+        range of the seconds of the others: what the display rounds to, where most are the same.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
     queue : (delay, NOISES)
@@ -72,6 +76,7 @@ class NoiseFilters(NamedTuple):
     last: Float64
     jump: Float64
     seen: Int64
+    coarse: Float64
     rate: Float64
     queue: Float64
     used: Float64
@@ -90,6 +95,7 @@ class NoiseFilters(NamedTuple):
             np.full((4, 2), np.nan),
             np.zeros(4),
             np.zeros(4, np.int64),
+            np.zeros((2, 2)),
             np.zeros(2),
             np.tile(first, (_DELAY, 1)),
             first,
@@ -124,6 +130,8 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
         value = said[LOG] - said[GROUND] if which == _APART else value
         if not np.isnan(value):
+            if which < GROUND + 1:
+                _coarse(noise, which, said[RANGES + which], driven)
             _one(noise, setting, which, value, driven)
     if not np.isnan(said[RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
@@ -140,6 +148,30 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
     young = max(noise.seen[0], noise.seen[1], noise.seen[2]) < _DELAY
     for k in range(NOISES):
         noise.used[k] = newest[k] if young else slot[k]
+
+
+@compiled(inline=True, uncounted=True)
+def _coarse(noise: NoiseFilters, which: int, spread: float, driven: float) -> None:
+    """Learn what a display rounds to."""
+    seen, coarse = noise.seen[which], noise.coarse[which]
+    gain = driven / min(seen + 1.0, n.MEMORY_S / n.BIN_S)
+    if spread > 0.0:
+        first = coarse[1] == 0.0
+        coarse[1] += (1.0 if first else min(gain / (1.0 - coarse[0] + gain), 1.0)) * (spread - coarse[1])
+    coarse[0] += gain * ((0.0 if spread > 0.0 else 1.0) - coarse[0])
+
+
+@compiled(inline=True, uncounted=True)
+def _rounding_of(noise: NoiseFilters, which: int) -> float:
+    return float(noise.coarse[which, 0] * noise.coarse[which, 1] / math.sqrt(12.0))
+
+
+@compiled(inline=True, uncounted=True)
+def _rounding(noise: NoiseFilters, which: int) -> float:
+    """Return the sd of what a display takes from readings: less, the more they scatter."""
+    if which == _APART:
+        return math.hypot(_rounding_of(noise, 0), _rounding_of(noise, 1))
+    return _rounding_of(noise, which) if which < _APART - 1 else 0.0
 
 
 @compiled(uncounted=True)
@@ -229,7 +261,7 @@ def _filter(
     p[3, 3] += (1.0 - keep_b * keep_b) * wander * wander
     p[4, 4] += walk * walk * dt
     first, second = (4, 4) if which == 2 else (0, 3)
-    variance = (white * spread) ** 2 + 1e-12
+    variance = (white * spread) ** 2 + _rounding(noise, which) ** 2 + 1e-12
     off = -x[4] if which == 2 else value - x[0] - x[3]
     gain = work[_STATES]
     total = variance
@@ -283,7 +315,7 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
         spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
         step = setting.step_s if which == 2 else 1.0
         spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
-        white = math.exp(w / total) * spread
+        white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
         if which == 0:

@@ -43,7 +43,8 @@ WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
 GONE = 10  # when revs over speed fell through those without thrust [s since the start]
-SAID = 11
+RANGES = 11  # and that after it: range of the seconds of log and of speed over ground
+SAID = 13
 
 # noise in use: gust over resistance, sd and time of the slow error of log and speed over ground,
 # white noise of log, speed over ground and fixes, their walk, sd of the rate of turn
