@@ -445,7 +445,7 @@ def _shaft(
         else:
             density = _dragged(f, kind, nu, u_part)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
-            density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
+            density = 0.1 * density + (0.9 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
 
 
