@@ -111,6 +111,8 @@ def diagnose_runs(
     found = with_whole_glides(
         alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
     )
+    unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
+    found = replace(found, notes=(*found.notes, *unused))
     if seen.whole:
         found = replace(found, no_coastdown=seen.no_coastdown, estimates=seen.estimates)
     return found, seen.ship
@@ -128,8 +130,7 @@ def _of_coastdowns(
         log_track = _sailing(runs, seen.no_coastdown, progress)
         return _unused(log_track, (*seen.ship.facts, *facts), earlier)
     found = _of_force(runs, seen, facts, earlier, progress)
-    unused = tuple(f'no coastdown was found {each}' for each in seen.without)
-    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
+    return replace(found, estimates=seen.estimates)
 
 
 def _of_force(

@@ -135,7 +135,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
         j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
         if j >= 0:
-            _glide(bank, j, setting.hull)
+            _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
     for k in range(len(n.RUN_DOWN_S)):
@@ -146,10 +146,11 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
+            bank.number[j, BEFORE] = x[OPEN]
+            _glide(bank, j, setting.hull)  # gusts and wind are parts of what the engine had to beat
             bank.whole[j, KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan
-            bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
             x[POWER] += tied * n.DRAGGED[kind]
@@ -157,7 +158,6 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
-            _glide(bank, j, setting.hull)
 
 
 @compiled(uncounted=True)
