@@ -138,16 +138,20 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
-    for k in range(len(n.RUN_DOWN_S)):
+    last = bank.whole[i, COUNT] - 1
+    idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
+    for k in range(1 if idles else len(n.RUN_DOWN_S)):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
-            part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
+            part = chance * (1.0 if idles else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
+            if idles:  # it is the same glide
+                bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
             bank.number[j, BEFORE] = x[OPEN]
-            _glide(bank, j, setting.hull)  # gusts and wind are parts of what the engine had to beat
+            _glide(bank, j, setting.hull)  # gusts: parts of what the engine beat
             bank.whole[j, KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan

@@ -81,7 +81,7 @@ _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
 _ROOT = math.sqrt(2.0 * math.pi)
 _WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
-_LONGEST = 2.0
+_LONGEST = math.log(float(n.LOG_LAG_MOST) / _LAG_S)
 _REVERSED = -0.05  # of the steady revs
 
 
@@ -445,7 +445,7 @@ def _shaft(
         else:
             density = _dragged(f, kind, nu, u_part)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
-            density = 0.1 * density + (0.9 if nu < 1.1 else 0.0)
+            density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
 
 
@@ -455,6 +455,8 @@ def _stop_seen(bank: Histories, i: int, nu: float, now_s: float, step_s: float) 
     f, w = bank.number[i], bank.whole[i]
     first_s = now_s - 0.5 * step_s
     if w[REGIME] != GLIDE or w[KIND] >= HELD or w[COUNT] == 0 or f[SINCE] != first_s:
+        return
+    if bank.at[i, w[COUNT] - 1] != first_s:  # she glided before
         return
     later = step_s * min(max(1.0 - 2.5 * (1.0 - nu), 0.0), 1.0)
     f[SINCE] += later
@@ -467,7 +469,7 @@ def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> Non
     f, w = bank.number[i], bank.whole[i]
     if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] >= HELD:
         return
-    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0:
+    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0 and bank.at[i, w[COUNT] - 1] == f[SINCE]:
         f[SINCE] = min(f[SINCE], gone_s - 0.1)
         f[RAMP_S] = gone_s - f[SINCE]
         bank.at[i, w[COUNT] - 1], bank.ramp[i, w[COUNT] - 1] = f[SINCE], f[RAMP_S]

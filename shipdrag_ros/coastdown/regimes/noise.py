@@ -61,7 +61,7 @@ class NoiseFilters(NamedTuple):
         Readings.
     coarse : (2, 2)
         Of log and speed over ground: share of bins in which every second reads the same, and mean
-        range of the seconds of the others: what the display rounds to, where most are the same.
+        range of the seconds of a bin.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
     queue : (delay, NOISES)
@@ -130,7 +130,7 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
         value = said[LOG] - said[GROUND] if which == _APART else value
         if not np.isnan(value):
-            if which < GROUND + 1:
+            if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
             _one(noise, setting, which, value, driven)
     if not np.isnan(said[RATE]):
@@ -152,26 +152,26 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
 
 @compiled(inline=True, uncounted=True)
 def _coarse(noise: NoiseFilters, which: int, spread: float, driven: float) -> None:
-    """Learn what a display rounds to."""
-    seen, coarse = noise.seen[which], noise.coarse[which]
-    gain = driven / min(seen + 1.0, n.MEMORY_S / n.BIN_S)
-    if spread > 0.0:
-        first = coarse[1] == 0.0
-        coarse[1] += (1.0 if first else min(gain / (1.0 - coarse[0] + gain), 1.0)) * (spread - coarse[1])
-    coarse[0] += gain * ((0.0 if spread > 0.0 else 1.0) - coarse[0])
+    """Learn how often the seconds of a bin read the same, and their mean range."""
+    coarse = noise.coarse[which]
+    gain = driven / min(noise.seen[which] + 1.0, n.MEMORY_S / n.BIN_S)
+    coarse[0] += gain * ((1.0 if spread == 0.0 else 0.0) - coarse[0])
+    coarse[1] += gain * (spread - coarse[1])
 
 
 @compiled(inline=True, uncounted=True)
 def _rounding_of(noise: NoiseFilters, which: int) -> float:
-    return float(noise.coarse[which, 0] * noise.coarse[which, 1] / math.sqrt(12.0))
+    """Return the sd of what a display rounds off: less, the more often its readings differ."""
+    same, spread = noise.coarse[which]
+    return float(same * spread / ((1.0 - same) * math.sqrt(12.0))) if spread > 0.0 else 0.0
 
 
 @compiled(inline=True, uncounted=True)
 def _rounding(noise: NoiseFilters, which: int) -> float:
-    """Return the sd of what a display takes from readings: less, the more they scatter."""
+    """Return that of an instrument, or of the log less the speed over ground."""
     if which == _APART:
-        return math.hypot(_rounding_of(noise, 0), _rounding_of(noise, 1))
-    return _rounding_of(noise, which) if which < _APART - 1 else 0.0
+        return math.hypot(_rounding_of(noise, LOG), _rounding_of(noise, GROUND))
+    return _rounding_of(noise, which) if which <= GROUND else 0.0
 
 
 @compiled(uncounted=True)
