@@ -4,6 +4,7 @@ What `shipdrag learn` makes of effects that the library lacks, on ships that sha
 
     python -m benchmarks.accuracy.learn_strangers --show kelp_below
     python -m benchmarks.accuracy.learn_strangers --ships 8 --runs 4
+    python -m benchmarks.accuracy.learn_strangers --ships 100 --only none
     python -m benchmarks.accuracy.learn_strangers --table
 
 `--show` is the whole way with one stranger: diagnosed, learnt, the gap on a run that was kept,
@@ -73,9 +74,11 @@ def write_run(case: world.Case, run: int, folder: Path) -> str:
     return str(path)
 
 
-def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
+def foretold(case: world.Case, run: int, term: LearntTerm) -> tuple[float, float, float]:
     """
-    Return which part of what a stranger does to the speed, without noise, a term foretells.
+    Return what a term foretells of what a stranger does to the speed, without noise.
+
+    First which part of the rms is gone, then the size over the true one, and its sd.
     """
     t, log, ground, _ = case.shown(run)
     ship, setting = Ship.from_yaml(case.ship_file, subject='ship'), case.settings[run]
@@ -87,15 +90,21 @@ def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
         depth_m=setting.depth_m,
         day=(EPOCH_NS * 1e-9 + setting.clock_s) / 86400.0,
     )
-    sizes = [q.value for q in term.parameters.values()]
-    acting = declared(term).action(Frame(ship, scenario, setting.first_rad), *sizes)
+    sizes = np.array([q.value for q in term.parameters.values()])
+    variance, across = np.linalg.eigh(np.array(term.covariance))
+    off = (across * np.sqrt(np.maximum(variance, 0.0))).T
+    frame = Frame(ship, scenario, setting.first_rad)
+    actions = [
+        declared(term).action(frame, *each) for each in (sizes, *(sizes + off), *(sizes - off))
+    ]
     time_s = np.clip(t + 60.0, 0.0, scenario.length_s)
-    read = simulate_columns(ship, scenario, [Action(), acting], time_s)
-    change = np.concatenate(
-        [speed[1] - speed[0] for speed in (read.log_m_s, read.speed_through_water_m_s)]
-    )
-    gap = np.concatenate([log, ground])
-    return 1.0 - float(np.sqrt(np.mean((gap - change) ** 2) / np.mean(gap**2)))
+    read = simulate_columns(ship, scenario, [Action(), *actions], time_s)
+    speeds = np.hstack([read.log_m_s, read.speed_through_water_m_s])
+    changes, gap = speeds[1:] - speeds[0], np.concatenate([log, ground])
+    size, *others = changes @ gap / (gap @ gap)
+    more, less = np.split(np.array(others), 2)
+    gone = 1.0 - np.sqrt(np.mean((gap - changes[0]) ** 2) / np.mean(gap**2))
+    return float(gone), float(size), float(np.linalg.norm(0.5 * (more - less)))
 
 
 def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
@@ -122,6 +131,7 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
             'reason': found['reason'],
             'probability': {k: round(p, 3) for k, p in found['probability'].items() if p > 0.01},
             'cut': 0.0,
+            'size': None,
             'alone': [alone['verdict'], [each['name'] for each in alone['effects']]],
             'later': None,
         }
@@ -132,7 +142,8 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
         result['parameters'] = {k: [q.value, q.sd] for k, q in term.parameters.items()}
         result['evidence'] = found['learnt']['evidence']
         if stranger:
-            result['cut'] = round(gap_cut(case, world.KEPT, term), 3)
+            cut, *size = foretold(case, world.KEPT, term)
+            result |= {'cut': round(cut, 3), 'size': [round(each, 3) for each in size]}
         if show:
             print(file.read_text())
             print(f'gap of a run that was kept: {result["cut"]:.0%} gone')
@@ -168,12 +179,15 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
         yield _line('the twelve: another form', wrong)
         yield _line('the others: a form written', [row['kind'] is not None for row in other])
         yield _line('without a stranger: a form written', [r['kind'] is not None for r in empty])
+        sizes = [abs(row['size'][0] - 1.0) <= 2.0 * row['size'][1] for row in written]
+        yield _line('written: size right within 2 sd, on that run', sizes)
         yield _line('90 % of the gap of a run that was kept gone', cut)
         yield _line(
             'written, and named in a later run', [r['later'][1] == [NAME] for r in written]
         )
-        alone = [row['alone'][0] == 'named' for row in (*plain, *other)]
-        yield _line('one run diagnosed alone: a name, which is wrong', alone)
+        alone = [[row['alone'][0] == 'named' for row in some] for some in (plain + other, empty)]
+        yield _line('one run diagnosed alone: a name, which is wrong', alone[0])
+        yield _line('without a stranger: one run, a name', alone[1])
         yield f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}'
         for row in sorted(mine, key=lambda row: (row['stranger'], row['ship'])):
             kind = ' '.join(row['kind'] or ['-'])

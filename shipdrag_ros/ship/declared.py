@@ -31,7 +31,7 @@ from shipdrag_ros.fields import (
 )
 from shipdrag_ros.parameter import Prior, Shape, log_normal, normal
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.expression import PURE, Formula, Unit, Units, Values
+from shipdrag_ros.ship.expression import NEWTON, PURE, Formula, Unit, Units, Values
 from shipdrag_ros.ship.sections import GRAVITY_M_S2
 
 SCOPES = ('hull', 'earth', 'sensor', 'run')
@@ -43,7 +43,6 @@ VARIABLES = {'speed': 'u', 'time': 't', 'heading': 'psi', 'date': 'd', 'depth': 
 _SPEED: Unit = (0.0, 1.0, -1.0)
 _LENGTH: Unit = (0.0, 1.0, 0.0)
 _TIME: Unit = (0.0, 0.0, 1.0)
-_FORCE: Unit = (1.0, 1.0, -2.0)
 _MASS: Unit = (1.0, 0.0, 0.0)
 _GAIN: Unit = (0.0, 1.0, -2.0)
 UNITS: Mapping[str, Unit] = {
@@ -54,7 +53,7 @@ UNITS: Mapping[str, Unit] = {
     'm/s': _SPEED,
     'm/s2': _GAIN,
     'kg': _MASS,
-    'N': _FORCE,
+    'N': NEWTON,
 }
 
 
@@ -80,7 +79,7 @@ class TermChannel(NamedTuple):
 
 
 CHANNELS: Mapping[str, TermChannel] = {
-    'force': TermChannel({_FORCE: 1e8}, ('speed', 'time', 'heading', 'date', 'depth'), 'ut'),
+    'force': TermChannel({NEWTON: 1e8}, ('speed', 'time', 'heading', 'date', 'depth'), 'ut'),
     'water': TermChannel({_SPEED: 50.0}, ('speed', 'time'), 't', is_vector=True),
     'air': TermChannel({_SPEED: 200.0}, is_vector=True),
     'log': TermChannel({_SPEED: 50.0, PURE: 10.0}, ('speed', 'time'), 'ut'),
@@ -133,9 +132,9 @@ NAMES: Mapping[str, FormulaName] = {
     'T_M': FormulaName(_LENGTH, 7.0, (0.01, 0.3), 1),
     'D_P': FormulaName(_LENGTH, 5.0, (0.005, 0.2), 1),
     'n_r': FormulaName(PURE, 0.1, (0.0, 1.0)),
-    'R_T': FormulaName(_FORCE, 3e5, (0.0, 1e10)),
-    'R_V': FormulaName(_FORCE, 2e5, (0.0, 1e10)),
-    'R_F': FormulaName(_FORCE, 2e5, (0.0, 1e10)),
+    'R_T': FormulaName(NEWTON, 3e5, (0.0, 1e10)),
+    'R_V': FormulaName(NEWTON, 2e5, (0.0, 1e10)),
+    'R_F': FormulaName(NEWTON, 2e5, (0.0, 1e10)),
     'u': FormulaName(_SPEED, 5.0, _even(0.0, 20.0, 16)),
     't': FormulaName(_TIME, 500.0, _even(0.0, 86400.0, 8)),
     't_end': FormulaName(_TIME, 1000.0, (1.0, 86400.0)),

@@ -125,8 +125,8 @@ class Formula:
 def _tree(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise FormulaError(f'has {len(text)} characters, at most {LONGEST} are read')
-    if not text.isascii() or not text.isprintable():
-        raise FormulaError('holds characters that are no plain text')
+    if not text.isascii() or not text.isprintable() or '#' in text:
+        raise FormulaError('holds characters that are no plain text, or a comment')
     try:
         return ast.parse(text.strip(), mode='eval').body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
@@ -212,6 +212,7 @@ def _literal(node: ast.expr) -> float | None:
 Unit = tuple[float, float, float]
 """Exponents of kilogram, metre and second."""
 PURE: Unit = (0.0, 0.0, 0.0)
+NEWTON: Unit = (1.0, 1.0, -2.0)
 
 
 class Units:
@@ -270,6 +271,8 @@ def unit_text(unit: Unit) -> str:
     """
     Return a unit in words.
     """
+    if unit == NEWTON:
+        return 'N'
     parts = [
         name if power == 1.0 else f'{name}^{power:g}'
         for name, power in zip(('kg', 'm', 's'), unit, strict=True)

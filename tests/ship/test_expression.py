@@ -19,6 +19,7 @@ from shipdrag_ros.ship.expression import (
     Ranges,
     Units,
     Values,
+    unit_text,
 )
 
 NUMBERS = st.floats(0.1, 9.0).map(lambda value: f'{value:.3f}')
@@ -147,6 +148,14 @@ def test_what_is_no_formula_is_refused(text: str) -> None:
         Formula.parse(text).walk(Ranges(), box)
 
 
+@given(text=FORMULAS, place=st.integers(0, 99), said=st.text(max_size=9))
+@settings(max_examples=100, deadline=None)
+def test_a_formula_has_no_comment(text: str, place: int, said: str) -> None:
+    place = min(place, len(text))
+    with pytest.raises(FormulaError):
+        Formula.parse(f'{text[:place]}#{said}{text[place:]}')
+
+
 @pytest.mark.parametrize(
     'text', ['1/(a - 1.5)', 'sqrt(a - 1.5)', '(a - 1.5)**0.5', 'a**(0 - b*0 - 40*a)*0/0']
 )
@@ -160,6 +169,7 @@ def test_units_are_joined_and_refused() -> None:
     units = {'u': (0.0, 1.0, -1.0), 'g': (0.0, 1.0, -2.0), 'L': (0.0, 1.0, 0.0)}
     assert Formula.parse('u/sqrt(g*L)').walk(Units(), units) == PURE
     assert Formula.parse('L**(2/3)').walk(Units(), units)[1] == pytest.approx(2 / 3)
+    assert unit_text(Formula.parse('m*g').walk(Units(), units | {'m': (1.0, 0.0, 0.0)})) == 'N'
     for wrong in ('u + g', 'exp(u)', 'step(u, 1)', 'u**L', 'min(u, L)', 'cos(L)', '2**u'):
         with pytest.raises(FormulaError):
             Formula.parse(wrong).walk(Units(), units)
