@@ -335,10 +335,12 @@ class Monitor:
     def _wake(self, source: int, number: int) -> None:
         """Let the regimes take the record, from some minutes before a second on."""
         self._memory.watch.source[0] = source
-        width = RegimeFilter.width(self._parameters.slope_window_s)
+        width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
         self._regimes = RegimeFilter.woken(
             self._vouching.sound(self._memory.bins), self._ship, width, number
         )
+        if before is not None:
+            self._regimes.tell(before.told_s)
 
     def _follow(self) -> list[Event]:
         """Let the regimes take all bins of the source watched that are whole."""
@@ -357,6 +359,8 @@ class Monitor:
                 return []
             events = self._end_glide(regimes, number, EndedBy.SPEED if slow else None)
             return events + (self._rest(regimes, number) if slow else [])
+        if slow and not regimes.caught_up:  # long ago: she has sailed since
+            return []
         if slow or regimes.asleep:
             return self._rest(regimes, number)
         if regimes.gliding < announce:

@@ -139,6 +139,15 @@ def test_of_several_shafts_the_last_that_stops_counts(ship, record, apart_s) -> 
     assert -1.0 <= (ended.start_ns - START_NS) / S - 900.0 - apart_s <= 10.0
 
 
+def test_a_ship_that_was_slow_a_while_before_is_judged_still(ship, record) -> None:
+    block = record(sensors=(LOG,), seed=1)
+    since_s = (block.stamp_ns - START_NS) / S
+    under_way = np.clip((since_s - 100.0) / 200.0, 0.1, 1.0)[:, np.newaxis]
+    events = events_of(ship, replace(block, value=block.value * under_way))
+    (ended,) = [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+    assert abs(ended.start_ns - START_NS - 905 * S) < 10 * S
+
+
 def test_positions_are_believed_beside_a_log_that_says_nothing_true(ship, record) -> None:
     block = record(sensors=(LOG, TRACK), seed=3)
     is_log = block.channel == Channel.SPEED_THROUGH_WATER
@@ -187,6 +196,18 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
     (late, _), (soon, start_ns) = starts[0][0], starts[1][0]
     assert abs(start_ns - START_NS - 900 * S) < 15 * S
     assert soon < late
+
+
+@pytest.mark.parametrize('lead_s', [300.0, 600.0])
+def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(ship, record, lead_s) -> None:
+    block = record(sensors=(LOG,), seed=2, lead_in_s=lead_s)
+    at = int(np.searchsorted(block.stamp_ns, START_NS + round((lead_s + 5.0) * S)))
+    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+    events = monitor.update(block[:at])
+    assert monitor.engine_stopped(int(block.receive_ns[at - 1])) == ''
+    events += [*monitor.update(block[at:]), *monitor.finish()]
+    (ended,) = of(EndedCoastdown, events)
+    assert abs(ended.start_ns - START_NS - (lead_s + 5.0) * S) < 10 * S
 
 
 def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:

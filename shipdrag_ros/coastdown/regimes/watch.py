@@ -160,6 +160,8 @@ class RegimeFilter:
         self._next += 1
         if self._bank.histories.clock[0] == 0:
             self._first = self._next
+            told_s = self._setting.told_s - self._width  # of a first bin that is later by one
+            self._setting = self._setting._replace(told_s=told_s)
             return True
         self._out.append(self._bank.out.copy())
         self._low.append(float(self._bank.said[LOW]))
@@ -172,6 +174,16 @@ class RegimeFilter:
         Take it from a person that the engine was stopped [s since the epoch].
         """
         self._setting = self._setting._replace(told_s=stop_s - self._zero_s)
+
+    @property
+    def told_s(self) -> float:
+        """The stop that a person told [s since the epoch]; NaN where nobody did."""
+        return self._setting.told_s + self._zero_s
+
+    @property
+    def caught_up(self) -> bool:
+        """Whether the record before it was woken has been taken."""
+        return self._next * self._width > self._woken
 
     @property
     def step_s(self) -> float:
