@@ -27,6 +27,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDED,
     GONE,
     GROUND,
+    GUST_A,
     HIGH,
     LEVEL,
     LIAR,
@@ -35,6 +36,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOG,
     LONGER,
     LOW,
+    N_FIX,
     OPEN,
     P0,
     P_VAR,
@@ -150,13 +152,14 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
-            p[WAY, WAY] = 1e4
+            x[WAY] = 0.5 * setting.step_s * speed
+            p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
-            f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+            f[FIRST_A] = f[GUST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
             if regime == DRIVEN:
                 x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
@@ -185,7 +188,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
             said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
             said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
         if learns:
-            revs[k] += gain * (value - revs[k])
+            revs[k] += (gain if revs[k] != 0.0 else 1.0) * (value - revs[k])
             learnt = True
     said[GONE] = np.nan
     if not np.isnan(said[HIGH]) and speed > 0.0:
@@ -245,8 +248,8 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
                 out[P_GLIDING] += share
             else:
                 out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
-            if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
-                out[P_EVEN] += share
+                if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                    out[P_EVEN] += share
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
             out[P_RUN_DOWN if running else P_GLIDING] += share

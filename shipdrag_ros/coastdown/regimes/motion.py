@@ -26,6 +26,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GONE,
     GROUND,
     GUST,
+    GUST_A,
     HELD,
     HIGH,
     KIND,
@@ -83,6 +84,7 @@ _ROOT = math.sqrt(2.0 * math.pi)
 _WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
 _LONGEST = math.log(float(n.LOG_LAG_MOST) / _LAG_S)
 _REVERSED = -0.05  # of the steady revs
+_MOST = 2.5  # ln of the speed that a thrust balances over that of now
 
 
 @compiled(inline=True, uncounted=True)
@@ -124,7 +126,7 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
     share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
     target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
     free = f[FREE] if w[KIND] == 1 else 0.0
-    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
+    rho = _advance(math.exp(min(target - x[LN_U], _MOST)), free)[0]
     return bool(rho * n.NO_THRUST > 1.0)
 
 
@@ -142,7 +144,7 @@ def _force(
         elif regime == LEVEL:
             share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
             target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), free)
+        rho, by_target = _advance(math.exp(min(target - x[LN_U], _MOST)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
         left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
@@ -184,7 +186,6 @@ def predict(
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
-    keep_c = math.exp(-dt / (n.CURRENT_S * pace))
     keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
@@ -214,7 +215,6 @@ def predict(
             p[LAG, k] = work[3, k]
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
-            p[CURRENT, k] *= keep_c
             p[EDDY, k] *= keep_e
         for k in range(STATES):
             new = (
@@ -227,7 +227,6 @@ def predict(
             p[k, LN_U], p[k, WAY] = new, way
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
-            p[k, CURRENT] *= keep_c
             p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
@@ -236,11 +235,13 @@ def predict(
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
-        first = f[FIRST_A]
-        gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
+        full, now = f[GUST_A], a
+        if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
+            now = min(a, full)
+        gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
-        p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[CURRENT, CURRENT] += 2.0 * n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
         p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
@@ -252,7 +253,6 @@ def predict(
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
-        x[CURRENT] *= keep_c
         x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
@@ -355,7 +355,7 @@ def _driving(
     at = math.exp(min(target - log_first, 1.0))
     if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
         free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
-        at = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0] * u_part
+        at = _advance(math.exp(min(target - x[LN_U], _MOST)), free)[0] * u_part
     if np.isnan(f[REVS]):
         density = _normal(nu - at, n.SHAFT_FIRST_SD)
         f[REVS] = nu / at
@@ -565,6 +565,9 @@ def weigh(
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
         gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
+    else:  # the next fix begins the way anew
+        way = 0.5 * setting.step_s * (math.exp(x[LN_U]) + x[CURRENT])
+        _forget(x, p, WAY, way, noise[N_FIX] ** 2)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way

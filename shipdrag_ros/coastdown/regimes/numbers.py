@@ -134,7 +134,12 @@ RUN_DOWN_S = _grid('RUN_DOWN_S', (3.0, 10.0, 24.0, 60.0), 's', 'fuel cut, pitch,
 RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.55, 0.22, 0.18, 0.05), '1', 'short by default')
 RUN_DOWN_FILE_SD = _number('RUN_DOWN_FILE_SD', 0.5, 'ln', 'of what a ship file says of it')
 LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a telegraph')
-LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
+LEVELS_SHARE = _grid(
+    'LEVELS_SHARE',
+    (0.1, 0.27, 0.23, 0.2, 0.1, 0.05, 0.05),
+    '1',
+    'of these, and of any speed that she sails at',
+)
 LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')
 LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
