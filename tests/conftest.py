@@ -46,7 +46,6 @@ from shipdrag_ros.ship import Ship
 settings.register_profile(
     'repeatable',
     derandomize=True,
-    max_examples=60,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )

@@ -46,7 +46,7 @@ def test_repeated_keys_are_reported_with_their_lines():
         Ship.from_yaml(text + 'displaced_volume_m3: 3', subject='test')
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(
     st.recursive(
         st.none()
@@ -95,7 +95,7 @@ def test_twenty_levels_are_read():
     assert strict_yaml.load('[' * 20 + ']' * 20) == eval('[' * 20 + ']' * 20)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(st.text(alphabet='ab:-[]{}&*!|>\'"#%@`, \n\t1.e~?', max_size=30))
 def test_no_text_does_more_than_be_refused(text):
     try:

@@ -16,7 +16,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import Block, concatenate
 
 EXAMPLES = settings(
-    max_examples=75, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

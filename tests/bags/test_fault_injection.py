@@ -422,7 +422,7 @@ def test_a_key_without_its_value_is_damage(samples: dict[str, Sample], tmp_path:
 
 
 @settings(
-    max_examples=75,
+    max_examples=150,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

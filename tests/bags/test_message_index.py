@@ -87,7 +87,7 @@ RECORDS = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(st.lists(st.lists(RECORDS, max_size=6).map(b''.join), min_size=1, max_size=3))
 def test_any_records_are_found_as_plain_python_finds_them(segments: list[bytes]) -> None:
     check(segments)

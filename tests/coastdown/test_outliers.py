@@ -36,7 +36,7 @@ def coasting(time_s, speed, start_s):
     return speed / (1.0 + min(0.06, 0.15 * speed) / speed * slowed)
 
 
-@settings(max_examples=75, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     rate=RATES,
     speed=st.floats(0.1, 20.0),
@@ -57,7 +57,7 @@ def test_a_clean_record_is_kept_whole(rate, speed, noise, quantum, seed) -> None
         assert np.all(found == Reason.ACCEPTED)
 
 
-@settings(max_examples=75, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     rate=RATES,
     speed=st.floats(2.0, 20.0),

@@ -190,7 +190,7 @@ def test_what_is_malformed_is_malformed_to_the_other_reader(
             assert Unreadable.MALFORMED not in decoded.unreadable
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(
     name=st.one_of(
         st.binary(max_size=6),

@@ -175,7 +175,7 @@ def test_a_pitch_alone_is_read(reference: Any) -> None:
     assert not decoded.unreadable
 
 
-@settings(max_examples=75, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     names=joint_names, velocity=numbers, position=numbers, stamp_ns=stamps, little=st.booleans()
 )

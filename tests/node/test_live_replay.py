@@ -121,7 +121,7 @@ def test_from_the_beginning(desk: Desk) -> None:
     assert len(figures) > 50
 
 
-@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, 3500.0])
+@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, 3500.0])
 def test_a_recording_that_starts_mid_run(desk: Desk, start_s: float) -> None:
     desk.feed(0, start_s)
     desk.recorder.start()

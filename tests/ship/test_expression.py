@@ -53,7 +53,7 @@ def worth(formula: Formula, **names: float) -> float:
 
 
 @given(text=FORMULAS, a=st.floats(0.2, 5.0), b=st.floats(-5.0, 5.0))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_a_formula_is_worth_what_python_says(text: str, a: float, b: float) -> None:
     formula = Formula.parse(text)
     with np.errstate(all='ignore'):
@@ -67,7 +67,7 @@ def test_a_formula_is_worth_what_python_says(text: str, a: float, b: float) -> N
 
 
 @given(text=FORMULAS, a=st.floats(0.2, 5.0), b=st.floats(-5.0, 5.0), wide=st.floats(0.0, 2.0))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_no_value_lies_outside_of_its_range(text: str, a: float, b: float, wide: float) -> None:
     formula = Formula.parse(text)
     box = {
@@ -85,7 +85,7 @@ def test_no_value_lies_outside_of_its_range(text: str, a: float, b: float, wide:
 
 
 @given(text=st.text(max_size=60))
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=500, deadline=None)
 def test_any_text_is_a_formula_or_a_plain_error(text: str) -> None:
     try:
         formula = Formula.parse(text)

@@ -214,13 +214,13 @@ def ship_or_refusal(text: str) -> None:
     assert Ship.from_yaml(ship.to_yaml(), subject='again') == ship
 
 
-@settings(max_examples=75, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.text(max_size=60) | st.text('length_m:{}[]&*!|>-#\n \'"0159.e', max_size=60))
 def test_any_text_is_a_ship_or_a_refusal(text):
     ship_or_refusal(text)
 
 
-@settings(max_examples=75, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(KEYS, JUNK, max_size=8))
 def test_any_values_are_a_ship_or_a_refusal(values):
     ship_or_refusal(yaml.safe_dump({'length_m': 150.0, 'displaced_volume_m3': 20200.0} | values))

@@ -468,7 +468,7 @@ PLAIN = st.recursive(
     ),
     value=PLAIN,
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=200, deadline=None)
 def test_any_value_of_a_key_passes_or_is_a_plain_error(key: str, value: Any) -> None:
     import io
 

@@ -375,7 +375,7 @@ def test_a_packed_table_that_is_cut_is_an_error(tmp_path: Path, content: bytes) 
 
 
 @settings(
-    max_examples=75, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(
     content=st.one_of(

@@ -333,7 +333,7 @@ def records(draw: st.DrawFn) -> tuple[Block, int]:
     return in_arrival_order(parts), draw(st.integers(-START_NS, 2**62))
 
 
-@settings(max_examples=75, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(records())
 def test_a_curve_or_a_reason_and_the_epoch_changes_no_bit(case: tuple[Block, int]) -> None:
     block, shift = case
