@@ -21,6 +21,7 @@ import io
 import json
 import os
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,6 +44,13 @@ from shipdrag_ros.simulation import Action, Scenario, simulate_columns
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import declared
 
+WHY = (
+    'no form is certain',
+    'something smooth',
+    'half of them',
+    'effects of the library',
+    'nothing is missing',
+)
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
 RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
@@ -188,7 +196,19 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
         alone = [[row['alone'][0] == 'named' for row in some] for some in (plain + other, empty)]
         yield _line('one run diagnosed alone: a name, which is wrong', alone[0])
         yield _line('without a stranger: one run, a name', alone[1])
-        yield f'CPU s: median {np.median([row["cpu_s"] for row in mine]):.0f}'
+        why = [
+            next(k for k in WHY if k in row['reason']) for row in plain + other if not row['kind']
+        ]
+        yield f'of {len(why)} of which nothing is written: ' + ', '.join(
+            f'{count} {text}' for text, count in Counter(why).most_common()
+        )
+        first = [
+            next(iter(row['probability']), '') == '{} by {} ({})'.format(*CURVES[row['stranger']])
+            for row in plain
+        ]
+        yield _line('the twelve: the right form is the likeliest', first)
+        cpu_s = [row['cpu_s'] for row in mine]
+        yield f'CPU s: median {np.median(cpu_s):.0f}, most {max(cpu_s):.0f}'
         for row in sorted(mine, key=lambda row: (row['stranger'], row['ship'])):
             kind = ' '.join(row['kind'] or ['-'])
             likeliest = next(iter(row['probability'].items()), ('-', 0.0))
