@@ -28,7 +28,6 @@ PARAMETERS = {
     'use_sim_time': True,
     'steady_s': 120.0,
     'slope_window_s': 30.0,
-    'confirm_s': 60.0,
     'window_s': 600.0,
     'forecast_speeds': [3.0, 1.5],
 }

@@ -35,7 +35,6 @@ LEAD_IN_S, COAST_S = 900.0, 900.0
 SETTINGS = {
     'steady_s': 600.0,
     'slope_window_s': 30.0,
-    'confirm_s': 60.0,
     'data_stop_s': 20.0,
     'update_s': 30.0,
 }
@@ -140,11 +139,12 @@ def test_monitor_hands_out_what_a_replay_reads_again() -> None:
     block = record()
     ended, window = coastdown_of(block)
     assert window.before is not None
+    assert ended.stop_ns is not None
     whole = Window.from_block(
         block,
-        ended.start_ns,
+        ended.stop_ns,
         ended.end_ns,
-        before_ns=ended.start_ns - round(PARAMETERS.steady_s * 1e9),
+        before_ns=ended.stop_ns - round(PARAMETERS.steady_s * 1e9),
     )
     for one, other in ((window, whole), (window.before, whole.before)):
         for name in STANDARD_INPUTS:

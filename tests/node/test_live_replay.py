@@ -37,10 +37,8 @@ from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SECOND_NS = 10**9
 LEAD_IN_S = 300.0
-DURATION_S = 400.0
-PARAMETERS = Parameters(
-    steady_s=120.0, slope_window_s=30.0, confirm_s=60.0, window_s=600.0, update_s=30.0
-)
+DURATION_S = 500.0
+PARAMETERS = Parameters(steady_s=120.0, slope_window_s=30.0, window_s=600.0, update_s=20.0)
 
 
 @cache

@@ -74,7 +74,7 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     FIT,
 ) = range(10)
 OUTS = 10  # and of even power, of the first one, mean speed, log predictive density
-_TURNING_RAD_S = 0.5  # a shaft below it drives no ship
+_TURNING_RAD_S = 0.05  # a shaft below it, times its pitch, drives no ship
 
 
 class Bank(NamedTuple):
@@ -180,7 +180,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
         value = said[SHAFTS + k]
         if np.isnan(value):
             continue
-        if known and abs(revs[k]) > _TURNING_RAD_S * 1e-3:
+        if known and abs(revs[k]) > _TURNING_RAD_S:
             nu = value / revs[k]
             said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
             said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
@@ -214,7 +214,9 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
     pushed = bank.what[i, last] == LEVEL
     if pushed == pushes(bank, i, now_s):
         return
-    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+    if pushed and bank.ramp[i, last] == 0.0:  # by the level as it is known now, not yet
+        w[COUNT] = last
+    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
         bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
         w[GLIDED] = 1
     elif not pushed and w[COUNT] < SWITCHES:

@@ -135,21 +135,26 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
         j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
         if j >= 0:
-            _glide(bank, j, setting.hull)
+            _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
-    for k in range(len(n.RUN_DOWN_S)):
+    last = bank.whole[i, COUNT] - 1
+    idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
+    for k in range(1 if idles else len(n.RUN_DOWN_S)):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
-            part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
+            part = chance * (1.0 if idles else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
+            if idles:  # it is the same glide
+                bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
+            bank.number[j, BEFORE] = x[OPEN]
+            _glide(bank, j, setting.hull)  # gusts: parts of what the engine beat
             bank.whole[j, KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan
-            bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
             x[POWER] += tied * n.DRAGGED[kind]
@@ -157,7 +162,6 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
-            _glide(bank, j, setting.hull)
 
 
 @compiled(uncounted=True)

@@ -54,6 +54,7 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
 LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
+LOG_LAG_MOST = _number('LOG_LAG_MOST', 30.0, 's', 'no filter of a log is longer')
 LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
@@ -103,6 +104,7 @@ MEMORY_S = _number('MEMORY_S', 1200.0, 's', 'over which noise is learnt')
 FROZEN_S = _number('FROZEN_S', 120.0, 's', 'age of the noise that is used')
 BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
+WIDE = _grid('WIDE', (0.05, 3.0), '1', 'share of readings that scatter more, and by what factor')
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')

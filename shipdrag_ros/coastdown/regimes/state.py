@@ -17,10 +17,10 @@ SWITCHES = 12  # that a history remembers
 
 # the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
 # of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], and ln of
-# the log's own lag over that
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER = range(10)
-STATES = 10
+# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], ln of
+# the log's own lag over that, and slow error of the speed over ground [m/s]
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(11)
+STATES = 11
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
@@ -43,12 +43,13 @@ WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
 GONE = 10  # when revs over speed fell through those without thrust [s since the start]
-SAID = 11
+RANGES = 11  # and that after it: range of the seconds of log and of speed over ground
+SAID = 13
 
-# noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
-# speed over ground and fixes, their walk, sd of the rate of turn
-N_GUST, N_WANDER, N_WANDER_S, N_LOG, N_GROUND, N_FIX, N_WALK, N_RATE = range(8)
-NOISES = 8
+# noise in use: gust over resistance, sd and time of the slow error of log and speed over ground,
+# white noise of log, speed over ground and fixes, their walk, sd of the rate of turn
+N_GUST, N_WANDER, N_WANDER_S, N_EDDY, N_EDDY_S, N_LOG, N_GROUND, N_FIX, N_WALK, N_RATE = range(10)
+NOISES = 10
 
 
 class Histories(NamedTuple):
