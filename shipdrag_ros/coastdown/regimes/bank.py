@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import bear, thin
+from shipdrag_ros.coastdown.regimes.births import bear, driven, free, thin
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, pushes, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
@@ -17,7 +17,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
     ADVANCE,
-    BEFORE,
+    AMID,
     BRAKE,
     COUNT,
     CURRENT,
@@ -128,8 +128,10 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        for regime in (DRIVEN, GLIDE):
+        for regime in (DRIVEN, AMID, GLIDE):
             chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
+            if regime != GLIDE:
+                chance *= n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
             if not chance > 0.0:
@@ -154,15 +156,16 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
-            f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
+            f[WEIGHT] = math.log(chance)
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
-            f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
-            if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
-                # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
-            else:
+            driven(all_, j, hull)
+            if regime == AMID:
+                law = hull_law(hull, max(x[LN_U], hull.sails))[0] + x[LN_A]
+                f[FIRST_A] = math.exp(law)
+                free(all_, j, OPEN, 0.0, (n.AMID[1] * f[FIRST_A]) ** 2)
+            elif regime == GLIDE:
+                free(all_, j, OPEN, 0.0, 0.0)
                 w[COUNT], w[GLIDED] = 1, 1
                 all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
 
@@ -190,9 +193,9 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
     said[GONE] = np.nan
     if not np.isnan(said[HIGH]) and speed > 0.0:
         before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
-        free = 1.0 / n.NO_THRUST_SEEN
-        if before > free >= now:
-            part = (before - free) / (before - now)
+        gone = 1.0 / n.NO_THRUST_SEEN
+        if before > gone >= now:
+            part = (before - gone) / (before - now)
             said[GONE] = (bank.histories.clock[0] - 1.5 + part) * step_s
         bank.first[2] = now
     if learns and (learnt or not known):
@@ -250,6 +253,8 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
             out[P_RUN_DOWN if running else P_GLIDING] += share
+        elif regime == AMID:
+            out[P_DRIVEN] += share
         elif regime == BRAKE:
             out[P_BRAKED] += share
         else:

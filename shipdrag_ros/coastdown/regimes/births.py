@@ -13,6 +13,7 @@ from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
+    AMID,
     BEFORE,
     BRAKE,
     COUNT,
@@ -80,8 +81,10 @@ def _copy(bank: Histories, i: int, j: int) -> None:
 
 
 @compiled(uncounted=True)
-def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
-    """Give a state a prior of its own."""
+def free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
+    """
+    Give a state a prior of its own.
+    """
     for k in range(STATES):
         bank.spread[j, row, k] = 0.0
         bank.spread[j, k, row] = 0.0
@@ -126,7 +129,7 @@ def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
     law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
-    _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+    free(bank, j, OPEN, 0.0, n.WIND_SD**2)
 
 
 @compiled(uncounted=True)
@@ -135,7 +138,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
         j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
         if j >= 0:
-            _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+            free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
     last = bank.whole[i, COUNT] - 1
@@ -185,7 +188,7 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
-            _free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
+            free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
 
 
 @compiled(uncounted=True)
@@ -198,7 +201,7 @@ def _turns(
             if regime == TURN:
                 bank.number[j, BEFORE] = bank.mean[i, OPEN]
                 bank.number[j, REVS] = np.nan
-            _free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
+            free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
 @compiled(uncounted=True)
@@ -213,7 +216,7 @@ def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 bank.whole[j, KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
-            _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+            free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
 
 
 @compiled(uncounted=True)
@@ -224,7 +227,29 @@ def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: f
         before = bank.number[i, BEFORE]
         bank.number[j, RAMP_FROM], bank.number[j, REVS] = before, np.nan
         bank.whole[j, KIND] = 0
-        _free(bank, j, OPEN, before, 0.02**2)
+        free(bank, j, OPEN, before, 0.02**2)
+
+
+@compiled(uncounted=True)
+def _settles(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """End the manoeuvre that the record began in: she is in balance."""
+    j = _born(bank, i, now_s, chance, DRIVEN, 1.0)
+    if j >= 0:
+        bank.whole[j, COUNT] = 0
+        driven(bank, j, setting.hull)
+
+
+@compiled(uncounted=True)
+def driven(bank: Histories, j: int, hull: HullPrior) -> None:
+    """
+    Put a history in balance at its speed, without a switch.
+    """
+    x, p, f = bank.mean[j], bank.spread[j], bank.number[j]
+    f[SINCE], f[BEFORE], f[RAMP_S] = -1e9, x[LN_U], 1.0
+    f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+    free(bank, j, OPEN, x[LN_U], p[LN_U, LN_U])
+    # the same error: she is in balance
+    p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
 
 
 @compiled(uncounted=True)
@@ -300,6 +325,9 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
             _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
             left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
+        elif regime == AMID:
+            _settles(bank, i, setting, now_s, n.AMID[3] * hours)
+            left = float(n.AMID[3])
         else:
             if regime == TURN:
                 _back(bank, i, setting, now_s, n.TURN_OUT * hours)
@@ -315,7 +343,8 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     w, v = bank.whole[i], bank.whole[j]
     last = w[COUNT] - 1
     if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
-        return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
+        first = w[COUNT] == 0 and v[COUNT] == 0 and w[REGIME] == v[REGIME]
+        return bool(first and w[LIAR] == v[LIAR])
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False
     if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:

@@ -13,6 +13,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
     ADVANCE,
+    AMID,
     BEFORE,
     BRAKE,
     COUNT,
@@ -154,6 +155,8 @@ def _force(
     more = 0.0
     if regime == BRAKE:
         more = by_open = -math.exp(min(x[OPEN], 3.0)) * f[FIRST_A]
+    elif regime == AMID:
+        left, more, by_open = 0.0, x[OPEN], 1.0
     elif regime == GLIDE:
         more, by_open = -x[OPEN] * f[FIRST_A], -f[FIRST_A]
     net = -a * left + x[GUST] + more
@@ -235,6 +238,8 @@ def predict(
             p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
+        elif regime == AMID:
+            p[OPEN, OPEN] += (n.AMID[2] * f[FIRST_A]) ** 2 * dt / (60.0 * pace)
         # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
         first = f[FIRST_A]
         gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
@@ -428,7 +433,9 @@ def _shaft(
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
-    if regime in (DRIVEN, LEVEL, TURN):
+    if regime == AMID:
+        density = 0.8 if 0.0 < nu < 1.25 else 0.0
+    elif regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
         if several and regime != LEVEL:  # they turn alike
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
@@ -570,7 +577,7 @@ def weigh(
         # errors of fixes turn a course by more, the shorter the way
         sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
-        turning = regime in (TURN, GLIDE_TURN)
+        turning = regime in (TURN, GLIDE_TURN, AMID)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
@@ -578,7 +585,7 @@ def weigh(
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
     f[WEIGHT] += gained
-    if regime in (DRIVEN, TURN):
+    if regime in (DRIVEN, TURN, AMID):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])

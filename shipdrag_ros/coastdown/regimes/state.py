@@ -23,6 +23,7 @@ LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(1
 STATES = 11
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
+AMID = 6  # the record begins amid a manoeuvre under power
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
