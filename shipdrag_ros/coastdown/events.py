@@ -28,7 +28,7 @@ class State(Enum):
 
     WAITING = 'waiting'  # not enough record to know what steady is
     STEADY = 'steady'  # watching for an onset
-    CANDIDATE = 'candidate'  # decelerating, not yet confirmed
+    CANDIDATE = 'candidate'  # probably not under even power
     COASTDOWN = 'coastdown'  # confirmed, estimating
 
 
@@ -60,12 +60,11 @@ class Dismissal(Enum):
     SETTLED = 'settled'  # a new steady speed after a small loss: power reduced
     SLOW = 'slow'  # below the minimum speed
     GAP = 'gap'  # the data stopped before it could be confirmed
-    OUTLIER = 'outlier'  # bad readings
     OTHER = 'other'
 
 
 BY_SPEED = frozenset({Dismissal.BRAKE, Dismissal.SETTLED, Dismissal.THRUST})
-"""For these a stretch is dismissed by its speed; a turn, a gap and bad readings are causes."""
+"""For these a stretch is dismissed by its speed; a turn and a gap are causes."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ class Regimes:
 @dataclass(frozen=True)
 class NotCoastdown:
     """
-    A candidate that was dismissed, or a part of a window that was cut.
+    A slowing down that was none, or a part of a window that was cut.
 
     `text` says in one sentence, with figures, what spoke against it.
     """

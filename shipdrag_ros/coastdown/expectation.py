@@ -2,9 +2,8 @@
 """
 How fast this ship should slow down when its engine stops.
 
-Only to separate a coastdown from a ship that has merely reduced power: an onset is
-confirmed where the loss of speed is of this size. Nothing estimated depends on
-it.
+Only to examine a window that a person claims: whether she slows there as without an engine.
+Nothing estimated depends on it.
 """
 
 from __future__ import annotations

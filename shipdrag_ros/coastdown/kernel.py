@@ -2,8 +2,8 @@
 """
 The walk through the samples, compiled.
 
-It accepts or rejects each sample, keeps and averages it, and looks for the
-what wakes the regimes each second. It returns where Python must act, always
+It accepts or rejects each sample, keeps and averages it, and looks each
+second for what wakes the regimes. It returns where Python must act, always
 BEFORE the sample in question is taken, and is then called again from that
 sample on: how the record is cut into blocks cannot matter.
 """

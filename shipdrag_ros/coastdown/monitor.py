@@ -112,7 +112,8 @@ class Monitor:
         self._vouching = Vouching(self._craft)
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None  # while awake
-        self._reported_s = self._followed_s = -np.inf  # until when glides, and whole ones, were
+        # until when glides, whole ones, and what was none were told
+        self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -247,7 +248,7 @@ class Monitor:
         events = self._stop_at_last_sample(EndedBy.RESET)
         events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
-        self._reported_s = self._followed_s = -np.inf
+        self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
@@ -280,7 +281,7 @@ class Monitor:
 
     def fall_silent(self) -> list[Event]:
         """
-        End a coastdown, or a candidate, at the last sample of its speed source.
+        End a coastdown, or what may be one, at the last sample of its speed source.
 
         For whoever has a clock and knows that all sources are silent; the memory stays.
         """
@@ -344,10 +345,16 @@ class Monitor:
 
     def _follow(self) -> list[Event]:
         """Let the regimes take all bins of the source watched that are whole."""
+        if self._regimes is None:
+            return []
+        number = int(self._memory.bins.filling[self._memory.watch.source[0]])
+        return self._judged(number, number)
+
+    def _judged(self, until: int, number: int) -> list[Event]:
+        """Let the regimes take all bins that are whole by a second, and decide after each."""
         events: list[Event] = []
-        regimes, bins = self._regimes, self._vouching.sound(self._memory.bins)
-        number = int(bins.filling[self._memory.watch.source[0]])
-        while regimes is not None and regimes is self._regimes and regimes.advance(bins, number):
+        bins = self._vouching.sound(self._memory.bins)
+        while (regimes := self._regimes) is not None and regimes.advance(bins, until):
             events += self._decide(regimes, number)
         return events
 
@@ -364,7 +371,7 @@ class Monitor:
         if slow or regimes.asleep:
             return self._rest(regimes, number)
         if regimes.gliding < announce:
-            return []
+            return self._anew(regimes, number) if regimes.full else []
         dated = self._unreported(regimes)
         if not dated:
             return []
@@ -414,6 +421,8 @@ class Monitor:
             return events
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
+        if was is not None:
+            self._dismissed_s = was.end_ns / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
         self._memory.watch.update_ns[0] = ALWAYS
@@ -443,7 +452,7 @@ class Monitor:
         last_ns: int | None = None,
     ) -> list[Event]:
         """Report what was never announced, say what it was if nothing, and sleep."""
-        since_s, dated = self._reported_s, self._unreported(regimes)
+        since_s, dated = max(self._reported_s, self._dismissed_s), self._unreported(regimes)
         otherwise = ended_by or EndedBy.SPEED
         events = [
             event
@@ -454,13 +463,20 @@ class Monitor:
         if was is not None:
             if ended_by is not None and not regimes.even:
                 was = cut_short(was, ended_by, regimes.gliding)
-            self._reported_s = was.end_ns / SECOND_NS
+            self._dismissed_s = was.end_ns / SECOND_NS
             events += self._dismissals.take(was)
         for first_s, last_s in regimes.whole_glides():
             if first_s >= self._followed_s:
                 events.append(WholeGlide(round(first_s * SECOND_NS), round(last_s * SECOND_NS)))
                 self._followed_s = last_s
         self._stand_down()
+        return events
+
+    def _anew(self, regimes: RegimeFilter, number: int) -> list[Event]:
+        """Begin again with the last minutes: she may manoeuvre for days."""
+        source = int(self._memory.watch.source[0])
+        events = self._rest(regimes, number)
+        self._wake(source, number)
         return events
 
     def _fall_back(self, now_ns: int) -> bool:
@@ -506,18 +522,13 @@ class Monitor:
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
-        events: list[Event] = []
-        regimes = self._regimes
-        if regimes is None:
-            return events
+        if self._regimes is None:
+            return []
         end_ns = int(self._memory.guard.last_ns[self._memory.watch.source[0]])
         number = end_ns // SECOND_NS
-        # what came since the last bin that was judged
-        while self._regimes is regimes and regimes.advance(
-            self._vouching.sound(self._memory.bins), number + 1
-        ):
-            events += self._decide(regimes, number)
-        if self._regimes is None:
+        events = self._judged(number + 1, number)  # what came since the last bin that was judged
+        regimes = self._regimes
+        if regimes is None:
             return self._vouching.explained(events)
         if self._running is not None:
             events += self._end_glide(regimes, number, ended_by, end_ns)

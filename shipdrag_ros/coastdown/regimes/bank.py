@@ -35,6 +35,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOG,
     LONGER,
     LOW,
+    N_FIX,
     OPEN,
     P0,
     P_VAR,
@@ -71,9 +72,8 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     P_EVEN,
     P_STEADY,
     SPEED,
-    FIT,
-) = range(10)
-OUTS = 10  # and of even power, of the first one, mean speed, log predictive density
+) = range(9)
+OUTS = 9  # and of even power, of the first one, mean speed
 _TURNING_RAD_S = 0.05  # a shaft below it, times its pitch, drives no ship
 
 
@@ -152,9 +152,10 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
-            p[WAY, WAY] = 1e4
+            x[WAY] = 0.5 * setting.step_s * speed
+            p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
+            p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT] = math.log(chance)
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
@@ -188,7 +189,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
             said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
             said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
         if learns:
-            revs[k] += gain * (value - revs[k])
+            revs[k] += (gain if revs[k] != 0.0 else 1.0) * (value - revs[k])
             learnt = True
     said[GONE] = np.nan
     if not np.isnan(said[HIGH]) and speed > 0.0:
@@ -232,7 +233,7 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
-    for k in range(FIT):
+    for k in range(OUTS):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
     for i in range(all_.used[0]):
@@ -248,8 +249,8 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
                 out[P_GLIDING] += share
             else:
                 out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
-            if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
-                out[P_EVEN] += share
+                if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                    out[P_EVEN] += share
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
             out[P_RUN_DOWN if running else P_GLIDING] += share
@@ -293,7 +294,6 @@ def step(bank: Bank, setting: BankSetting) -> None:
     used = bank.noise.used
     if all_.clock[0] > 1:
         bear(all_, setting, both, not np.isnan(said[RATE]))
-    before = 0.0
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
@@ -302,4 +302,3 @@ def step(bank: Bank, setting: BankSetting) -> None:
     thin(all_, setting)
     _sum_up(bank, setting)
     listen(bank.noise, setting, said, bank.out[P_STEADY])
-    bank.out[FIT] = before

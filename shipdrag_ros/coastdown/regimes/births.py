@@ -21,8 +21,10 @@ from shipdrag_ros.coastdown.regimes.state import (
     FIRST_A,
     FREE,
     GLIDE,
+    GLIDE_KIND,
     GLIDE_TURN,
     GLIDED,
+    GUST_A,
     HELD,
     KEPT,
     KIND,
@@ -60,6 +62,7 @@ _PARENTS = 7.0  # nats below the best: a history that still has children
 _LOST = 16.0  # and one that is dropped
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
+_NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
 _ROOT = math.sqrt(2.0 * math.pi)
 
@@ -136,7 +139,7 @@ def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
 def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
-        j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
+        j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
         if j >= 0:
             free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
@@ -144,7 +147,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     last = bank.whole[i, COUNT] - 1
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
     for k in range(1 if idles else len(n.RUN_DOWN_S)):
-        ramp_s = n.RUN_DOWN_S[k] * setting.pace
+        ramp_s = _NO_RAMP_S if idles else n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
             part = chance * (1.0 if idles else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
@@ -154,8 +157,8 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
             bank.number[j, BEFORE] = x[OPEN]
-            _glide(bank, j, setting.hull)  # gusts: parts of what the engine beat
-            bank.whole[j, KIND] = kind
+            _glide(bank, j, setting.hull)
+            bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan
             x[LN_A] += n.DRAGGED[kind]
@@ -189,6 +192,10 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
+            if not engaged:  # what the screw dragged is over
+                drag = n.DRAGGED[bank.whole[i, KIND]]
+                bank.mean[j, LN_A] -= drag
+                bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[bank.whole[i, KIND]] * drag
 
 
 @compiled(uncounted=True)
@@ -199,8 +206,15 @@ def _turns(
         j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
             if regime == TURN:
-                bank.number[j, BEFORE] = bank.mean[i, OPEN]
-                bank.number[j, REVS] = np.nan
+                f, x, p = bank.number[j], bank.mean[i], bank.spread[i]
+                f[BEFORE], f[REVS] = x[OPEN], np.nan
+                # what the level before it taught
+                f[A0], f[A_VAR], f[P0], f[P_VAR] = (
+                    x[LN_A],
+                    p[LN_A, LN_A],
+                    x[POWER],
+                    p[POWER, POWER],
+                )
             free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
@@ -212,8 +226,8 @@ def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
                 _glide(bank, j, setting.hull)
-                bank.number[j, REVS] = np.nan
-                bank.whole[j, KIND] = STANDS
+                bank.number[j, BEFORE], bank.number[j, REVS] = bank.mean[i, OPEN], np.nan
+                bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
             free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
@@ -246,7 +260,7 @@ def driven(bank: Histories, j: int, hull: HullPrior) -> None:
     """
     x, p, f = bank.mean[j], bank.spread[j], bank.number[j]
     f[SINCE], f[BEFORE], f[RAMP_S] = -1e9, x[LN_U], 1.0
-    f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+    f[FIRST_A] = f[GUST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
     free(bank, j, OPEN, x[LN_U], p[LN_U, LN_U])
     # the same error: she is in balance
     p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
@@ -292,6 +306,10 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             _lies(bank, i, THE_TRACK, n.LIES * hours)
         if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
             w[REGIME] = regime = DRIVEN
+            w[KIND] = 0
+            f[GUST_A] = math.exp(
+                hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A]
+            )
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
         left = 0.0  # hazard of all that it may switch to
@@ -368,7 +386,7 @@ def thin(bank: Histories, setting: BankSetting) -> None:
     for i in range(count):
         total += math.exp(bank.number[i, WEIGHT] - best)
     norm = best + math.log(total)
-    due = bank.clock[0] % _THIN_EVERY == 0 or count > ROOM - 2 * KEPT
+    due = bank.clock[0] % _THIN_EVERY == 0
     now_s = bank.clock[0] * setting.step_s
     kept = 0
     for i in range(count):
@@ -380,10 +398,10 @@ def thin(bank: Histories, setting: BankSetting) -> None:
         kept += 1
     bank.used[0] = kept
     if not due:
+        _keep_best(bank)  # or the next births find no room
         return
     _merge(bank, now_s, setting.pace)
-    if bank.used[0] > KEPT:
-        _keep_best(bank)
+    _keep_best(bank)
 
 
 @compiled(uncounted=True)
@@ -419,6 +437,8 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
 @compiled(uncounted=True)
 def _keep_best(bank: Histories) -> None:
     count = bank.used[0]
+    if count <= KEPT:
+        return
     low, high = -_LOST - 1.0, 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)

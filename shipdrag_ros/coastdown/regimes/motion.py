@@ -27,6 +27,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GONE,
     GROUND,
     GUST,
+    GUST_A,
     HELD,
     HIGH,
     KIND,
@@ -187,7 +188,6 @@ def predict(
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
-    keep_c = math.exp(-dt / (n.CURRENT_S * pace))
     keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
@@ -217,7 +217,6 @@ def predict(
             p[LAG, k] = work[3, k]
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
-            p[CURRENT, k] *= keep_c
             p[EDDY, k] *= keep_e
         for k in range(STATES):
             new = (
@@ -230,7 +229,6 @@ def predict(
             p[k, LN_U], p[k, WAY] = new, way
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
-            p[k, CURRENT] *= keep_c
             p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
@@ -241,11 +239,13 @@ def predict(
         elif regime == AMID:
             p[OPEN, OPEN] += (n.AMID[2] * f[FIRST_A]) ** 2 * dt / (60.0 * pace)
         # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
-        first = f[FIRST_A]
-        gusts = noise[N_GUST] ** 2 * max(0.5 * first * (a + first), a * a)
+        full, now = f[GUST_A], a
+        if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
+            now = min(a, full)
+        gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
-        p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
         p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
@@ -257,7 +257,6 @@ def predict(
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
-        x[CURRENT] *= keep_c
         x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
@@ -572,6 +571,9 @@ def weigh(
         gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
         gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
+    else:  # the next fix begins the way anew
+        way = 0.5 * setting.step_s * (math.exp(x[LN_U]) + x[CURRENT])
+        _forget(x, p, WAY, way, noise[N_FIX] ** 2)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way

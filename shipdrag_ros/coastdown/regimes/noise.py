@@ -40,6 +40,7 @@ _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S),
 _WALKS = len(n.TRACK_WALK)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
+_STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
 _APART = 3  # log less speed over ground
 _DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
@@ -135,7 +136,7 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
             _one(noise, setting, which, value, driven)
     if not np.isnan(said[RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
-        clipped = min(abs(said[RATE]), 3.0 * sd)
+        clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += 1.0
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
@@ -185,7 +186,7 @@ def _one(
     if count > 0 and not np.isnan(last[0]):
         size = abs(value - last[0])
         if count > 8:
-            size = min(size, 4.0 * noise.jump[which])
+            size = min(size, max(4.0 * noise.jump[which], n.WHITE_FLOOR * abs(value)))
         gain = driven / min(count, n.MEMORY_S / n.BIN_S)
         noise.jump[which] += gain * (size - noise.jump[which])
     last[0] = value
@@ -231,7 +232,9 @@ def _filter(
     x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
     gust, wander, wander_s, white, walk = _parts(which, k)
     dt, pace = setting.step_s, setting.pace
-    keep = math.exp(-dt * min(_STEEP * a / max(x[1], 1e-3), 1.0 / dt))
+    keep = 1.0  # no hull brings back what they differ by
+    if which != _APART:
+        keep = math.exp(-dt * min(_STEEP * a / max(x[1], 1e-3), 1.0 / dt))
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (wander_s * pace))
     way = dt if which == 2 else 0.0
     # rows of the transition: speed, engine, gust, slow error, way

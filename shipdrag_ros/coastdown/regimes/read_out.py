@@ -24,9 +24,9 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     DRIVEN,
     GLIDE,
+    GLIDE_KIND,
     GLIDE_TURN,
     HELD,
-    KIND,
     LEVEL,
     SWITCHES,
     TURN,
@@ -117,7 +117,7 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
     ramp = np.where(what == GLIDE, ramp, 0.0)
     gone = np.minimum(at + ramp, end)
-    seen = (setting.shafts > 0) & (all_.whole[:used, KIND, np.newaxis] < HELD)
+    seen = (setting.shafts > 0) & (all_.whole[:used, GLIDE_KIND, np.newaxis] < HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
     date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))

@@ -32,11 +32,12 @@ AMID = 6  # the record begins amid a manoeuvre under power
 WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
 STAYS, STAYS_WAY = 12, 13
 MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
-COLUMNS = 16
+GUST_A = 16  # resistance under even power, of which gusts are parts [m/s^2]
+COLUMNS = 17
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
-# number of switches, whether she has glided
-REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
-WHOLE = 5
+# number of switches, whether she has glided, how the screw was dragged then
+REGIME, KIND, LIAR, COUNT, GLIDED, GLIDE_KIND = range(6)
+WHOLE = 6
 NOBODY, THE_LOG, THE_TRACK = range(3)
 WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 

@@ -37,6 +37,7 @@ from shipdrag_ros.ship import Ship
 LEAD_S = 900  # of record before what woke it
 _LATE = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
+_FULL_S = 6 * 3600.0  # of record that it remembers
 _EVEN = 0.95
 _DOUBTED = 0.5
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
@@ -220,6 +221,11 @@ class RegimeFilter:
         """Whether she has been under even power for long."""
         awake_s = self._next * self._width - self._woken
         return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
+
+    @property
+    def full(self) -> bool:
+        """Whether it remembers so much that it should begin anew."""
+        return len(self._out) * self._width > _FULL_S
 
     def glides(self) -> list[Dated]:
         """
