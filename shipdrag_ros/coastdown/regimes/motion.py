@@ -55,6 +55,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     P0,
     P_VAR,
     POWER,
+    PUSH,
     RAMP_FROM,
     RAMP_S,
     RATE,
@@ -114,20 +115,29 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 def _thrust_left(f: Float64, now_s: float) -> float:
     """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
     left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
-    return float(left * left)
+    return float(left * left * f[PUSH])
+
+
+@compiled(uncounted=True)
+def thrust(bank: Histories, i: int, now_s: float) -> float:
+    """
+    Return the thrust at a level, over the resistance.
+    """
+    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+    free = f[FREE] if w[KIND] == 1 else 0.0
+    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
+    return float((_S * rho * rho - rho) / (_S - 1.0))
 
 
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes."""
-    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
-    if w[REGIME] != LEVEL:
-        return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
-    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
-    free = f[FREE] if w[KIND] == 1 else 0.0
-    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
-    return bool(rho * n.NO_THRUST > 1.0)
+    regime = bank.whole[i, REGIME]
+    if regime == LEVEL:
+        return thrust(bank, i, now_s) > 0.0
+    return regime in (DRIVEN, TURN)
 
 
 @compiled(inline=True, uncounted=True)
@@ -411,7 +421,8 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         f[REVS] = nu
         # or anything below its last: it runs down
         return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
-    f[REVS] = nu
+    if kind == HELD:  # a sensor that is stuck stays where it was
+        f[REVS] = nu
     moves = 0.1 if kind == HELD else 0.01
     return (1.0 - moves) * _off(nu, revs) + moves
 
