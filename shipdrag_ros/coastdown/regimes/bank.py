@@ -293,7 +293,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
     _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
-        bear(all_, setting, both, not np.isnan(said[RATE]))
+        bear(all_, setting, both)
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)

@@ -281,7 +281,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
 
 
 @compiled(uncounted=True)
-def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> None:
+def bear(bank: Histories, setting: BankSetting, both: bool) -> None:
     """
     Let every likely history switch at the beginning of this bin.
 
@@ -289,8 +289,6 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
     ----------
     both
         Two instruments show the motion: either may lie from now on.
-    steered
-        The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
     hours = setting.step_s / 3600.0
@@ -338,9 +336,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
         elif regime == GLIDE:
             _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
-            if steered:
-                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-                left += n.GLIDE_TURN
+            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            left += n.GLIDE_TURN
             _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
