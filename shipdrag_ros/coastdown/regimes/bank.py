@@ -41,7 +41,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     P_VAR,
     POWER,
     RAMP_S,
-    RATE,
     REGIME,
     REVS,
     SAID,
