@@ -80,6 +80,10 @@ class Regimes:
         Mean speed in it.
     probability
         Of each regime, by its name, (n,) each.
+    excess
+        Mean log density of a reading, over what the model expects of it [nats].
+    explained
+        Share of the records that the model was learnt on which it explains less well.
     """
 
     __repr__ = short_repr
@@ -87,6 +91,8 @@ class Regimes:
     time_ns: Int64
     speed_m_s: Float64
     probability: Mapping[str, Float64]
+    excess: float
+    explained: float
 
 
 @dataclass(frozen=True)

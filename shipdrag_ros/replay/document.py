@@ -101,6 +101,7 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
         'noise_sd': {},
         'current_m_s': None,
         'regimes': _regimes(coastdown),
+        'explained': None if coastdown.regimes is None else coastdown.regimes.explained,
         'notes': [],
     }
     if estimate is None:

@@ -159,6 +159,18 @@ def test_positions_are_believed_beside_a_log_that_says_nothing_true(ship, record
     assert ended.end_ns > START_NS + 1500 * S
 
 
+def test_a_record_of_what_no_ship_does_is_explained_less_well(ship, record) -> None:
+    block = record(sensors=(LOG,), seed=1)
+    since_s = (block.stamp_ns - START_NS) / S
+    # from 500 s on the log shows an error that nothing in the model has: it jumps each minute
+    jumps = np.where((since_s > 500.0) & (since_s // 60.0 % 2 == 0), 0.9, 1.0)[:, np.newaxis]
+    explained = []
+    for value in (block.value, block.value * jumps):
+        (*_, ended) = of(EndedCoastdown, events_of(ship, replace(block, value=value)))
+        explained.append(ended.regimes.explained)
+    assert explained[0] > 0.05 > explained[1]
+
+
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=5, deadline=None)
 def test_how_a_record_is_cut_changes_no_bit(ship, record, bits, seed) -> None:

@@ -41,6 +41,8 @@ def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdo
         np.array([8.0, 1.0]),
         {name: 1.0 - share if name == 'gliding' else 0.0 * share for name in OUT}
         | {'driven': share},
+        0.0,
+        0.5,
     )
     shown = replace(coastdown, cuts=cuts, regimes=regimes)
     axis, strip = pictures.cut_picture(shown, None, 2e7).axes

@@ -22,6 +22,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     CURRENT,
     DRIVEN,
+    EXCESS,
     FIRST_A,
     GLIDE,
     GLIDED,
@@ -71,8 +72,9 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     P_EVEN,
     P_STEADY,
     SPEED,
-) = range(9)
-OUTS = 9  # and of even power, of the first one, mean speed
+    FIT,
+) = range(10)
+OUTS = 10  # and of even power, of the first one, mean speed, excess of the log density
 _TURNING_RAD_S = 0.05  # a shaft below it, times its pitch, drives no ship
 
 
@@ -260,6 +262,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
         else:
             out[P_TURNING] += share
         out[SPEED] += share * math.exp(all_.mean[i, LN_U])
+        out[FIT] += share * f[EXCESS]
 
 
 _SETTING = BankSetting(

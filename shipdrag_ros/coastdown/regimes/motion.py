@@ -20,6 +20,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     CURRENT,
     DRIVEN,
     EDDY,
+    EXCESS,
     FIRST_A,
     FREE,
     GLIDE,
@@ -284,8 +285,12 @@ def _take(
     variance: float,
     bad: float,
     least: float,
-) -> float:
-    """Update by one reading, as usual, of more scatter, or bad; return its log density."""
+) -> tuple[float, float]:
+    """
+    Update by one reading, as usual, of more scatter, or bad.
+
+    Return its log density, and how much more than its expectation that is.
+    """
     total = variance
     for j in range(STATES):
         row = 0.0
@@ -308,7 +313,7 @@ def _take(
                 p[j, k] += (around - gain) * work[0, j] * work[0, k]
                 p[k, j] = p[j, k]
         x[LN_U] = max(x[LN_U], least)
-    return math.log(density)
+    return math.log(density), 0.5 + math.log(density * _ROOT * math.sqrt(total))
 
 
 @compiled(inline=True, uncounted=True)
@@ -516,7 +521,9 @@ def _by_way(
         h[j] = 0.0
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
-    gained = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull.first - 1.0)
+    least = setting.hull.first - 1.0
+    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
+    f[EXCESS] += excess
     if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
         _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
     return gained
@@ -553,7 +560,7 @@ def weigh(
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[STATES]
-    gained = 0.0
+    gained = f[EXCESS] = 0.0
     bad = float(n.BAD_DENSITY)
     least = setting.hull.first - 1.0  # at rest
     for which in (LOG, GROUND):
@@ -579,7 +586,9 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
+        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
+        gained += shown
+        f[EXCESS] += excess
     if not np.isnan(said[ADVANCE]):
         gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
     else:  # the next fix begins the way anew

@@ -165,6 +165,16 @@ HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and 
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
 
+EXPLAINED_SHARE = _grid(
+    'EXPLAINED_SHARE', (0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0), '1', 'of the records learnt on'
+)
+EXPLAINED = _grid(
+    'EXPLAINED',
+    (-1.0, -0.2, -0.1, 0.0, 0.05, 0.1, 0.15, 0.2),
+    'nats a reading',
+    'by which these are explained less well: log density over its expectation',
+)
+
 
 def table() -> str:
     """

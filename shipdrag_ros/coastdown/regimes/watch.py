@@ -10,7 +10,9 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, newest_bin
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import (
+    FIT,
     OUT,
     P_EVEN,
     P_GLIDING,
@@ -30,7 +32,17 @@ from shipdrag_ros.coastdown.regimes.read_out import (
     spans_of,
     unpowered,
 )
-from shipdrag_ros.coastdown.regimes.state import BRAKE, GLIDE_TURN, LEVEL, LOW, TURN, BankSetting
+from shipdrag_ros.coastdown.regimes.state import (
+    ADVANCE,
+    BRAKE,
+    GLIDE_TURN,
+    GROUND,
+    LEVEL,
+    LOG,
+    LOW,
+    TURN,
+    BankSetting,
+)
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
@@ -129,6 +141,7 @@ class RegimeFilter:
         self._woken = first
         self._out: list[Float64] = []
         self._low: list[float] = []
+        self._read = 0  # readings of motion
         self._even_s = 0.0
 
     @classmethod
@@ -166,6 +179,7 @@ class RegimeFilter:
             return True
         self._out.append(self._bank.out.copy())
         self._low.append(float(self._bank.said[LOW]))
+        self._read += int(np.count_nonzero(~np.isnan(self._bank.said[[LOG, GROUND, ADVANCE]])))
         even = self._bank.out[P_EVEN] > _EVEN
         self._even_s = self._even_s + self._width if even else 0.0
         return True
@@ -309,4 +323,6 @@ class RegimeFilter:
         middle_s = self._zero_s + (np.arange(len(self._out)) + 0.5) * self._width
         probability = smoothed(self._spans, len(self._out), self._setting.step_s)
         time_ns = np.round(middle_s * SECOND_NS).astype(np.int64)
-        return Regimes(time_ns, self._speed, probability)
+        excess = sum(float(out[FIT]) for out in self._out) / max(self._read, 1)
+        explained = float(np.interp(excess, n.EXPLAINED, n.EXPLAINED_SHARE))
+        return Regimes(time_ns, self._speed, probability, excess, explained)
