@@ -70,13 +70,16 @@ def clean(record, sensors) -> Block:
     return block[block.stamp_ns < block.stamp_ns[0] + 1800 * S]
 
 
-@pytest.mark.parametrize('name', FAULTS)
-def test_bad_readings_neither_hide_nor_move_a_coastdown(ship, clean, watch, name) -> None:
-    def the_one(block: Block) -> EndedCoastdown:
-        [one] = [event for event in watch(block) if isinstance(event, EndedCoastdown)]
-        return one
+@pytest.fixture(scope='module')
+def as_it_is(clean, watch) -> EndedCoastdown:
+    [one] = [event for event in watch(clean) if isinstance(event, EndedCoastdown)]
+    return one
 
-    as_it_is, bad = the_one(clean), the_one(spoilt(clean, *FAULTS[name]))
+
+@pytest.mark.parametrize('name', FAULTS)
+def test_bad_readings_neither_hide_nor_move_a_coastdown(clean, as_it_is, watch, name) -> None:
+    events = watch(spoilt(clean, *FAULTS[name]))
+    [bad] = [event for event in events if isinstance(event, EndedCoastdown)]
     assert abs(bad.start_ns - as_it_is.start_ns) <= 10 * S
     assert bad.end_ns == as_it_is.end_ns
 

@@ -44,7 +44,7 @@ TYPES = {
 
 @cache
 def truth() -> Truth:
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=500.0)
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=400.0)
     return simulate(Ship.load(SHIP_FILE), scenario)
 
 
