@@ -160,7 +160,9 @@ WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.85), '1', 'over u / U: mean, sd, most
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss
-ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.03), '1', 'P(gliding) above, and again below')
+ANNOUNCE = _grid(
+    'ANNOUNCE', (0.7, 0.002), '1', 'P(gliding) above; below, as an end is not taken back'
+)
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
