@@ -172,7 +172,7 @@ EXPLAINED_SHARE = _grid(
 )
 EXPLAINED = _grid(
     'EXPLAINED',
-    (-1.0, -0.2, -0.1, 0.0, 0.05, 0.1, 0.15, 0.2),
+    (-1.27, -0.18, -0.12, -0.06, 0.0, 0.05, 0.09, 0.28),
     'nats a reading',
     'by which these are explained less well: log density over its expectation',
 )
