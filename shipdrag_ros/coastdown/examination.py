@@ -253,7 +253,7 @@ def _by_speed(
     time_s, speed = readings(part)
 
     def usual(speed_m_s: float) -> float:
-        return expect(ship, speed_m_s).deceleration_m_s2
+        return expect(ship, speed_m_s)
 
     cuts = []
     for cut in departures(time_s, speed, usual):

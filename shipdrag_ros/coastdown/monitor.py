@@ -359,10 +359,13 @@ class Monitor:
         return events
 
     def _decide(self, regimes: RegimeFilter, number: int) -> list[Event]:
-        announce, again = (float(each) for each in numbers.ANNOUNCE)
+        announce, again, over = (float(each) for each in numbers.ANNOUNCE)
         slow = regimes.slow < self._tuning.speed_min
         if self._running is not None:
-            if not slow and regimes.gliding > again:
+            # a glide that is born since is not the one that was announced
+            same = regimes.gliding_since(self._running.onset.detected_ns / SECOND_NS)
+            glides = regimes.gliding > again or same > over
+            if glides and not slow and not regimes.full:
                 return []
             events = self._end_glide(regimes, number, EndedBy.SPEED if slow else None)
             return events + (self._rest(regimes, number) if slow else [])
@@ -371,7 +374,8 @@ class Monitor:
         if slow or regimes.asleep:
             return self._rest(regimes, number)
         if regimes.gliding < announce:
-            return self._anew(regimes, number) if regimes.full else []
+            unlikely = regimes.gliding < float(numbers.HOLD[0])
+            return self._anew(regimes, number) if regimes.full and unlikely else []
         dated = self._unreported(regimes)
         if not dated:
             return []
@@ -421,8 +425,7 @@ class Monitor:
             return events
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
-        if was is not None:
-            self._dismissed_s = was.end_ns / SECOND_NS
+        self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
         self._memory.watch.update_ns[0] = ALWAYS
@@ -476,6 +479,7 @@ class Monitor:
         """Begin again with the last minutes: she may manoeuvre for days."""
         source = int(self._memory.watch.source[0])
         events = self._rest(regimes, number)
+        self._regimes = regimes  # what a person told it stays told
         self._wake(source, number)
         return events
 

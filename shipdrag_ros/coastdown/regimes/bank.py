@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import bear, driven, free, thin
+from shipdrag_ros.coastdown.regimes.births import bear, driven, free, switch, thin
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, pushes, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
@@ -42,6 +42,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     P_VAR,
     POWER,
     RAMP_S,
+    RATE,
     REGIME,
     REVS,
     SAID,
@@ -50,7 +51,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     STATES,
     STAYS,
     STAYS_WAY,
-    SWITCHES,
     THE_LOG,
     WAY,
     WEIGHT,
@@ -119,24 +119,20 @@ class Bank(NamedTuple):
 
 @compiled(uncounted=True)
 def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
-    """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
+    """Give birth to the first histories: driven evenly, or not; any instrument may lie."""
     all_ = bank.histories
     hull = setting.hull
     both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
-        by_log = not np.isnan(log) and liar != THE_LOG
+        by_log = log > 0.0 and liar != THE_LOG  # the logarithm of rest is of no use
         speed = log if by_log else track
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        for regime in (DRIVEN, AMID, GLIDE):
-            chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
-            if regime != GLIDE:
-                chance *= n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
+        for regime in (DRIVEN, AMID):
+            chance = n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
-            if not chance > 0.0:
-                continue
             chance *= math.exp(-0.5 * off * off)
             j = all_.used[0]
             all_.used[0] = j + 1
@@ -156,7 +152,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             x[WAY] = 0.5 * setting.step_s * speed
             p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
+            p[CURRENT, CURRENT] = n.CURRENT[0 if setting.log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT] = math.log(chance)
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
@@ -166,10 +162,6 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
                 law = hull_law(hull, max(x[LN_U], hull.sails))[0] + x[LN_A]
                 f[FIRST_A] = math.exp(law)
                 free(all_, j, OPEN, 0.0, (n.AMID[1] * f[FIRST_A]) ** 2)
-            elif regime == GLIDE:
-                free(all_, j, OPEN, 0.0, 0.0)
-                w[COUNT], w[GLIDED] = 1, 1
-                all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
 
 
 @compiled(uncounted=True)
@@ -193,7 +185,9 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
             revs[k] += (gain if revs[k] != 0.0 else 1.0) * (value - revs[k])
             learnt = True
     said[GONE] = np.nan
-    if not np.isnan(said[HIGH]) and speed > 0.0:
+    if np.isnan(said[HIGH]):
+        bank.first[2] = np.nan
+    elif speed > 0.0:
         before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
         gone = 1.0 / n.NO_THRUST_SEEN
         if before > gone >= now:
@@ -224,10 +218,8 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
     elif pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
         bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
         w[GLIDED] = 1
-    elif not pushed and w[COUNT] < SWITCHES:
-        bank.at[i, last + 1], bank.what[i, last + 1] = now_s, LEVEL
-        bank.ramp[i, last + 1] = 0.0
-        w[COUNT] += 1
+    elif not pushed:
+        switch(bank, i, now_s, LEVEL, 0.0)
 
 
 @compiled(uncounted=True)
@@ -270,7 +262,7 @@ _SETTING = BankSetting(
     0.0,
     0.0,
     0,
-    0.0,
+    False,
     0.0,
 )  # its types are all that counts
 
@@ -295,7 +287,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
     _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
-        bear(all_, setting, both)
+        bear(all_, setting, both, not np.isnan(said[RATE]))
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)

@@ -97,6 +97,23 @@ def free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
 
 
 @compiled(uncounted=True)
+def switch(bank: Histories, i: int, now_s: float, regime: int, ramp_s: float) -> None:
+    """
+    Write down a switch.
+    """
+    w = bank.whole[i]
+    if w[COUNT] == SWITCHES:  # the oldest is forgotten
+        for k in range(SWITCHES - 1):
+            bank.at[i, k] = bank.at[i, k + 1]
+            bank.what[i, k] = bank.what[i, k + 1]
+            bank.ramp[i, k] = bank.ramp[i, k + 1]
+        w[COUNT] -= 1
+    bank.at[i, w[COUNT]], bank.what[i, w[COUNT]] = now_s, regime
+    bank.ramp[i, w[COUNT]] = ramp_s
+    w[COUNT] += 1
+
+
+@compiled(uncounted=True)
 def _born(
     bank: Histories,
     i: int,
@@ -115,15 +132,7 @@ def _born(
     f[WEIGHT] += math.log(share)
     f[SINCE], f[RAMP_S] = now_s, ramp_s
     w[REGIME] = regime
-    if w[COUNT] == SWITCHES:  # the oldest is forgotten
-        for k in range(SWITCHES - 1):
-            bank.at[j, k] = bank.at[j, k + 1]
-            bank.what[j, k] = bank.what[j, k + 1]
-            bank.ramp[j, k] = bank.ramp[j, k + 1]
-        w[COUNT] -= 1
-    bank.at[j, w[COUNT]], bank.what[j, w[COUNT]] = now_s, regime
-    bank.ramp[j, w[COUNT]] = ramp_s
-    w[COUNT] += 1
+    switch(bank, j, now_s, regime, ramp_s)
     return int(j)
 
 
@@ -281,7 +290,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
 
 
 @compiled(uncounted=True)
-def bear(bank: Histories, setting: BankSetting, both: bool) -> None:
+def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> None:
     """
     Let every likely history switch at the beginning of this bin.
 
@@ -289,6 +298,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool) -> None:
     ----------
     both
         Two instruments show the motion: either may lie from now on.
+    steered
+        The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
     hours = setting.step_s / 3600.0
@@ -336,8 +347,9 @@ def bear(bank: Histories, setting: BankSetting, both: bool) -> None:
         elif regime == GLIDE:
             _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
             left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
-            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-            left += n.GLIDE_TURN
+            if steered:
+                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+                left += n.GLIDE_TURN
             _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
@@ -376,7 +388,7 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
 @compiled(uncounted=True)
 def thin(bank: Histories, setting: BankSetting) -> None:
     """
-    Weigh against the best; merge and keep the likeliest now and then.
+    Weigh against the best and keep the likeliest; merge now and then.
     """
     count = bank.used[0]
     best = -np.inf

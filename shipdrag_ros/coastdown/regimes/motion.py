@@ -191,7 +191,7 @@ def predict(
     bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
 ) -> float:
     """
-    Carry a history to the end of the bin; return its deceleration there [m/s^2].
+    Carry a history to the end of the bin; return its acceleration there [m/s^2].
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime = bank.whole[i, REGIME]
@@ -327,6 +327,7 @@ def _untrue(f: Float64, column: int, value: float, wide: float, bad: float) -> f
     off = value - f[column]
     stays = 0.0 if np.isnan(off) else n.STUCK * _normal(off, wide)
     density = stays + (1.0 - n.STUCK) * bad
+    f[EXCESS] += 0.5 + math.log(density * _ROOT * wide)
     share = stays / density
     f[column] = value if share < 0.1 else f[column] + 0.1 * share * off
     return math.log(density)

@@ -161,7 +161,10 @@ SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss
 ANNOUNCE = _grid(
-    'ANNOUNCE', (0.7, 0.002), '1', 'P(gliding) above; below, as an end is not taken back'
+    'ANNOUNCE',
+    (0.7, 0.03, 0.005),
+    '1',
+    'P(gliding) above; below, with that of the glide announced: an end is not taken back',
 )
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')

@@ -51,8 +51,6 @@ class SmoothedGlide(NamedTuple):
         the end [s of the bank].
     begin_sd_s
         Standard deviation of `begin_s`.
-    probability
-        The largest in it.
     after
         Regime that follows; -1 where none does.
     """
@@ -62,7 +60,6 @@ class SmoothedGlide(NamedTuple):
     begin_s: float
     end_s: float
     begin_sd_s: float
-    probability: float
     after: int
 
 
@@ -184,7 +181,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         one = shared > 0.5 * (last - first) * step_s
         if not one.any():
             continue
-        glide = _one(found.part(one), peak)
+        glide = _one(found.part(one))
         even_s = _even_s(speed, glide, step_s)
         if even_s < glide.end_s:
             glide = glide._replace(end_s=even_s, after=LEVEL)
@@ -199,7 +196,7 @@ def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
 
 
-def _one(found: Spans, peak: float) -> SmoothedGlide:
+def _one(found: Spans) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
     stop, start, begin, end = (
@@ -209,7 +206,7 @@ def _one(found: Spans, peak: float) -> SmoothedGlide:
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
     codes = np.arange(-1, GLIDE_TURN + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
-    return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, peak, after)
+    return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
 
 
 def _median(value: Float64, share: Float64) -> float:

@@ -70,7 +70,6 @@ class Histories(NamedTuple):
         Columns as above.
     at, what, ramp : (ROOM, SWITCHES)
         When each switch was [s since the start], the regime entered and its ramp [s].
-    scratch : (ROOM,)
     """
 
     used: Int64
@@ -82,7 +81,6 @@ class Histories(NamedTuple):
     at: Float64
     what: Int64
     ramp: Float64
-    scratch: Float64
 
     @classmethod
     def fresh(cls) -> Histories:
@@ -99,7 +97,6 @@ class Histories(NamedTuple):
             np.zeros((ROOM, SWITCHES)),
             np.zeros((ROOM, SWITCHES), np.int64),
             np.zeros((ROOM, SWITCHES)),
-            np.zeros(ROOM),
         )
 
 
@@ -115,8 +112,8 @@ class BankSetting(NamedTuple):
         Length of a bin [s], and over that of the table.
     shafts
         How many are read.
-    glides
-        Probability that the record begins in a glide.
+    log
+        Whether a log is read.
     told_s
         When a person says that the engine was stopped [s since the start]; NaN where nobody does.
     """
@@ -125,14 +122,14 @@ class BankSetting(NamedTuple):
     step_s: float
     pace: float
     shafts: int
-    glides: float
+    log: bool
     told_s: float
 
     @classmethod
     def of(
-        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0
+        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, log: bool = False
     ) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, log, np.nan)

@@ -35,15 +35,18 @@ from shipdrag_ros.coastdown.regimes.read_out import (
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     BRAKE,
+    COUNT,
+    GLIDE,
     GLIDE_TURN,
     GROUND,
     LEVEL,
     LOG,
     LOW,
     TURN,
+    WEIGHT,
     BankSetting,
 )
-from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel, Float64
 from shipdrag_ros.ship import Ship
 
 LEAD_S = 900  # of record before what woke it
@@ -124,16 +127,14 @@ class RegimeFilter:
         Second from which on the record is taken.
     shafts
         How many are read.
-    glides
-        Probability that the record begins in a glide.
+    log
+        Whether a log is read.
     """
 
     def __init__(
-        self, ship: Ship, width: int, first: int, *, shafts: int = 0, glides: float = 0.0
+        self, ship: Ship, width: int, first: int, *, shafts: int = 0, log: bool = False
     ) -> None:
-        self._setting = BankSetting.of(
-            HullPrior.of(ship), float(width), shafts=shafts, glides=glides
-        )
+        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts, log=log)
         self._bank = Bank.fresh()
         self._width = width
         self._next = first // width + 1
@@ -151,7 +152,8 @@ class RegimeFilter:
         """
         first = number - LEAD_S
         shafts = sum(newest_bin(bins, int(each)) > first for each in SHAFTS)
-        made = cls(ship, width, first, shafts=shafts)
+        log = newest_bin(bins, Channel.SPEED_THROUGH_WATER) > first
+        made = cls(ship, width, first, shafts=shafts, log=log)
         made._woken = number
         return made
 
@@ -201,11 +203,6 @@ class RegimeFilter:
         return self._next * self._width > self._woken
 
     @property
-    def step_s(self) -> float:
-        """Length of a bin [s]."""
-        return float(self._width)
-
-    @property
     def _zero_s(self) -> int:
         return self._first * self._width
 
@@ -219,6 +216,17 @@ class RegimeFilter:
         """P(gliding) now, the run-down with it."""
         out = self._bank.out
         return float(out[P_RUN_DOWN] + out[P_GLIDING])
+
+    def gliding_since(self, second: float) -> float:
+        """
+        Return the probability of a glide that began before a second [s since the epoch].
+        """
+        all_ = self._bank.histories
+        used = int(all_.used[0])
+        each, last = np.arange(used), all_.whole[:used, COUNT] - 1
+        glides = (last >= 0) & (all_.what[each, last] == GLIDE)
+        before = self._zero_s + all_.at[each, last] <= second
+        return float(np.exp(all_.number[:used, WEIGHT])[glides & before].sum())
 
     @property
     def slow(self) -> float:
