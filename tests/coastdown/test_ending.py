@@ -108,7 +108,7 @@ def test_a_turn_on_another_mark_ends_it_still(watch, record, sensors) -> None:
 
 def test_fixes_on_another_mark_are_kept_and_live_is_as_replay(ship, record, sensors, bits) -> None:
     block = on_another_mark(
-        record(sensors=(sensors['log'], sensors['radar']), duration_s=500.0), 300.0, 0
+        record(sensors=(sensors['log'], sensors['radar']), duration_s=440.0), 300.0, 0
     )
 
     def watched(blocks) -> list:
@@ -156,14 +156,15 @@ def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float, seed
 
 
 @pytest.mark.parametrize(
-    ('shaft', 'by'), [(1.0, EndedBy.ENGINE), (0.3, EndedBy.ENGINE), (-0.8, EndedBy.ASTERN)]
+    ('shaft', 'thrust', 'by'),
+    [(1.0, 1.0, EndedBy.ENGINE), (0.3, 0.1, EndedBy.ENGINE), (-0.8, 0.1, EndedBy.ASTERN)],
 )
 def test_an_engaged_engine_shows_in_the_shaft_at_once(
-    watch, record, sensors, shaft: float, by: EndedBy
+    watch, record, sensors, shaft: float, thrust: float, by: EndedBy
 ) -> None:
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
-        orders=(STOP, EngineOrder(400.0, shaft=shaft, thrust=0.1)),
+        orders=(STOP, EngineOrder(400.0, shaft=shaft, thrust=thrust)),
         duration_s=440.0,
     )
     coastdown = the_coastdown(watch(block))

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law, thrust
+from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
@@ -36,7 +36,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     P0,
     P_VAR,
     POWER,
-    PUSH,
     RAMP_FROM,
     RAMP_S,
     REGIME,
@@ -151,13 +150,11 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
         j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
         if j >= 0:
-            bank.number[j, PUSH] = 0.0
             free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
     last = bank.whole[i, COUNT] - 1
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
-    push = max(thrust(bank, i, now_s), 0.0) if learnt else 1.0
     for k in range(1 if idles else len(n.RUN_DOWN_S)):
         ramp_s = _NO_RAMP_S if idles else n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
@@ -168,7 +165,7 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             if idles:  # it is the same glide
                 bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
-            bank.number[j, BEFORE], bank.number[j, PUSH] = x[OPEN], push
+            bank.number[j, BEFORE] = x[OPEN]
             _glide(bank, j, setting.hull)
             bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan

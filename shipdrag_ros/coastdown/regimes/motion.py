@@ -56,7 +56,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     P0,
     P_VAR,
     POWER,
-    PUSH,
     RAMP_FROM,
     RAMP_S,
     RATE,
@@ -116,29 +115,20 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 def _thrust_left(f: Float64, now_s: float) -> float:
     """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
     left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
-    return float(left * left * f[PUSH])
-
-
-@compiled(uncounted=True)
-def thrust(bank: Histories, i: int, now_s: float) -> float:
-    """
-    Return the thrust at a level, over the resistance.
-    """
-    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
-    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
-    free = f[FREE] if w[KIND] == 1 else 0.0
-    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
-    return float((_S * rho * rho - rho) / (_S - 1.0))
+    return float(left * left)
 
 
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes."""
-    regime = bank.whole[i, REGIME]
-    if regime == LEVEL:
-        return thrust(bank, i, now_s) > 0.0
-    return regime in (DRIVEN, TURN)
+    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
+    if w[REGIME] != LEVEL:
+        return w[REGIME] in (DRIVEN, TURN)
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+    free = f[FREE] if w[KIND] == 1 else 0.0
+    rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
+    return bool(rho * n.NO_THRUST > 1.0)
 
 
 @compiled(inline=True, uncounted=True)

@@ -33,9 +33,8 @@ WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_
 STAYS, STAYS_WAY = 12, 13
 MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
 GUST_A = 16  # resistance under even power, of which gusts are parts [m/s^2]
-PUSH = 17  # thrust over resistance at the stop
-EXCESS = 18  # log density of the bin's readings of motion, over its expectation
-COLUMNS = 19
+EXCESS = 17  # log density of the bin's readings of motion, over its expectation
+COLUMNS = 18
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
 # number of switches, whether she has glided, how the screw was dragged then
 REGIME, KIND, LIAR, COUNT, GLIDED, GLIDE_KIND = range(6)
