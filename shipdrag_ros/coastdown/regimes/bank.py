@@ -152,7 +152,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             x[WAY] = 0.5 * setting.step_s * speed
             p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0 if setting.log else 1] ** 2
+            p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT] = math.log(chance)
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
@@ -249,6 +249,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
             out[P_RUN_DOWN if running else P_GLIDING] += share
         elif regime == AMID:
             out[P_DRIVEN] += share
+            out[P_EVEN] += share  # under power, and nothing to tell
         elif regime == BRAKE:
             out[P_BRAKED] += share
         else:
@@ -262,7 +263,6 @@ _SETTING = BankSetting(
     0.0,
     0.0,
     0,
-    False,
     0.0,
 )  # its types are all that counts
 
@@ -284,7 +284,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
         _sum_up(bank, setting)
         bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
-    _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
+    _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
         bear(all_, setting, both, not np.isnan(said[RATE]))

@@ -111,8 +111,6 @@ class BankSetting(NamedTuple):
         Length of a bin [s], and over that of the table.
     shafts
         How many are read.
-    log
-        Whether a log is read.
     told_s
         When a person says that the engine was stopped [s since the start]; NaN where nobody does.
     """
@@ -121,14 +119,11 @@ class BankSetting(NamedTuple):
     step_s: float
     pace: float
     shafts: int
-    log: bool
     told_s: float
 
     @classmethod
-    def of(
-        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, log: bool = False
-    ) -> BankSetting:
+    def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, log, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan)

@@ -46,7 +46,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     WEIGHT,
     BankSetting,
 )
-from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel, Float64
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
 LEAD_S = 900  # of record before what woke it
@@ -127,14 +127,10 @@ class RegimeFilter:
         Second from which on the record is taken.
     shafts
         How many are read.
-    log
-        Whether a log is read.
     """
 
-    def __init__(
-        self, ship: Ship, width: int, first: int, *, shafts: int = 0, log: bool = False
-    ) -> None:
-        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts, log=log)
+    def __init__(self, ship: Ship, width: int, first: int, *, shafts: int = 0) -> None:
+        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
         self._bank = Bank.fresh()
         self._width = width
         self._next = first // width + 1
@@ -152,8 +148,7 @@ class RegimeFilter:
         """
         first = number - LEAD_S
         shafts = sum(newest_bin(bins, int(each)) > first for each in SHAFTS)
-        log = newest_bin(bins, Channel.SPEED_THROUGH_WATER) > first
-        made = cls(ship, width, first, shafts=shafts, log=log)
+        made = cls(ship, width, first, shafts=shafts)
         made._woken = number
         return made
 
