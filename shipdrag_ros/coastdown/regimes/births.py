@@ -391,6 +391,9 @@ def thin(bank: Histories, setting: BankSetting) -> None:
     best = -np.inf
     for i in range(count):
         best = max(best, bank.number[i, WEIGHT])
+    if best == -np.inf:  # it begins anew
+        bank.used[0] = 0
+        return
     total = 0.0
     for i in range(count):
         total += math.exp(bank.number[i, WEIGHT] - best)

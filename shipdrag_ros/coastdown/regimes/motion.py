@@ -597,7 +597,8 @@ def weigh(
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
-    f[WEIGHT] += gained
+    # a covariance that rounding broke weighs nothing
+    f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
     if regime in (DRIVEN, TURN, AMID):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
