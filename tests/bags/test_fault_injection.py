@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
+from shutil import disk_usage
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +46,8 @@ WRITERS: dict[str, dict[str, Any]] = {
     'unchunked': {'use_chunking': False},
 }
 MESSAGES = 120
+MEMORY = Path('/dev/shm')  # a disk would sync each of thousands of files
+ENOUGH_BYTES = 1 << 30
 SMALL = [Channel.SHAFT, Channel.DEPTH]  # of few bytes a message
 
 
@@ -135,6 +139,16 @@ def messages_of(content: bytes) -> frozenset[Message]:
 @pytest.fixture(scope='module')
 def samples(block: Block) -> dict[str, Sample]:
     return {writer: make(block, options) for writer, options in WRITERS.items()}
+
+
+@pytest.fixture
+def tmp_path(tmp_path: Path) -> Iterator[Path]:
+    """Return a folder that need not last: in memory where there is room."""
+    if not MEMORY.is_dir() or disk_usage(MEMORY).free < ENOUGH_BYTES:
+        yield tmp_path
+        return
+    with TemporaryDirectory(dir=MEMORY) as folder:
+        yield Path(folder)
 
 
 @pytest.fixture
