@@ -65,7 +65,7 @@ def sound(path: Path, slowing: bool) -> Path:
     time = np.arange(3600.0)
     speed = np.full(len(time), 5.0)
     if slowing:
-        speed[1820:2400] = 2.5
+        speed = np.interp(time, [1820.0, 1880.0, 2400.0, 2460.0], [5.0, 2.5, 2.5, 5.0])
     east = np.where(time // 600.0 % 2 == 0, speed, -speed)
     place = np.array([np.cumsum(east), np.zeros(len(time))]).T
     place += rng.normal(0.0, 1.0, place.shape)

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.motion import balance, hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
@@ -183,8 +183,9 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
 def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the engine go to another level, or engage."""
     f = bank.number[i]
-    engaged = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
-    base = bank.mean[i, OPEN] if engaged else f[BEFORE]
+    regime = bank.whole[i, REGIME]
+    engaged = regime in (DRIVEN, LEVEL)
+    base = balance(bank.mean[i], f, regime, now_s)[0] if engaged else f[BEFORE]
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     for k in range(len(n.LEVELS)):
         for m in range(2 * ramps):
@@ -195,12 +196,12 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 continue
             bank.whole[j, KIND] = m % 2
             bank.number[j, FREE] = n.WINDMILL[0]
-            if bank.whole[i, REGIME] == GLIDE and bank.whole[i, KIND] == WINDMILLS:
+            if regime == GLIDE and bank.whole[i, KIND] == WINDMILLS:
                 revs = f[REVS]
                 bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
-            free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
+            free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
             if not engaged:  # what the screw dragged is over
                 drag = n.DRAGGED[bank.whole[i, KIND]]
                 bank.mean[j, LN_A] -= drag
@@ -216,7 +217,7 @@ def _turns(
         if j >= 0:
             if regime == TURN:
                 f, x, p = bank.number[j], bank.mean[i], bank.spread[i]
-                f[BEFORE], f[REVS] = x[OPEN], np.nan
+                f[BEFORE], f[REVS] = balance(x, f, bank.whole[i, REGIME], now_s)[0], np.nan
                 # what the level before it taught
                 f[A0], f[A_VAR], f[P0], f[P_VAR] = (
                     x[LN_A],
@@ -272,7 +273,9 @@ def driven(bank: Histories, j: int, hull: HullPrior) -> None:
     f[FIRST_A] = f[GUST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
     free(bank, j, OPEN, x[LN_U], p[LN_U, LN_U])
     # the same error: she is in balance
-    p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
+    for k in range(STATES):
+        if k != OPEN:
+            p[k, OPEN] = p[OPEN, k] = 0.9 * p[LN_U, k]
 
 
 @compiled(uncounted=True)

@@ -118,14 +118,22 @@ def _thrust_left(f: Float64, now_s: float) -> float:
     return float(left * left)
 
 
+@compiled(inline=True, uncounted=True)
+def balance(x: Float64, f: Float64, regime: int, now_s: float) -> tuple[float, float]:
+    """Return ln of the speed at which thrust and water would balance now, and part of the ramp."""
+    if regime == TURN:
+        return f[BEFORE], 0.0
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S]) if regime == LEVEL else 1.0
+    return f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share if share < 1.0 else x[OPEN], share
+
+
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes."""
     f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
     if w[REGIME] != LEVEL:
         return w[REGIME] in (DRIVEN, TURN)
-    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+    target = balance(x, f, LEVEL, now_s)[0]
     free = f[FREE] if w[KIND] == 1 else 0.0
     rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
     return bool(rho * n.NO_THRUST > 1.0)
@@ -139,12 +147,7 @@ def _force(
     a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
     left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
     if regime in (DRIVEN, LEVEL, TURN):
-        target, share = x[OPEN], 1.0
-        if regime == TURN:
-            target, share = f[BEFORE], 0.0
-        elif regime == LEVEL:
-            share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-            target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
+        target, share = balance(x, f, regime, now_s)
         rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
@@ -355,13 +358,8 @@ def _driving(
 ) -> float:
     """Return the density of the revs of a screw that drives."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
-    target, settled = x[OPEN], True
-    if regime == TURN:
-        target = f[BEFORE]
-    elif regime == LEVEL:
-        share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-        target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        settled = share == 1.0
+    target, share = balance(x, f, regime, now_s)
+    settled = regime == TURN or share == 1.0
     at = math.exp(min(target - log_first, 1.0))
     if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
         free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
