@@ -98,6 +98,13 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
+def _bounded(hull: HullPrior, log_u: float) -> float:
+    """Return ln u of a hull that is at rest at least, and no faster than any."""
+    last = hull.first + (len(hull.curve) - 1.0) * hull.step
+    return float(min(max(log_u, hull.first - 1.0), last + 2.0))
+
+
+@compiled(inline=True, uncounted=True)
 def _advance(part: float, free: float) -> tuple[float, float]:
     """
     Return revs over speed, as of steady sailing, and their derivative by ln of `part`.
@@ -256,7 +263,7 @@ def predict(
         lagged = keep_f * x[LAG] - u * change
         mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
         x[LAG] = lagged
-        x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
+        x[LN_U] = _bounded(setting.hull, x[LN_U] + change)
         mean_u += 0.5 * (u + math.exp(x[LN_U])) / _PARTS
         x[LN_A] += power * change
         x[GUST] *= keep_g
@@ -277,7 +284,7 @@ def _take(
     off: float,
     variance: float,
     bad: float,
-    least: float,
+    hull: HullPrior,
 ) -> tuple[float, float]:
     """
     Update by one reading, as usual, of more scatter, or bad.
@@ -305,7 +312,7 @@ def _take(
             for k in range(j + 1):
                 p[j, k] += (around - gain) * work[0, j] * work[0, k]
                 p[k, j] = p[j, k]
-        x[LN_U] = max(x[LN_U], least)
+        x[LN_U] = _bounded(hull, x[LN_U])
     return math.log(density), 0.5 + math.log(density * _ROOT * math.sqrt(total))
 
 
@@ -510,8 +517,7 @@ def _by_way(
         h[j] = 0.0
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
-    least = setting.hull.first - 1.0
-    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
+    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull)
     f[EXCESS] += excess
     if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
         _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
@@ -551,7 +557,6 @@ def weigh(
     h = work[STATES]
     gained = f[EXCESS] = 0.0
     bad = float(n.BAD_DENSITY)
-    least = setting.hull.first - 1.0  # at rest
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
@@ -575,7 +580,7 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
+        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, setting.hull)
         gained += shown
         f[EXCESS] += excess
     if not np.isnan(said[ADVANCE]):

@@ -306,7 +306,7 @@ class RegimeFilter:
         start_ns, end_ns = (
             round((self._zero_s + k * self._width) * SECOND_NS) for k in (first, last)
         )
-        said = f'{text}: P(gliding) was never above {most:.2f}'
+        said = f'{text}: P(gliding) was {most:.2f} at most'
         return NotCoastdown(start_ns, end_ns, reason, said)
 
     def whole_glides(self) -> list[tuple[float, float]]:
