@@ -287,13 +287,15 @@ class RegimeFilter:
         )
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
+        if glide.after < 0:
+            return None
         around = _ASTERN_S * self._setting.pace
         first, last = (
             max(round((glide.end_s + off) / self._width), 0) for off in (-around, around)
         )
         if any(low < _ASTERN for low in self._low[first : last + 1]):
             return EndedBy.ASTERN
-        return _ENDED.get(glide.after)
+        return _ENDED[glide.after]
 
     def dismissal(self, since_s: float) -> NotCoastdown | None:
         """
