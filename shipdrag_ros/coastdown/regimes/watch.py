@@ -295,7 +295,7 @@ class RegimeFilter:
         )
         if any(low < _ASTERN for low in self._low[first : last + 1]):
             return EndedBy.ASTERN
-        return _ENDED[glide.after]
+        return _ENDED.get(glide.after)
 
     def dismissal(self, since_s: float) -> NotCoastdown | None:
         """
