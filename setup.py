@@ -79,7 +79,7 @@ FORMATS = {  # of logs: name and module
 
 setup(
     name=PACKAGE,
-    version='0.4.0',
+    version='0.5.0',
     description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
     long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',

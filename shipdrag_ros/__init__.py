@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # on every computer of a kind
 os.environ.setdefault('NUMBA_CPU_NAME', 'generic')
 
-__version__ = '0.4.0'
+__version__ = '0.5.0'
 
 __all__ = [
     'Coastdown',

@@ -300,7 +300,12 @@ def named(kind: Kind) -> Kind:
 
 
 def read_keys(
-    known: Mapping[str, Key], value: object, path: str, problems: Problems
+    known: Mapping[str, Key],
+    value: object,
+    path: str,
+    problems: Problems,
+    *,
+    former: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """
     Check a mapping against the keys that are known; return what is given and valid.
@@ -315,6 +320,8 @@ def read_keys(
         Of the mapping in its file, '' for the file itself.
     problems
         Each finding is added, with the key it is about.
+    former
+        Keys of earlier versions, and what replaces each.
 
     Returns
     -------
@@ -326,7 +333,9 @@ def read_keys(
         problems.append(f'{path or "the file"}: {found}, expected the keys {", ".join(known)}')
         return {}
     for key in value:
-        if key not in known:
+        if key in former:
+            problems.append(f'{dotted(path, str(key))}: no key any more; {former[key]}')
+        elif key not in known:
             near = difflib.get_close_matches(str(key), known, n=1)
             hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
             problems.append(f'{dotted(path, str(key))}: unknown key; {hint}')

@@ -33,6 +33,13 @@ from shipdrag_ros.fields import (
 _SECTION = 'ros__parameters'
 FORMER_ESTIMATORS = dict.fromkeys(('auto', 'log_time', 'ode_fit', 'warped', 'motion'), 'one')
 """Names that an estimator had before, and what they are now; a file may not use them."""
+_JUDGED = 'leave it out: the probability of each regime judges it, without a threshold to set'
+FORMER_KEYS = {
+    'regimes': 'leave it out: the filter of regimes is the only judge of a deceleration',
+    'confirm_s': _JUDGED,
+    'shaft_stopped_fraction': _JUDGED,
+}
+"""Keys that a parameter file had before, and what replaces each."""
 # every module of that folder is one; listed without importing it
 ESTIMATORS = tuple(
     module.name
@@ -125,25 +132,10 @@ class Parameters:
         low=1e-3,
         high=100.0,
     )
-    confirm_s: float = _parameter(
-        120.0,
-        'length of deceleration that must look like a coastdown before one is confirmed '
-        'without shaft speed; shorter: figures come sooner, and slow-downs are taken for stops',
-        unit='s',
-        low=10.0,
-        high=1200.0,
-    )
-    shaft_stopped_fraction: float = _parameter(
-        0.5,
-        'shaft speed, as a fraction of the steady one, below half of which a propeller counts as '
-        'standing; larger: a windmilling propeller counts as standing',
-        low=0.05,
-        high=0.9,
-    )
     turn_rad: float = _parameter(
         0.35,
-        'a change of heading, or of course over ground, that ends a coastdown; larger: turning '
-        'slows the ship and is counted as resistance',
+        'a change of heading, or of course over ground, from which on a window that is given by '
+        'hand is cut; larger: turning slows the ship and is counted as resistance',
         unit='rad',
         low=0.05,
         high=3.0,
@@ -195,12 +187,6 @@ class Parameters:
         'one: one posterior of hull, thrust, instruments and noise, of all inputs, while a '
         'coastdown runs and after it; s1_...: the published problems',
         choices=ESTIMATORS,
-    )
-    regimes: str = _parameter(
-        'rules',
-        'what judges a deceleration. rules: those of the onset, the shafts and the end; filter: '
-        'one model of driven, gliding, braked and turning, under trial',
-        choices=('rules', 'filter'),
     )
     order_max: int = _parameter(
         20,
@@ -267,7 +253,7 @@ class Parameters:
         10.0
         """
         problems: list[str] = []
-        accepted = read_keys(keys_of(cls), dict(values), '', problems)
+        accepted = read_keys(keys_of(cls), dict(values), '', problems, former=FORMER_KEYS)
         if problems:
             raise ParameterError(subject, problems)
         return cls(**accepted)
@@ -307,7 +293,7 @@ class Parameters:
         dropped: list[str] = []
         for name, value in _values(text, subject=subject).items():
             problems: list[str] = []
-            read = read_keys(known, {name: value}, '', problems)
+            read = read_keys(known, {name: value}, '', problems, former=FORMER_KEYS)
             if problems:
                 dropped.append(f'{subject}: {"; ".join(problems)}: not used')
             else:

@@ -44,7 +44,7 @@ from shipdrag_ros.sources.reading import read_any
 
 PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'vouching.txt'
 START_NS = 1_700_000_000 * SECOND_NS
-LEAD_S, COAST_S = 1200, 900
+LEAD_S, COAST_S = 1200, 600
 LASTS_S = LEAD_S + COAST_S - 60
 SCALES = {
     '0.4 times': 0.4, '0.5 times': 0.5, '0.6 times': 0.6, '0.7 times': 0.7, '1.4 times': 1.4,
@@ -104,7 +104,8 @@ def faulty(fault: str, ground: Channel, *, seed: int = 0) -> Block:
     rng = np.random.default_rng(seed)
     count = LEAD_S + COAST_S
     time_s = np.arange(count, dtype=np.float64)
-    speed = 5.0 / (1.0 + 2e-3 * np.maximum(time_s - LEAD_S, 0.0)) + slow(rng, count, 0.03, 60.0)
+    # about as friction and waves slow hulls of that length and volume
+    speed = 5.0 / (1.0 + 5e-3 * np.maximum(time_s - LEAD_S, 0.0)) + slow(rng, count, 0.03, 60.0)
     log = speed + rng.normal(0.0, 0.03, count)
     nonsense = {
         'random': rng.uniform(0.0, 10.0, count),

@@ -41,7 +41,7 @@ CONFIRMED_S = 120.0  # played fast, after the stop
 LIVE_S = 700.0  # at most
 SETTLE_S = 3.0
 CATCH_UP_S = 120.0
-PARAMETERS = {'update_s': 1.0, 'steady_s': 60.0, 'slope_window_s': 30.0, 'confirm_s': 30.0}
+PARAMETERS = {'update_s': 1.0, 'steady_s': 60.0, 'slope_window_s': 30.0}
 
 Span = tuple[float, float]
 """Begin and end [s, steady clock]."""

@@ -77,7 +77,6 @@ def measure(rate_hz: float) -> str:
         'update_s': 1.0,
         'steady_s': 60.0,
         'slope_window_s': 30.0,
-        'confirm_s': 30.0,
     }
     heard: list[tuple[float, int]] = []  # when, stamp [ns]
 

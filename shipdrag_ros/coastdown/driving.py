@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings, seconds
-from shipdrag_ros.estimation.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
@@ -33,14 +32,11 @@ _RISES = 1.3  # a shaft that the water turns does not go faster again
 _JOIN = 0.05  # of the window: pauses of the thrust no longer than this are part of it
 _DIAMETER = 0.05  # of a propeller, of the length, where it is not stated
 _SLIP = 0.1  # of the ship's speed: a screw that goes forward by less can drive nothing
-_IDLES = 1.4  # of the turns a metre that drive the ship: no propeller that drives has as many ...
-_IDLES_ON_TRACK = 1.7  # the same where a current may be part of the speed
-_OFTEN = 0.1  # ... for this part of the time
-_PUSHES = 0.7  # of those: with fewer a propeller hardly pushes
 _RUN_DOWNS, _ONSET_S = 5.0, 30.0
+_PUSHES = 0.7  # of those: with fewer a propeller hardly pushes
 
 
-def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
+def thrust(window: Window, ship: Ship) -> list[NotCoastdown]:
     """
     Find when a propeller drives, or is driven astern.
 
@@ -49,10 +45,7 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
     window
         With the record `before` it, if there is any.
     ship
-        For the size of the propeller and its run-down.
-    steady
-        The record before is of steady sailing up to an engine stop: what runs
-        down from the start on belongs to the coastdown.
+        For the size of the propeller.
     """
     record = [_joined(window, number) for number in range(len(window.shafts))]
     top = max((float(np.abs(n).max(initial=0.0)) for _, n, _ in record), default=0.0)
@@ -66,15 +59,12 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
             continue
         v = np.interp(time_s, speed_s, speed) if len(speed_s) else np.full(len(time_s), np.nan)
         fast = (np.abs(turning) > _IDLE * top) & _can_drive(turning, v, ship) & ~idle
-        drives = _driven(time_s, turning, v, fast, steady=steady, by_log=by_log)
+        drives = _driven(time_s, turning, v, fast, by_log=by_log)
         driven = turning[fast]
         ahead = 1.0 if not len(driven) or np.median(driven) >= 0.0 else -1.0
         name = f'shaft {number + 1}' if several else 'the shaft'
         for first, last in runs(drives & (time_s >= 0.0), time_s, _JOIN * length_s(window)):
             start_s, end_s = max(float(time_s[first]), 0.0), until(time_s, last, window)
-            from_onset = first == int(np.argmax(time_s >= 0.0))
-            if steady and from_onset and end_s < gone_s(ship):
-                continue
             run = turning[first : last + 1]
             fastest = float(run[np.argmax(np.abs(run))])
             is_astern = fastest < 0.0 < ahead
@@ -89,74 +79,26 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
     return found
 
 
-def idles(window: Window) -> bool:
-    """
-    Say whether all shafts turn on, but more often a metre than ever drove the ship.
-
-    Notes
-    -----
-    A propeller that drives with less power turns less often a metre than in steady
-    sailing, until the ship has slowed to where it drives her as before. If she slows on
-    beyond that it is at zero pitch, which nothing shows where no pitch is known. What
-    it does after it has stopped says nothing.
-    """
-    speed_s, speed = _speed_of_record(window)
-    most = _IDLES if len(window.speed_through_water) >= LEAST_READINGS else _IDLES_ON_TRACK
-    found = False
-    for number, shaft in enumerate(window.shafts):
-        past = None if window.before is None else window.before.shafts[number]
-        # a shaft that stood before as well has driven nothing: its sensor is dead
-        if not len(shaft) or past is None or not len(past):
-            continue
-        if np.median(np.abs(past.value)) < STANDS_RAD_S:
-            continue
-        if len(window.pitches[number]) or not len(speed_s):
-            return False
-        time_s, turning, _ = _joined(window, number)
-        v = np.interp(time_s, speed_s, speed)
-        turns = np.abs(turning) / np.maximum(np.abs(v), max(0.02 * float(np.abs(v).max()), 1e-9))
-        usual = float(np.median(turns[time_s < 0.0]))
-        size = np.abs(turning[time_s >= 0.0])
-        if np.any(size > _RISES * np.minimum.accumulate(size) + STANDS_RAD_S):
-            return False
-        on = turns[time_s >= 0.0][size > STANDS_RAD_S]
-        if not len(on) or np.quantile(on, 1.0 - _OFTEN) < most * usual:
-            return False
-        found = True
-    return found
-
-
-def gone_s(ship: Ship) -> float:
-    """
-    Return how long after an onset the thrust is surely gone [s].
-    """
-    constant_s = 0.0 if ship.propulsion is None else ship.propulsion.run_down_s
-    return _ONSET_S + _RUN_DOWNS * constant_s
-
-
 def start_of(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
     """
-    Return the start of a coastdown, and whether what comes before it may be steady sailing.
+    Return the start of a window that was given, and whether what comes before may be steady.
+
+    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
+    good as before any other. What was cut before that, the engine drove.
 
     Parameters
     ----------
     coastdown
-        That has ended.
+        As it was judged.
     ship
         For how long the thrust runs down.
-
-    Notes
-    -----
-    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
-    good as before any other. What was cut before that, the engine drove: it may be steady.
     """
-    if not coastdown.cut_at_start:
-        return coastdown.start_ns, True
     cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
-    first_ns = min(cut.start_ns for cut in cuts)
-    if all(cut.reason is Dismissal.THRUST for cut in cuts):
-        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * SECOND_NS)), True
-    return coastdown.start_ns, False
+    if not cuts or any(cut.reason is not Dismissal.THRUST for cut in cuts):
+        return coastdown.start_ns, not cuts
+    constant_s = 0.0 if ship.propulsion is None else ship.propulsion.run_down_s
+    gone_ns = round((_ONSET_S + _RUN_DOWNS * constant_s) * SECOND_NS)
+    return max(min(cut.start_ns for cut in cuts), coastdown.start_ns - gone_ns), True
 
 
 def _joined(window: Window, number: int) -> tuple[Float64, Float64, NDArray[np.bool_]]:
@@ -200,7 +142,6 @@ def _driven(
     speed: Float64,
     fast: NDArray[np.bool_],
     *,
-    steady: bool,
     by_log: bool,
 ) -> NDArray[np.bool_]:
     """Say where an engine turns a shaft, and not the water."""
@@ -209,7 +150,7 @@ def _driven(
         return fast
     turns = size / np.maximum(np.abs(speed), max(0.02 * float(np.abs(speed).max()), 1e-9))
     drives = np.zeros(len(size), bool)
-    usual = _usual_turns(time_s, turning, turns, speed, fast, steady=steady)
+    usual = _usual_turns(time_s, turning, turns, speed, fast)
     if usual is not None:
         ratio, sign = usual
         drives |= fast & ((turns >= _DRIVING * ratio) | (turning * sign < 0.0))
@@ -221,7 +162,6 @@ def _driven(
             turning[run],
             np.abs(speed[run]),
             usual=None if usual is None else usual[0],
-            steady=steady,
             by_log=by_log,
         )
     return drives
@@ -233,8 +173,6 @@ def _usual_turns(
     turns: Float64,
     speed: Float64,
     fast: NDArray[np.bool_],
-    *,
-    steady: bool,
 ) -> tuple[float, float] | None:
     """Return turns a metre and sense of the shaft as it drives the ship; None if not known."""
     past = np.flatnonzero(time_s < 0.0)
@@ -243,7 +181,7 @@ def _usual_turns(
     third = len(past) // 3
     early, late = np.median(speed[past[:third]]), np.median(speed[past[-third:]])
     driven = past[fast[past]]
-    even = steady or _STEADY * early <= late <= early / _STEADY
+    even = _STEADY * early <= late <= early / _STEADY
     if not even or len(driven) < 0.5 * len(past):
         return None
     return float(np.median(turns[driven])), float(np.sign(np.median(turning[driven])))
@@ -255,7 +193,6 @@ def _is_driven(
     speed: Float64,
     *,
     usual: float | None,
-    steady: bool,
     by_log: bool,
 ) -> NDArray[np.bool_]:
     """Judge one run of a turning shaft by whether it follows the ship's speed."""
@@ -268,7 +205,7 @@ def _is_driven(
     slowed = _fall(size, some)
     if fell > _SHOWN:
         power = math.log(max(slowed, 1e-9)) / math.log(fell)
-        follows = power >= _FOLLOWS and (steady or power < _RUNS_DOWN)
+        follows = _FOLLOWS <= power < _RUNS_DOWN
         follows = follows and not (by_log and least and _pushes_again(size, speed, least))
     else:
         # what turns with the water does not make the ship faster

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
 from shipdrag_ros.display import short_repr
@@ -12,6 +12,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.path import PathAhead
 from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.samples import Float64, Int64
 
 BRAKED = (
     'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
@@ -27,7 +28,7 @@ class State(Enum):
 
     WAITING = 'waiting'  # not enough record to know what steady is
     STEADY = 'steady'  # watching for an onset
-    CANDIDATE = 'candidate'  # decelerating, not yet confirmed
+    CANDIDATE = 'candidate'  # probably not under even power
     COASTDOWN = 'coastdown'  # confirmed, estimating
 
 
@@ -59,26 +60,45 @@ class Dismissal(Enum):
     SETTLED = 'settled'  # a new steady speed after a small loss: power reduced
     SLOW = 'slow'  # below the minimum speed
     GAP = 'gap'  # the data stopped before it could be confirmed
-    OUTLIER = 'outlier'  # bad readings
     OTHER = 'other'
 
 
-BY_SPEED = frozenset(
-    {
-        Dismissal.BRAKE,
-        Dismissal.LEAD_IN,
-        Dismissal.PLATEAU,
-        Dismissal.SETTLED,
-        Dismissal.THRUST,
-    }
-)
-"""For these a candidate is dismissed by its speed; a turn, a gap and bad readings are causes."""
+BY_SPEED = frozenset({Dismissal.BRAKE, Dismissal.SETTLED, Dismissal.THRUST})
+"""For these a stretch is dismissed by its speed; a turn and a gap are causes."""
+
+
+@dataclass(frozen=True)
+class Regimes:
+    """
+    What she did, as far as the record up to its end shows it.
+
+    Attributes
+    ----------
+    time_ns : (n,)
+        Middle of each bin [ns].
+    speed_m_s : (n,)
+        Mean speed in it.
+    probability
+        Of each regime, by its name, (n,) each.
+    excess
+        Mean log density of a reading, over what the model expects of it [nats].
+    explained
+        Share of the records that the model was learnt on which it explains less well.
+    """
+
+    __repr__ = short_repr
+
+    time_ns: Int64
+    speed_m_s: Float64
+    probability: Mapping[str, Float64]
+    excess: float
+    explained: float
 
 
 @dataclass(frozen=True)
 class NotCoastdown:
     """
-    A candidate that was dismissed, or a part of a window that was cut.
+    A slowing down that was none, or a part of a window that was cut.
 
     `text` says in one sentence, with figures, what spoke against it.
     """
@@ -130,8 +150,9 @@ class EndedCoastdown:
     start) where there is no heading. One that was `withdrawn` turned out to be none: a
     `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are no
     coastdown, before `start_ns` and after `end_ns`; or all of what speaks against one that was
-    withdrawn. Where there are any, `stretch` shows the whole of it: times [ns] and mean speeds
-    [m/s].
+    withdrawn. The thrust began to fall at `stop_ns`, not after `start_ns`; None where the window
+    was given, and what comes before it is not known to be steady sailing: `regimes` is None then,
+    and where there are cuts, `stretch` shows the whole of it: times [ns] and mean speeds [m/s].
     """
 
     __repr__ = short_repr
@@ -146,6 +167,8 @@ class EndedCoastdown:
     withdrawn: bool = False
     cuts: tuple[NotCoastdown, ...] = ()
     stretch: tuple[tuple[int, float], ...] = ()
+    stop_ns: int | None = None
+    regimes: Regimes | None = field(default=None, repr=False)
 
     @property
     def stands(self) -> bool:
@@ -170,10 +193,17 @@ class EndedCoastdown:
         """What but the water acted in a part of it, a clause; '' where nothing did."""
         return BRAKED if self.braked else TURNED if self.turned else ''
 
-    @property
-    def cut_at_start(self) -> bool:
-        """Whether what comes before it is no steady sailing, but was cut off."""
-        return any(cut.start_ns < self.start_ns for cut in self.cuts)
+
+@dataclass(frozen=True)
+class WholeGlide:
+    """
+    A stretch without thrust in which something but the water acted.
+
+    It is more than the coastdown in it, or holds none.
+    """
+
+    start_ns: int
+    end_ns: int
 
 
 @dataclass(frozen=True)
@@ -184,6 +214,6 @@ class Reset:
     reason: str
 
 
-Event = Onset | Update | NoEstimate | NotCoastdown | EndedCoastdown | Reset
+Event = Onset | Update | NoEstimate | NotCoastdown | EndedCoastdown | WholeGlide | Reset
 OnCoastdown = Callable[[EndedCoastdown, Window], None]
 """Called with a coastdown that has ended and its window."""

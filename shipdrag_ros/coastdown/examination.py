@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A stretch of record is cut to what is a coastdown before anything is fitted.
+A window that a person claims is cut to what is a coastdown before anything is fitted.
 
 Instruments speak first (`instruments`), then the speed itself (`force_law`). The
 longest clean part is kept, or the stretch is refused with the reason.
@@ -15,16 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.driving import gone_s, idles, thrust
+from shipdrag_ros.coastdown.driving import thrust
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
-from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, swing, turns
+from shipdrag_ros.coastdown.instruments import astern, gaps, rudder, swing, turns
 from shipdrag_ros.coastdown.readings import binned, readings
-from shipdrag_ros.coastdown.thrust_end import thrust_end
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.shaft_fall import IDLING
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
@@ -33,9 +31,7 @@ from shipdrag_ros.ship import Ship
 LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are noted
-_SHORTEST = 0.5  # of confirm_s: less at the end of what was found is no coastdown by itself
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
-_LATE_S = 10.0  # of the thrust after an onset that is worth a cut
 _TURNS = 0.25  # of turn_rad, by which the heading swings where it is a turn that stops her
 _TURN_MOST = 4.0  # times the deceleration before: no turn slows her by more
 _MANY = 20  # readings that must be left by them, since fewer show less than the turn spoils
@@ -90,11 +86,12 @@ def estimate_examined(
     ship: Ship,
     parameters: Parameters,
     estimator: Callable[[Window, Ship, Parameters], Estimate],
-    *,
-    steady: bool = True,
 ) -> Examined:
     """
     Cut a window to what is a coastdown and estimate r(v) from that.
+
+    The record before it is not known to be steady sailing; it helps to judge, and teaches the
+    estimate nothing.
 
     Parameters
     ----------
@@ -103,17 +100,12 @@ def estimate_examined(
     ship, parameters
     estimator
         Raises `EstimationError` where no estimate is possible.
-    steady
-        The record before is steady sailing up to the engine stop, as of a
-        coastdown that was found. Else it only helps to judge the window.
     """
-    examined = examine(window, ship, parameters, steady=steady)
+    examined = examine(window, ship, parameters)
     estimate, failure = None, examined.failure
     if failure is None:
         part = window.part(examined.start_ns, examined.end_ns)
-        part = replace(
-            part, before=part.before if steady else None, notes=(*examined.notes, *part.notes)
-        )
+        part = replace(part, before=None, notes=(*examined.notes, *part.notes))
         try:
             estimate = estimator(part, ship, parameters)
         except EstimationError as error:
@@ -129,29 +121,6 @@ def estimate_examined(
     )
 
 
-def estimate_kept(
-    window: Window,
-    cuts: tuple[NotCoastdown, ...],
-    ship: Ship,
-    parameters: Parameters,
-    estimator: Callable[[Window, Ship, Parameters], Estimate],
-) -> Examined:
-    """
-    Estimate r(v) from a window that the regimes have chosen already.
-
-    Parameters
-    ----------
-    cuts
-        What lies about it and is no coastdown.
-    """
-    estimate, failure = None, None
-    try:
-        estimate = estimator(window, ship, parameters)
-    except EstimationError as error:
-        failure = str(error)
-    return Examined(window.start_ns, window.end_ns, cuts, estimate, failure, False, ())
-
-
 def _shown(window: Window) -> tuple[tuple[int, float], ...]:
     """Return the speed of a whole window, for a picture."""
     time_s, speed = binned(*readings(window), _SHOWN)
@@ -161,9 +130,7 @@ def _shown(window: Window) -> tuple[tuple[int, float], ...]:
     )
 
 
-def examine(
-    window: Window, ship: Ship, parameters: Parameters, *, steady: bool = True
-) -> Examination:
+def examine(window: Window, ship: Ship, parameters: Parameters) -> Examination:
     """
     Find the longest part of a window that is a coastdown.
 
@@ -175,8 +142,6 @@ def examine(
         For what slows her down as a rule, and for her propeller.
     parameters
         `turn_rad`, `data_stop_s` and `heading_convention` are used.
-    steady
-        See `estimate_examined`.
 
     Notes
     -----
@@ -184,48 +149,25 @@ def examine(
     by `LEAST_FALL` in it. Where nothing is cut nothing is refused: what a short
     or even record gives is for the estimator to say.
     """
-    steady = steady and window.before is not None
     whole = (window.start_ns, window.end_ns)
-    idling = steady and idles(window)
     cuts = [
         *gaps(window, parameters),
-        *([] if idling else thrust(window, ship, steady=steady)),
-        *(_slow_stop(window, ship) if steady else []),
+        *thrust(window, ship),
         *astern(window, parameters),
     ]
     top = float(np.max(np.abs(readings(window)[1]), initial=0.0))
-    parts = [
-        _examine_part(window, span, ship, parameters, top, steady=steady)
-        for span in _left(whole, cuts)
-    ]
+    parts = [_examine_part(window, span, ship, parameters, top) for span in _left(whole, cuts)]
     best = max(parts, key=lambda part: (part.worth, part.kept[1] - part.kept[0]), default=None)
     for part in parts:
         cuts += part.cuts if part is best else [part.set_aside]
     cuts.sort(key=lambda cut: cut.start_ns)
     kept = None if best is None else best.kept
-    least_s = _SHORTEST * parameters.confirm_s if steady else 0.0
-    failure = _refusal(window, kept, cuts, least_s) if cuts else None
+    failure = _refusal(window, kept, cuts) if cuts else None
     start_ns, end_ns = whole if failure or kept is None else kept
     if failure is None:  # what lies between two samples is worth no word
         cuts = [cut for cut in cuts if cut.end_ns - cut.start_ns > _WORDLESS * _length(whole)]
     notes = () if best is None else tuple(best.notes)
-    if idling:
-        notes = (*notes, IDLING)
     return Examination(start_ns, end_ns, tuple(cuts), failure, notes)
-
-
-def _slow_stop(window: Window, ship: Ship) -> list[NotCoastdown]:
-    """Let the speed show how long the thrust ran down, where no shaft does."""
-    if any(len(shaft) for shaft in window.shafts):
-        return []
-    end = thrust_end(window, 0.0 if ship.propulsion is None else ship.propulsion.run_down_s)
-    if end is None or end.ended_s < _LATE_S:
-        return []
-    text = (
-        f'the deceleration grows for {end.ended_s - end.began_s:.0f} s: the thrust runs down '
-        f'slowly, and is gone {end.ended_s:.0f} ± {end.sd_s:.0f} s after the onset'
-    )
-    return [cut_of(window, 0.0, end.ended_s, Dismissal.THRUST, text)]
 
 
 class _KeptPart(NamedTuple):
@@ -249,11 +191,9 @@ def _examine_part(
     ship: Ship,
     parameters: Parameters,
     top: float,
-    *,
-    steady: bool,
 ) -> _KeptPart:
     kept, cuts, notes = _steered(window.part(*span), ship, parameters)
-    by_speed = _by_speed(window, kept, ship, parameters, steady=steady)
+    by_speed = _by_speed(window, kept, ship, parameters)
     kept = max(_left(kept, by_speed), key=_length, default=(kept[0], kept[0]))
     first, last, _ = _ends(window.part(*kept))
     fall = 1.0 - last / first if first > 0.0 else 0.0
@@ -306,25 +246,20 @@ def _steered(
 
 
 def _by_speed(
-    window: Window, kept: _SPAN, ship: Ship, parameters: Parameters, *, steady: bool
+    window: Window, kept: _SPAN, ship: Ship, parameters: Parameters
 ) -> list[NotCoastdown]:
     """Let the speed show where it is not that of a ship that coasts."""
     part = window.part(*kept)
     time_s, speed = readings(part)
-    from_onset = steady and kept[0] == window.start_ns
-    skip_s = 0.0
-    if from_onset:  # while the thrust runs down the deceleration grows
-        skip_s = min(gone_s(ship), (kept[1] - kept[0]) / 3e9)
-    settled = time_s >= skip_s
 
     def usual(speed_m_s: float) -> float:
-        return expect(ship, speed_m_s).deceleration_m_s2
+        return expect(ship, speed_m_s)
 
     cuts = []
-    for cut in departures(time_s[settled], speed[settled], usual):
+    for cut in departures(time_s, speed, usual):
         start_ns = kept[0] + round(cut.start_s * SECOND_NS)
         end_ns = kept[0] + round(cut.end_s * SECOND_NS)
-        at_start = cut.start_s <= float(time_s[settled][0])
+        at_start = cut.start_s <= float(time_s[0])
         at_end = cut.end_s >= float(time_s[-1])
         reason, text = cut.reason, cut.text
         if at_end and reason is Dismissal.BRAKE and cut.quickened < _TURN_MOST:
@@ -359,21 +294,17 @@ def _length(span: _SPAN) -> int:
     return span[1] - span[0]
 
 
-def _refusal(
-    window: Window, kept: _SPAN | None, cuts: Sequence[NotCoastdown], least_s: float
-) -> str | None:
+def _refusal(window: Window, kept: _SPAN | None, cuts: Sequence[NotCoastdown]) -> str | None:
     """Say why what is left is no coastdown; None where it may be one."""
     why = '; '.join(dict.fromkeys(f'{cut.reason.value}: {cut.text}' for cut in cuts))
     if kept is None or not _length(kept):
         return f'nothing of it is a coastdown: {why}'
     first, last, count = _ends(window.part(*kept))
     fall = 1.0 - last / first if first > 0.0 else 0.0
-    long_enough = kept[0] == window.start_ns or _length(kept) >= least_s * SECOND_NS
-    if count >= LEAST_READINGS and fall >= LEAST_FALL and long_enough:
+    if count >= LEAST_READINGS and fall >= LEAST_FALL:
         return None
-    least = f'{least_s:.0f} s, ' if least_s else ''
     return (
         f'what is left is no coastdown: {_length(kept) * 1e-9:.1f} s with {count} readings, '
-        f'in which the speed falls by {fall:.0%}; it takes {least}{LEAST_READINGS} readings and '
+        f'in which the speed falls by {fall:.0%}; it takes {LEAST_READINGS} readings and '
         f'a fall of {LEAST_FALL:.0%}; cut was {why}'
     )

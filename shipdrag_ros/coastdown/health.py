@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -53,11 +54,14 @@ class MonitorProgress:
         The longest steady record that is of use.
     coastdown_since_ns
         Stamp of the stop; None where no coastdown runs.
+    probability
+        Of each regime now, by its name; empty while they sleep, in steady sailing.
     """
 
     steady_s: float
     used_s: float
     coastdown_since_ns: int | None
+    probability: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def values(self) -> dict[str, str]:
@@ -68,6 +72,8 @@ class MonitorProgress:
         }
         if self.coastdown_since_ns is not None:
             figures['coastdown since [ns]'] = str(self.coastdown_since_ns)
+        for name, share in self.probability.items():
+            figures[f'probability of {name.replace("_", " ")} [1]'] = f'{share:.2f}'
         return figures
 
 

@@ -2,8 +2,8 @@
 """
 The walk through the samples, compiled.
 
-It accepts or rejects each sample, keeps and averages it, and looks for the
-candidate of an onset each second. It returns where Python must act, always
+It accepts or rejects each sample, keeps and averages it, and looks each
+second for what wakes the regimes. It returns where Python must act, always
 BEFORE the sample in question is taken, and is then called again from that
 sample on: how the record is cut into blocks cannot matter.
 """
@@ -106,11 +106,7 @@ def _look_at_speed(
     watched = watch.source[0]
     if watched == NEVER:
         if not _is_primary(bins, watch, tuning, source, number):
-            return (
-                _SLOPE
-                if tuning.all_wake and _wakes(bins, steadiness, watch, tuning, source, number)
-                else 0
-            )
+            return _SLOPE if _wakes(bins, steadiness, watch, tuning, source, number) else 0
     elif watched != source:
         update_limits(
             steadiness, tuning.slopes, bins, source, number
@@ -133,13 +129,12 @@ def _look_at_speed(
         # comparisons with NaN are False: neither an unknown limit nor a slope of too few bins
         # says anything
         falls = falls or slope < -limits[scale]
-        if slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]:
+        if slope < -0.5 * limits[scale]:
             steady = False
     if steady and number >> (SCALES - 1) != before >> (SCALES - 1):  # all were looked at
-        watch.armed[:] = 1
+        watch.armed[0] = 1
     fast = watch.level[0] > tuning.speed_min
     falls = falls and watch.armed[0] != 0 and fast
-    watch.falls[0] = falls
     if watched != NEVER or falls or not fast or watch.armed[0] == 0:
         watch.lead[0] = NEVER
     else:
@@ -156,7 +151,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     """Judge a closed bin of a shaft speed or a pitch; return a `WalkEvent` code, 0 to go on."""
     if (
         watch.source[0] != NEVER
-        or watch.armed[1] == 0
+        or watch.armed[0] == 0
         or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
         or not watch.level[0] > tuning.speed_min
     ):
@@ -179,7 +174,7 @@ _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all th
     f'(Memory, Tuning, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, i8)',
     like={
         'Memory': Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh()),
-        'Tuning': Tuning(Limits(0, 0), _SLOPES, 0, 0.0, False),
+        'Tuning': Tuning(Limits(0, 0), _SLOPES, 0, 0.0),
     },
     uncounted=True,
 )

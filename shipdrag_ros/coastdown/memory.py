@@ -14,7 +14,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import SOURCES, Bins
 from shipdrag_ros.coastdown.ring import RingBuffer, first_store
-from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness
+from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
 from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, CheckMemory, Limits
 from shipdrag_ros.samples import Float64, Int64, Reason
 
@@ -29,21 +29,15 @@ class Watch(NamedTuple):
     Attributes
     ----------
     source : int64
-        The speed source of a candidate or coastdown; NEVER while there is none.
+        The speed source that the regimes follow; NEVER while they sleep.
     update_ns : int64
         When the next estimate is due; ALWAYS if none is.
-    armed : (2,) int64
-        0 after a candidate or coastdown until the speed has been steady again: for the speed,
-        and for the shafts.
-    held : (SCALES,) float64
-        The limits of that candidate: it is part of the record that later limits are learnt
-        from, and would make a fall that goes on look steady [m/s^2].
+    armed : int64
+        0 after the regimes were awake until the speed has been steady again.
     seen_source, seen : int64
         Speed source and number of the bin looked at last.
     level : float64
         Speed there [m/s].
-    falls : int64
-        1 where the speed fell faster than chance explains, at that bin.
     lead : (2,) int64
         Since which bin the ship has been steady, NEVER if it is not; the longest that it was
         [bins].
@@ -56,11 +50,9 @@ class Watch(NamedTuple):
     source: Int64
     update_ns: Int64
     armed: Int64
-    held: Float64
     seen_source: Int64
     seen: Int64
     level: Float64
-    falls: Int64
     lead: Int64
     look: Int64
     doubted: Int64
@@ -73,12 +65,10 @@ class Watch(NamedTuple):
         return cls(
             np.full(1, NEVER),
             np.full(1, ALWAYS),
-            np.ones(2, np.int64),
-            np.full(SCALES, np.nan),
+            np.ones(1, np.int64),
             np.full(1, NEVER),
             np.full(1, NEVER),
             np.full(1, np.nan),
-            np.zeros(1, np.int64),
             np.array([NEVER, 0]),
             np.full(1, NEVER),
             np.full(SOURCES, NEVER),
@@ -150,12 +140,9 @@ class Tuning(NamedTuple):
         Silence that stops a source [ns].
     speed_min
         Speed below which nothing starts [m/s].
-    all_wake
-        Whether any speed source may propose a coastdown, or the best of them alone.
     """
 
     limits: Limits
     slopes: Slopes
     data_stop_ns: int
     speed_min: float
-    all_wake: bool

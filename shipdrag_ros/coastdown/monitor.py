@@ -10,15 +10,12 @@ before the last `history_ns` of it.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
-from shipdrag_ros.coastdown.driving import start_of
-from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
     Dismissal,
     EndedBy,
@@ -28,15 +25,15 @@ from shipdrag_ros.coastdown.events import (
     Onset,
     Reset,
     State,
+    WholeGlide,
 )
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
-from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.regimes import numbers
+from shipdrag_ros.coastdown.regimes.watch import LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown
-from shipdrag_ros.coastdown.shafts import Drive
+from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
@@ -48,9 +45,6 @@ from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Reason
 from shipdrag_ros.ship import Ship
-
-if TYPE_CHECKING:
-    from shipdrag_ros.coastdown.regimes.watch import Dated, RegimeFilter
 
 
 class Monitor:
@@ -110,19 +104,16 @@ class Monitor:
             slopes,
             round(parameters.data_stop_s * SECOND_NS),
             float(ship.speed(parameters.froude_min)),
-            parameters.regimes == 'filter',
         )
-        self._seconds = (
-            round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
-        )
+        self._seconds = max(round(parameters.steady_s), LEAD_S) + 16 * slopes.width + 64
         self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._craft = Craft(ship.length_m, self._tuning.speed_min)
         self._vouching = Vouching(self._craft)
-        self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
-        self._regimes: RegimeFilter | None = None
-        self._reported_s = -np.inf  # until when glides were reported
+        self._regimes: RegimeFilter | None = None  # while awake
+        # until when glides, whole ones, and what was none were told
+        self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -146,14 +137,15 @@ class Monitor:
             seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        return MonitorProgress(steady_s, used_s, since_ns)
+        probability = {} if self._regimes is None else self._regimes.probability
+        return MonitorProgress(steady_s, used_s, since_ns, probability)
 
     @property
     def state(self) -> State:
         """Where the monitor stands."""
         if self._running is not None:
             return State.COASTDOWN
-        if self._candidate is not None:
+        if self._regimes is not None and not self._regimes.even:
             return State.CANDIDATE
         source = int(self._memory.watch.seen_source[0])
         if source == NEVER or np.isnan(self._memory.steadiness.limit[source, 0]):
@@ -167,7 +159,8 @@ class Monitor:
 
         A monitor that has seen this much of a sequence says the same from then
         on as one that has seen all of it, unless a coastdown longer than
-        `window_s`, or a sensor that froze longer ago, reaches back beyond it.
+        `window_s`, a sensor that froze longer ago, or manoeuvres without five
+        minutes of even power between them, reach back beyond it.
         """
         return self._history_ns
 
@@ -224,7 +217,7 @@ class Monitor:
             elif stop == WalkEvent.UPDATE:
                 events += self._vouching.explained([self._update(int(stamp_ns[at]))])
             elif stop == WalkEvent.BIN:
-                events += self._vouching.explained(self._judge())
+                events += self._vouching.explained(self._follow())
             elif stop == WalkEvent.LOOK:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
@@ -232,11 +225,10 @@ class Monitor:
                     events += self._stop_at_last_sample(EndedBy.DATA_STOP)
             elif stop == WalkEvent.SLOPE:
                 source = int(channel[at])
-                self._propose(source, int(self._memory.bins.closed[source]), noticed=True)
+                self._wake(source, int(self._memory.bins.closed[source]))
             elif stop == WalkEvent.SHAFT:
-                source = int(self._memory.watch.seen_source[0])
                 number = int(self._memory.bins.filling[channel[at]])
-                self._propose(source, number, noticed=False)
+                self._wake(int(self._memory.watch.seen_source[0]), number)
             else:
                 arrival, guard = int(receive_ns[at]), self._memory.guard
                 why = clock_set(guard, stop, int(channel[at]), int(stamp_ns[at]), arrival)
@@ -255,7 +247,8 @@ class Monitor:
         """
         events = self._stop_at_last_sample(EndedBy.RESET)
         events += self._dismissals.flush()
-        self._memory, self._reported_s = self._fresh(self._memory.tally), -np.inf
+        self._memory = self._fresh(self._memory.tally)
+        self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
@@ -276,12 +269,10 @@ class Monitor:
             Why it is of no use; '' where it is weighed.
         """
         source, tally = int(self._memory.watch.seen_source[0]), self._memory.tally
-        if self._parameters.regimes != 'filter':
-            return 'the rules judge, which weigh no such thing: set the parameter regimes: filter'
         if source == NEVER:
             return 'no speed was read yet, so there is nothing to weigh the stop with'
         if self._regimes is None:
-            self._propose(source, int(self._memory.watch.seen[0]), noticed=True)
+            self._wake(source, int(self._memory.watch.seen[0]))
         assert self._regimes is not None
         last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
         clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
@@ -290,7 +281,7 @@ class Monitor:
 
     def fall_silent(self) -> list[Event]:
         """
-        End a coastdown, or a candidate, at the last sample of its speed source.
+        End a coastdown, or what may be one, at the last sample of its speed source.
 
         For whoever has a clock and knows that all sources are silent; the memory stays.
         """
@@ -308,8 +299,8 @@ class Monitor:
 
         What is older than `history_ns` may be missing; after a reset all is.
         """
-        start_ns, steady = start_of(ended, self._ship)
-        before_ns = round(self._parameters.steady_s * SECOND_NS) if steady else 0
+        start_ns = ended.start_ns if ended.stop_ns is None else ended.stop_ns
+        before_ns = round(self._parameters.steady_s * SECOND_NS)
         return self._cut(start_ns, ended.end_ns, start_ns - before_ns)
 
     def _fresh(self, tally: InputTally) -> Memory:
@@ -326,9 +317,12 @@ class Monitor:
             forget_speeds(bins, source)
             self._memory.steadiness.forget(source)
         watch.look[0] = (number // LOOK_S + 1) * LOOK_S
+        newly = (self._vouching.until > number) & (watch.doubted <= number)
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
             self._fall_back(now_ns)
+        if watched != NEVER and newly.any() and self._running is None:
+            self._wake(int(watch.source[0]), number)  # the record is judged without it
 
     def _make_room(self) -> None:
         store = make_room(
@@ -339,162 +333,85 @@ class Monitor:
         )
         self._memory = self._memory._replace(store=store)
 
-    def _propose(self, source: int, number: int, *, noticed: bool) -> None:
-        watch, bins = self._memory.watch, self._vouching.sound(self._memory.bins)
-        watch.source[0] = source
-        seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
-        if self._parameters.regimes == 'filter':
-            # compiled for whoever asks for it alone: that takes a while
-            from shipdrag_ros.coastdown.regimes.watch import RegimeFilter
+    def _wake(self, source: int, number: int) -> None:
+        """Let the regimes take the record, from some minutes before a second on."""
+        self._memory.watch.source[0] = source
+        width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
+        self._regimes = RegimeFilter.woken(
+            self._vouching.sound(self._memory.bins), self._ship, width, number
+        )
+        if before is not None:
+            self._regimes.tell(before.told_s)
 
-            width = RegimeFilter.width(self._parameters.slope_window_s)
-            self._regimes = RegimeFilter(bins, self._ship, width, number)
-            self._candidate = seen
-            return
-        self._candidate = propose(bins, self._tuning, seen, number)
+    def _follow(self) -> list[Event]:
+        """Let the regimes take all bins of the source watched that are whole."""
+        if self._regimes is None:
+            return []
+        number = int(self._memory.bins.filling[self._memory.watch.source[0]])
+        return self._judged(number, number)
 
-    def _judge(self) -> list[Event]:
-        assert self._candidate is not None
-        bins, steadiness = self._vouching.sound(self._memory.bins), self._memory.steadiness
-        tuning, parameters = self._tuning, self._parameters
-        number = int(bins.filling[self._candidate.source])
-        if self._regimes is not None:
-            return self._follow(self._regimes, number)
-        if self._running is not None:
-            end = end_of(self._candidate, bins, tuning, parameters, number)
-            return [] if end is None else self._end_at(end, (end.last + 1) * SECOND_NS)
-        candidate = self._candidate
-        if not candidate.noticed and self._memory.watch.falls[0]:
-            # from here on as if the speed alone had made it one
-            candidate = replace(
-                candidate, noticed=True, start=number, slope_sd=np.nan, trials=0, doubt=None
-            )
-            candidate = propose(bins, tuning, candidate.knowing(steadiness), number)
-        found = judge(candidate.knowing(steadiness), bins, self._ship, tuning, parameters, number)
-        self._candidate = found.candidate
-        if found.decision is OnsetDecision.DISMISSED:
-            return self._dismiss(found.doubt, (number + 1) * SECOND_NS)
-        if found.decision is OnsetDecision.CONFIRMED:
-            return [self._begin(self._candidate, number)]
-        return []
-
-    # the same by the regimes
-
-    def _follow(self, regimes: RegimeFilter, number: int) -> list[Event]:
-        """Let the filter take what has come up to a second."""
+    def _judged(self, until: int, number: int) -> list[Event]:
+        """Let the regimes take all bins that are whole by a second, and decide after each."""
         events: list[Event] = []
-        while self._regimes is regimes and regimes.advance(
-            self._vouching.sound(self._memory.bins), number
-        ):
+        bins = self._vouching.sound(self._memory.bins)
+        while (regimes := self._regimes) is not None and regimes.advance(bins, until):
             events += self._decide(regimes, number)
         return events
 
     def _decide(self, regimes: RegimeFilter, number: int) -> list[Event]:
-        announce, again = (float(each) for each in numbers.ANNOUNCE)
+        announce, again, over = (float(each) for each in numbers.ANNOUNCE)
         slow = regimes.slow < self._tuning.speed_min
         if self._running is not None:
-            if not slow and regimes.gliding > again:
+            # a glide that is born since is not the one that was announced
+            same = regimes.gliding_since(self._running.onset.detected_ns / SECOND_NS)
+            glides = regimes.gliding > again or same > over
+            if glides and not slow and not regimes.full:
                 return []
-            events = self._end_glide(regimes, EndedBy.SPEED if slow else None)
+            why = EndedBy.SPEED if slow else EndedBy.RESET if regimes.full else None
+            events = self._end_glide(regimes, number, why)
             return events + (self._rest(regimes, number) if slow else [])
+        if slow and not regimes.caught_up:  # long ago: she has sailed since
+            return []
         if slow or regimes.asleep:
             return self._rest(regimes, number)
-        if regimes.gliding < announce:
+        if regimes.full:
+            return self._anew(regimes, number)
+        glides = regimes.gliding > announce
+        if not glides and not regimes.due:
             return []
-        dated = self._unreported(regimes)
-        if not dated:
-            return []
-        events = [event for one in dated[:-1] for event in self._all_of(one, regimes, number)]
-        return [*events, self._begin_glide(dated[-1], number)]
+        events = []
+        for each in self._unreported(regimes):
+            if glides and each.ended_by is None:
+                return [*events, self._begin(each, number)]
+            if glides or each.end_s < number - LEAD_S:
+                events += self._all_of(each, regimes, number)
+        return events
+
+    def _all_of(
+        self,
+        dated: Dated,
+        regimes: RegimeFilter,
+        number: int,
+        otherwise: EndedBy = EndedBy.SPEED,
+        last_ns: int | None = None,
+    ) -> list[Event]:
+        """Report a glide that was never announced."""
+        return [self._begin(dated, number), *self._end(dated, regimes, otherwise, last_ns)]
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
-        return [each for each in regimes.glides() if each.begin_s >= self._reported_s]
+        """Return the glides that were not told; of one that was said to have ended, the rest."""
+        since_s = self._reported_s
+        after = [each for each in regimes.glides() if each.end_s >= since_s + numbers.SHORTEST_S]
+        return [
+            each if each.begin_s >= since_s else each.since(since_s)
+            for each in after
+            if each.begin_s >= since_s or each.ended_by is None
+        ]
 
-    def _all_of(self, one: Dated, regimes: RegimeFilter, number: int) -> list[Event]:
-        """Report a glide that was never announced."""
-        begun = self._begin_glide(one, number)
-        cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
-        return [begun, *self._end_one(one, cause)]
-
-    def _end_one(self, one: Dated, cause: EndedBy) -> list[Event]:
-        assert self._running is not None
-        end_ns = round(one.end_s * SECOND_NS)
-        events = self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
-        self._running, self._reported_s = None, one.end_s
-        return events
-
-    def _begin_glide(self, dated: Dated, number: int) -> Onset:
-        assert self._candidate is not None
-        candidate = replace(self._candidate, start=max(int(dated.begin_s), 1))
-        return self._begin(candidate, number)
-
-    def _end_glide(self, regimes: RegimeFilter, ended_by: EndedBy | None) -> list[Event]:
-        """End the coastdown that runs, as the histories have it now."""
-        assert self._running is not None
-        start_ns = self._running.onset.start_ns
-        after_s = start_ns / SECOND_NS - 0.5 * self._parameters.confirm_s
-        dated = [each for each in self._unreported(regimes) if each.end_s > after_s]
-        if not dated:
-            reason, text = regimes.dismissal()
-            end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
-            events = self._running.end(
-                ended_by or EndedBy.ENGINE, end_ns, Doubt(reason, text), self._final_estimator
-            )
-        else:
-            one = dated[0]
-            events = self._end_one(one, ended_by or regimes.ended_by(one.after))
-            number = int(self._memory.watch.seen[0])
-            for other in dated[1:]:
-                events += self._all_of(other, regimes, number)
-        self._running = None
-        self._memory.watch.update_ns[0] = ALWAYS
-        return events
-
-    def _rest(self, regimes: RegimeFilter, number: int) -> list[Event]:
-        """Report what was never announced, say what it was if nothing, and sleep."""
-        assert self._candidate is not None
-        events: list[Event] = []
-        dated = self._unreported(regimes)
-        for one in dated:
-            events += self._all_of(one, regimes, number)
-        if not dated and self._reported_s < self._candidate.start and regimes.doubted:
-            reason, text = regimes.dismissal()
-            start_ns, end_ns = self._candidate.start * SECOND_NS, (number + 1) * SECOND_NS
-            events += self._dismissals.take(NotCoastdown(start_ns, end_ns, reason, text))
-        self._stand_down()
-        return events
-
-    def _dismiss(self, doubt: Doubt | None, end_ns: int) -> list[Event]:
-        """Give a candidate up and say why."""
-        assert self._candidate is not None
-        start_ns = self._candidate.start * SECOND_NS
-        # the stop may be still to come, and the shafts then show it
-        driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
-        self._stand_down(driven=driven)
-        if doubt is None:
-            return []
-        return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
-
-    def _fall_back(self, now_ns: int) -> bool:
-        """Go on with another speed source where the one watched is silent, if there is one."""
-        assert self._candidate is not None
-        steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
-        failed = self._candidate.source
-        for source in range(SOURCES):
-            # by the rule that found the other silent: or both would be tried in turn for ever
-            silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
-            doubted = self._memory.watch.doubted[source] > now_ns // SECOND_NS
-            if source == failed or silent or doubted or np.isnan(steadiness.limit[source, 0]):
-                continue
-            self._memory.watch.source[0] = source
-            other = replace(self._candidate, source=source, slope_sd=np.nan)
-            self._candidate = other.knowing(steadiness)
-            return True
-        return False
-
-    def _begin(self, candidate: OnsetCandidate, number: int) -> Onset:
-        onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
-        heading = mean_heading(self._memory.bins, candidate.start - 1, HEADING_BEFORE_S)
+    def _begin(self, dated: Dated, number: int) -> Onset:
+        start = max(int(dated.start_s), 1)
+        onset = Onset(start * SECOND_NS, (number + 1) * SECOND_NS)
+        heading = mean_heading(self._memory.bins, start - 1, HEADING_BEFORE_S)
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
@@ -502,13 +419,104 @@ class Monitor:
             self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
         return onset
 
+    def _end_glide(
+        self,
+        regimes: RegimeFilter,
+        number: int,
+        ended_by: EndedBy | None,
+        last_ns: int | None = None,
+    ) -> list[Event]:
+        """End the coastdown that runs, as the histories have it now, and tell any after it."""
+        assert self._running is not None
+        start_ns = self._running.onset.start_ns
+        dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
+        if dated:
+            events = self._end(dated[0], regimes, ended_by, last_ns)
+            for one in dated[1:]:
+                events += self._all_of(one, regimes, number, ended_by or EndedBy.ENGINE, last_ns)
+            return events
+        end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
+        was = regimes.dismissal(start_ns / SECOND_NS)
+        self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
+        events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
+        self._running = None
+        self._memory.watch.update_ns[0] = ALWAYS
+        return events
+
+    def _end(
+        self,
+        dated: Dated,
+        regimes: RegimeFilter,
+        ended_by: EndedBy | None,
+        last_ns: int | None = None,
+    ) -> list[Event]:
+        """End the coastdown that runs; one that goes on at the last sample ends there."""
+        if dated.ended_by is None and last_ns is not None:
+            dated = dated._replace(end_s=last_ns / SECOND_NS)
+        assert self._running is not None
+        events = self._running.end(dated, ended_by, regimes.regimes(), self._final_estimator)
+        self._running, self._reported_s = None, dated.end_s
+        self._memory.watch.update_ns[0] = ALWAYS
+        return events
+
+    def _rest(
+        self,
+        regimes: RegimeFilter,
+        number: int,
+        ended_by: EndedBy | None = None,
+        last_ns: int | None = None,
+    ) -> list[Event]:
+        """Report what was never announced, say what it was if nothing, and sleep."""
+        since_s, dated = max(self._reported_s, self._dismissed_s), self._unreported(regimes)
+        otherwise = ended_by or EndedBy.SPEED
+        events = [
+            event
+            for one in dated
+            for event in self._all_of(one, regimes, number, otherwise, last_ns)
+        ]
+        was = None if dated else regimes.dismissal(since_s)
+        if was is not None:
+            if ended_by is not None and not regimes.even:
+                was = cut_short(was, ended_by, regimes.gliding)
+            self._dismissed_s = was.end_ns / SECOND_NS
+            events += self._dismissals.take(was)
+        for first_s, last_s in regimes.whole_glides():
+            if first_s >= self._followed_s:
+                events.append(WholeGlide(round(first_s * SECOND_NS), round(last_s * SECOND_NS)))
+                self._followed_s = last_s
+        self._stand_down()
+        return events
+
+    def _anew(self, regimes: RegimeFilter, number: int) -> list[Event]:
+        """Begin again with the last minutes: she may manoeuvre for days."""
+        source = int(self._memory.watch.source[0])
+        events = self._rest(regimes, number)
+        self._regimes = regimes  # what a person told it stays told
+        self._wake(source, number)
+        return events
+
+    def _fall_back(self, now_ns: int) -> bool:
+        """Go on with another speed source where the one watched is silent, if there is one."""
+        steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
+        failed = int(self._memory.watch.source[0])
+        for source in range(SOURCES):
+            # by the rule that found the other silent: or both would be tried in turn for ever
+            silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
+            doubted = self._memory.watch.doubted[source] > now_ns // SECOND_NS
+            if source == failed or silent or doubted or np.isnan(steadiness.limit[source, 0]):
+                continue
+            self._memory.watch.source[0] = source
+            return True
+        return False
+
     def _update(self, next_stamp_ns: int) -> Event:
         assert self._running is not None
+        assert self._regimes is not None
         assert self._estimator is not None
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._running.due_ns(next_stamp_ns)
-        gliding = self._regimes is None or self._regimes.gliding > 0.5
+        gliding = self._regimes.gliding > 0.5
         return self._running.update(stamp_ns, self._estimator, gliding=gliding)
 
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
@@ -530,59 +538,39 @@ class Monitor:
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
-        events: list[Event] = []
-        if self._candidate is None:
-            self._stand_down()
-            return events
-        end_ns = int(self._memory.guard.last_ns[self._candidate.source])
-        if self._regimes is not None:
-            if self._running is not None:
-                events += self._end_glide(self._regimes, ended_by)
-            events += self._rest(self._regimes, end_ns // SECOND_NS)
-        elif self._running is not None:
-            events += self._end_at(End(ended_by, end_ns // SECOND_NS - 1), end_ns)
-        elif self._candidate.noticed:
-            age_s = end_ns // SECOND_NS - self._candidate.start
-            events += self._dismiss(cut_short(ended_by, age_s), end_ns)
-        self._stand_down()
+        if self._regimes is None:
+            return []
+        end_ns = int(self._memory.guard.last_ns[self._memory.watch.source[0]])
+        number = end_ns // SECOND_NS
+        events = self._judged(number + 1, number)  # what came since the last bin that was judged
+        regimes = self._regimes
+        if regimes is None:
+            return self._vouching.explained(events)
+        if self._running is not None:
+            events += self._end_glide(regimes, number, ended_by, end_ns)
+        events += self._rest(regimes, number, ended_by, end_ns)
         return self._vouching.explained(events)
 
-    def _end_at(self, end: End, end_ns: int) -> list[Event]:
-        assert self._candidate is not None
-        assert self._running is not None
-        doubt = None
-        if end.ended_by is not EndedBy.RESET:
-            bins, number = self._memory.bins, int(self._memory.bins.closed[self._candidate.source])
-            doubt = withdrawn(
-                self._candidate, end, bins, self._ship, self._tuning, self._parameters, number
-            )
-        events = self._running.end(end.ended_by, end_ns, doubt, self._final_estimator)
-        self._stand_down()
-        return events
-
-    def _stand_down(self, *, driven: bool = False) -> None:
+    def _stand_down(self) -> None:
         """Watch for an onset again, once the ship has been steady."""
         watch = self._memory.watch
         watch.source[0] = NEVER
         watch.update_ns[0] = ALWAYS
-        if self._candidate is not None:
-            # what a shaft alone proposed and the speed did not bear out changes nothing for it
-            if self._candidate.noticed or self._running is not None:
-                watch.armed[0] = 0
-                watch.held[:] = self._candidate.limits
-            if not driven:
-                watch.armed[1] = 0
-        self._candidate = self._running = self._regimes = None
+        watch.armed[0] = 0
+        self._running = self._regimes = None
 
 
-def _chosen(dated: Dated) -> Chosen:
-    """Return where a glide begins, and the run-down before it if it was a long one."""
-    start_ns = round(dated.begin_s * SECOND_NS)
-    if not dated.slow_s:
-        return Chosen(start_ns, ())
-    text = (
-        f'the thrust ran down for {dated.slow_s:.0f} s, and was gone at the end of that, '
-        f'± {dated.begin_sd_s:.0f} s'
-    )
-    first_ns = start_ns - round(dated.slow_s * SECOND_NS)
-    return Chosen(start_ns, (NotCoastdown(first_ns, start_ns, Dismissal.THRUST, text),))
+_CUT_SHORT = {
+    EndedBy.DATA_STOP: 'the speed fell silent',
+    EndedBy.SILENCE: 'all sources of speed fell silent',
+    EndedBy.RESET: 'the memory was reset',
+    EndedBy.RECORD_END: 'the record ended',
+}
+
+
+def cut_short(was: NotCoastdown, ended_by: EndedBy, gliding: float) -> NotCoastdown:
+    """
+    Say that a record ended before it was clear what a stretch is.
+    """
+    text = f'{_CUT_SHORT[ended_by]} before it was clear what it is: P(gliding) was {gliding:.2f}'
+    return replace(was, reason=Dismissal.GAP, text=text)

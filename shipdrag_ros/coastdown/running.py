@@ -5,20 +5,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 from shipdrag_ros.coastdown.events import (
+    Dismissal,
     EndedBy,
     EndedCoastdown,
     Event,
     NoEstimate,
     NotCoastdown,
     Onset,
+    Regimes,
     Update,
 )
-from shipdrag_ros.coastdown.examination import estimate_examined, estimate_kept
 from shipdrag_ros.coastdown.memory import ALWAYS
-from shipdrag_ros.coastdown.onset import Doubt
+from shipdrag_ros.coastdown.regimes.watch import Dated
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
@@ -34,13 +34,6 @@ from shipdrag_ros.ship import Ship
 
 CutWindow = Callable[[int, int, int], Window]
 """From its first and last stamp, and the first of the record before it [ns]."""
-
-
-class Chosen(NamedTuple):
-    """A start [ns] and the parts about it that are no coastdown, as the regimes have them."""
-
-    start_ns: int
-    cuts: tuple[NotCoastdown, ...]
 
 
 class RunningCoastdown:
@@ -110,61 +103,75 @@ class RunningCoastdown:
 
     def end(
         self,
-        ended_by: EndedBy,
-        end_ns: int,
-        doubt: Doubt | None,
+        dated: Dated,
+        otherwise: EndedBy | None,
+        regimes: Regimes | None,
         estimator: WindowEstimator,
-        chosen: Chosen | None = None,
     ) -> list[Event]:
         """
         Say what it was, as a whole.
 
         Parameters
         ----------
-        ended_by, end_ns
-            What ended it, and when [ns].
-        doubt
-            Why it was none after all.
+        dated
+            As the histories have it.
+        otherwise
+            What ended it where no regime followed.
+        regimes
+            What she did.
         estimator
             Of whole coastdowns.
-        chosen
-            What the regimes say of it; None: the rules examine it.
         """
-        start_ns, final, failure = self.onset.start_ns, None, None
-        cuts: tuple[NotCoastdown, ...] = ()
-        stretch: tuple[tuple[int, float], ...] = ()
-        if doubt is None:
-            if chosen is None:
-                window = self._window(end_ns)
-                found = estimate_examined(window, self._ship, self._parameters, estimator)
-            else:
-                before_ns = round(self._parameters.steady_s * SECOND_NS)
-                window = self._cut(
-                    chosen.start_ns, end_ns, chosen.start_ns - before_ns * (not chosen.cuts)
-                )
-                start_ns = chosen.start_ns
-                found = estimate_kept(window, chosen.cuts, self._ship, self._parameters, estimator)
-            cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
-            stretch = found.stretch
-            if found.start_ns != window.start_ns:  # later too where an old part has rolled out
-                start_ns = found.start_ns
-            refused = found.refused
-        else:
-            failure, refused = f'withdrawn: {doubt.text}', True
-            cuts = (NotCoastdown(start_ns, end_ns, doubt.reason, failure),)
+        stop_ns, cuts = round(dated.stop_s * SECOND_NS), dated.cuts
+        start_ns, end_ns = round(dated.start_s * SECOND_NS), round(dated.end_s * SECOND_NS)
+        before_ns = 0 if cuts else round(self._parameters.steady_s * SECOND_NS)
+        window = self._cut(start_ns, end_ns, start_ns - before_ns)
+        estimate, failure = None, None
+        try:
+            estimate = estimator(window, self._ship, self._parameters)
+        except EstimationError as error:
+            failure = str(error)
         ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            ended_by,
-            final,
+            dated.ended_by or otherwise or EndedBy.ENGINE,
+            estimate,
             failure,
             self._heading_rad,
-            refused,
-            cuts,
-            stretch,
+            cuts=cuts,
+            stop_ns=stop_ns,
+            regimes=regimes,
         )
         return [ended, *cuts]
+
+    def withdraw(
+        self,
+        was: NotCoastdown | None,
+        ended_by: EndedBy | None,
+        end_ns: int,
+        regimes: Regimes | None,
+    ) -> list[Event]:
+        """
+        Say that it was none after all, and what it was.
+        """
+        start_ns = self.onset.start_ns
+        if was is None:
+            was = NotCoastdown(start_ns, end_ns, Dismissal.OTHER, 'nothing slowed her after all')
+        cut = NotCoastdown(start_ns, end_ns, was.reason, was.text)
+        ended = EndedCoastdown(
+            start_ns,
+            end_ns,
+            self.onset.detected_ns,
+            ended_by or EndedBy.ENGINE,
+            None,
+            was.text,
+            self._heading_rad,
+            withdrawn=True,
+            cuts=(cut,),
+            regimes=regimes,
+        )
+        return [ended, cut]
 
     def _window(self, end_ns: int) -> Window:
         """Cut the coastdown so far, with the record before it where all of it is there."""

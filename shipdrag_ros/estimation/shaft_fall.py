@@ -21,10 +21,6 @@ _FEW = 3  # samples that show a level
 _BLOCKS = 40  # of a window, whose median speeds are taken
 _SLOWEST = 0.05  # of her first speed: below it the readings are noise
 _LONGEST = 0.15  # of the window: what falls more slowly falls with the ship
-IDLING = (
-    'the shaft turns on, more often a metre than when it drove the ship, and no pitch is known: '
-    'the propeller is taken to idle at zero pitch'
-)
 STANDS_RAD_S = 0.5  # no propeller of a ship drives at less
 _SLOWED, _ALIKE = 0.85, 0.2  # a ship has slowed down; a shaft has, as much
 
@@ -235,8 +231,6 @@ def say(
             return f'{name} stood before the stop too: it shows nothing, or its sensor is dead'
         return f'{name} stands whenever it is heard in the window: no thrust is left then'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
-    if IDLING in window.notes:
-        return f'{turns}: with no thrust, as it is taken'
     for speed in (window.speed_through_water, window.speed_over_ground):
         later = speed.value[speed.time_ns >= since_ns]
         if len(later) >= _FEW:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
-from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.diagnosis.joined import with_whole_glides
 from shipdrag_ros.diagnosis.words import sentence
@@ -31,7 +31,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.rows import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
-from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
+from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
 from shipdrag_ros.simulation.effects import carrying
@@ -296,14 +296,13 @@ def _diagnosis(
     try:
         if hull.ship.baseline is None:
             return _held(result, hull, run), []
-        glide = whole_glide(result, coastdown)
+        glide = whole_window(result, coastdown)
         if glide is None:
             return _held(result, hull, run), []
-        whole = None
-        if glide.window is not None:
-            whole = partial(_held, result, hull, replace(run, window=glide.window))
+        whole = partial(_held, result, hull, replace(run, window=glide))
         alone = partial(_held, result, hull, run)
-        found = with_whole_glides(alone, whole, (glide.note,), coastdowns=1)
+        note = coastdown.disturbed or BRAKED
+        found = with_whole_glides(alone, whole, (note,), coastdowns=1)
         return found, [f': {note}' for note in found.notes]
     except (DiagnosisError, EstimationError) as error:
         return None, [f' is not diagnosed: {error}']
@@ -311,15 +310,17 @@ def _diagnosis(
 
 def _dismissed(result: ReplayResult, hull: _ShipInRun) -> list[str]:
     """Diagnose a glide that was taken for none; it has no row, as it gives no r(v)."""
-    glide = None if hull.ship.baseline is None else dismissed_glide(result)
-    if glide is None:
+    if hull.ship.baseline is None:
         return []
-    run = CoastRun(Path(result.run.name).name, glide, hull.facts)
-    try:
-        said = sentence(_held(result, hull, run))
-    except ShipdragError as error:  # a glide that is like none may not be followed
-        said = f'it could not be: {error}'
-    return [f'{DISMISSED}. All of it held against the model: {said}']
+    notes = []
+    for glide in dismissed_glides(result):
+        run = CoastRun(Path(result.run.name).name, glide, hull.facts)
+        try:
+            said = sentence(_held(result, hull, run))
+        except ShipdragError as error:  # a glide that is like none may not be followed
+            said = f'it could not be: {error}'
+        notes.append(f'{DISMISSED}. All of it compared with the model: {said}')
+    return notes
 
 
 def _held(result: ReplayResult, hull: _ShipInRun, run: CoastRun) -> DiagnosisResult:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
 from shipdrag_ros.diagnosis import (
     CoastRun,
     DiagnosisResult,
@@ -34,8 +34,8 @@ from shipdrag_ros.replay import (
     replay,
     why_no_coastdown,
 )
+from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.cuts import cut_lines
-from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.replay.told_stop import StopTime
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
@@ -322,22 +322,20 @@ def _of_run(
     """Look for glides that are more than the coastdowns of a bag."""
     bag = result.run.name
     coasts = [run(*one) for one in _named(bag, windows)]
-    missed = None if windows else dismissed_glide(result)
-    if missed is not None:
-        return _OfRun([], True, [run(bag, missed)], (f'{bag}: {DISMISSED}',))
+    if not windows:
+        missed = [run(bag, each) for each in dismissed_glides(result)]
+        return _OfRun([], bool(missed), missed, (f'{bag}: {DISMISSED}',) if missed else ())
     whole: list[CoastRun] = []
     notes: list[str] = []
     glide_end_ns = 0
     for coast, (coastdown, window) in zip(coasts, windows, strict=True):
         if window.start_ns < glide_end_ns:  # a part of the glide before, which counts once
             continue
-        whole.append(coast)
-        glide = whole_glide(result, coastdown)
+        glide = whole_window(result, coastdown)
+        whole.append(coast if glide is None else replace(coast, window=glide))
         if glide is not None:
-            notes.append(f'{coast.name}: {glide.note}')
-        if glide is not None and glide.window is not None:
-            whole[-1] = replace(coast, window=glide.window)
-            glide_end_ns = glide.window.end_ns
+            notes.append(f'{coast.name}: {coastdown.disturbed or BRAKED}')
+            glide_end_ns = glide.end_ns
     return _OfRun(coasts, glide_end_ns > 0, whole, tuple(notes))
 
 

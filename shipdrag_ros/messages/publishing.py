@@ -21,6 +21,7 @@ from shipdrag_ros.coastdown.events import (
     Onset,
     Reset,
     Update,
+    WholeGlide,
 )
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.path import PathAhead
@@ -102,6 +103,8 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
                     'reason': dismissal.value,
                 },
             )
+        case WholeGlide():  # for a diagnosis of the record alone
+            return []
         case Reset(receive_ns, reason):
             note = EventNote(EventKind.RESET, receive_ns, reason, {})
     return [event_message(note, node=node)]

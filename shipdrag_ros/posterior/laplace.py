@@ -43,6 +43,10 @@ _LEAST = 1e-3  # of the weight of the likeliest model; less is left out of mean 
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
 _SHORTEST = 1.0 / 32.0  # part of a step to the mean of the mixture
+_RUNS_AWAY = (
+    'the motion is not finite under what the readings ask for: give a window that lies in one '
+    'coastdown, or the time of the stop'
+)
 
 
 @dataclass(frozen=True)
@@ -152,10 +156,7 @@ def _prepared(
     """Return the same of rows as predicted under some unknowns."""
     table, speed = predicted
     if not np.all(np.isfinite(table)):
-        raise EstimationError(
-            'the motion is not finite under what the readings ask for: give a window that lies in '
-            'one coastdown, or the time of the stop'
-        )
+        raise EstimationError(_RUNS_AWAY)
     theta = now[: problem.coefficients]
     damping, inertia = damping_of(problem.forces, theta, np.maximum(speed, 0.0))
     kept = np.concatenate([[0], 1 + problem.free])
@@ -165,6 +166,8 @@ def _prepared(
 def _likely(problem: RunModel, now: Float64, typical: Settings, least: float) -> RunModel:
     """Return the problem with the families that count under a setting of the noise."""
     logs = _each_family(problem, now, _linear(problem, now), typical).log_evidence
+    if not np.isfinite(logs.max()):
+        raise EstimationError(_RUNS_AWAY)
     kept = zip(problem.families, logs - logs.max())
     return replace(problem, families=tuple(each for each, log in kept if log > least))
 

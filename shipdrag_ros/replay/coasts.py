@@ -9,7 +9,14 @@ import numpy as np
 
 from shipdrag_ros.coastdown import Monitor, validate
 from shipdrag_ros.coastdown.driving import start_of
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event
+from shipdrag_ros.coastdown.events import (
+    Dismissal,
+    EndedBy,
+    EndedCoastdown,
+    Event,
+    NotCoastdown,
+    WholeGlide,
+)
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -19,6 +26,10 @@ from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed
 from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Block, Reason, concatenate
 from shipdrag_ros.ship import Ship
 
+DISMISSED = (
+    'she lost speed without thrust, but not as water alone slows a ship; no coastdown is taken '
+    'from it'
+)
 _SET_CLOCK_S = 10.0
 _CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
 _MOST = 0.5  # of the messages of an input
@@ -70,10 +81,59 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     found = []
     for coastdown in coastdowns:
         if not coastdown.withdrawn:
-            start_ns, steady = start_of(coastdown, result.ship)
+            start_ns, steady = begins(coastdown, result.ship)
             window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
             found.append((coastdown, window))
     return found
+
+
+def begins(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
+    """
+    Return when the thrust began to fall, and whether what comes before is steady sailing.
+    """
+    if coastdown.stop_ns is None:
+        return start_of(coastdown, ship)
+    return coastdown.stop_ns, True
+
+
+def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | None:
+    """
+    Read a coastdown with the parts about it in which something but the water acted.
+
+    Returns
+    -------
+    Window or None
+        None where there is none.
+    """
+    start_ns, steady = begins(coastdown, result.ship)
+    # what acted from the stop on leaves all that was before it
+    steady = steady or any(cut.start_ns < coastdown.start_ns for cut in coastdown.cuts)
+    acted: list[WholeGlide | NotCoastdown] = [
+        cut for cut in coastdown.cuts if cut.reason in (Dismissal.BRAKE, Dismissal.TURN)
+    ]
+    parts = [
+        (each.start_ns, each.end_ns)
+        for each in (*result.whole_glides, *acted)
+        if each.start_ns <= coastdown.end_ns and coastdown.start_ns <= each.end_ns
+    ]
+    if not parts:
+        return None
+    first_ns = min(start_ns, *(first for first, _ in parts))
+    last_ns = max(coastdown.end_ns, *(last for _, last in parts))
+    apart = bool(clocks_apart(result))
+    return window_between(result, first_ns, last_ns, steady=steady, apart=apart)
+
+
+def dismissed_glides(result: ReplayResult) -> list[Window]:
+    """
+    Read what she did without thrust where no coastdown was found in it.
+    """
+    apart = bool(clocks_apart(result))
+    return [
+        window_between(result, glide.start_ns, glide.end_ns, steady=True, apart=apart)
+        for glide in result.whole_glides
+        if all(each.withdrawn for each in result.coastdowns)
+    ]
 
 
 def _look_anew(result: ReplayResult) -> tuple[EndedCoastdown, ...]:

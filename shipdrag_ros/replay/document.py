@@ -23,7 +23,7 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
     were compared. `combined` is one r(v) from two or more coastdowns of one
     ship: `scatter_m_s2` is the standard deviation of one run about it, the
     current is along the heading of the first run; where it is null although there
-    are several, `not_combined` says why.
+    are several, `not_combined` says why. `regimes` of a coastdown counts s from its start.
     """
     whole = together(runs)
     found = {
@@ -100,6 +100,8 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
         'w': None,
         'noise_sd': {},
         'current_m_s': None,
+        'regimes': _regimes(coastdown),
+        'explained': None if coastdown.regimes is None else coastdown.regimes.explained,
         'notes': [],
     }
     if estimate is None:
@@ -130,6 +132,16 @@ def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
         'noise_sd': estimate.noise_sd,
         'current_m_s': current,
         'notes': estimate.notes,
+    }
+
+
+def _regimes(coastdown: EndedCoastdown) -> dict[str, Any] | None:
+    regimes = coastdown.regimes
+    if regimes is None:
+        return None
+    return {
+        'time_s': (regimes.time_ns - coastdown.start_ns) * 1e-9,
+        'probability': dict(regimes.probability),
     }
 
 

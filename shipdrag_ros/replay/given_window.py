@@ -122,7 +122,7 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         accepted = accepted[parts[0]] if parts else accepted[:0]
         before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
         window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
-        found = estimate_examined(window, ship, parameters, estimate_final, steady=False)
+        found = estimate_examined(window, ship, parameters, estimate_final)
     heading = _heading(accepted, found.start_ns)
     return EndedCoastdown(
         found.start_ns,

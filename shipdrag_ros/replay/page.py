@@ -147,6 +147,12 @@ def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
             'Speed over the whole stretch. Hatched: what was cut, and why; only the rest is '
             'taken for a coastdown.',
         )
+    if coastdown.regimes is not None:
+        hatched = ' Hatched: what was cut, and why.' if coastdown.cuts else ''
+        yield picture(
+            pictures.cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
+            f'Speed, and below it how probable each thing is that she may have done.{hatched}',
+        )
     estimate = coastdown.estimate
     if estimate is None:
         return

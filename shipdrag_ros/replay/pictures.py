@@ -8,24 +8,28 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
-from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, Regimes
 from shipdrag_ros.display import speed_unit
 from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
 from shipdrag_ros.replay.cuts import StretchSpan, inside, stretch
 from shipdrag_ros.replay.hulls import RankedHull
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
+from shipdrag_ros.samples import Float64
 
 _HATCHES = ('///', '\\\\\\', 'xxx', '...')  # distinct in print too
+_COLORS = ('#bbbbbb', '#9ecae1', '#2171b5', '#d94801', '#f1b300', '#636363')  # of each regime
+_SHOWN = 0.02
 _NARROW = 0.02  # of the time axis: no room for a label
 
 
 def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg: float) -> Figure:
     """
-    Draw the speed of the whole stretch, with what was cut of it hatched and named.
+    Draw the speed with what was cut hatched and named, and under it what she did.
 
     Parameters
     ----------
@@ -46,9 +50,17 @@ def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg:
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
-        time_s = np.array([seconds(time_ns) for time_ns, _ in coastdown.stretch])
-        axis.plot(time_s, [speed / unit for _, speed in coastdown.stretch], color=BLUE)
+        regimes = coastdown.regimes
+        if regimes is None:
+            axis = lowest = figure.subplots()
+            time_s = np.array([seconds(time_ns) for time_ns, _ in coastdown.stretch])
+            speed_m_s = np.array([speed for _, speed in coastdown.stretch])
+        else:
+            axis, lowest = figure.subplots(2, sharex=True, height_ratios=(3, 1))
+            time_s = np.array([seconds(time_ns) for time_ns in regimes.time_ns.tolist()])
+            speed_m_s = regimes.speed_m_s
+            _probabilities(lowest, time_s, regimes)
+        axis.plot(time_s, speed_m_s / unit, color=BLUE)
         places = blended_transform_factory(axis.transData, axis.transAxes)
         first, last = (seconds(each) for each in stretch(coastdown))
         reasons = list(dict.fromkeys(cut.reason for cut in coastdown.cuts))
@@ -76,10 +88,33 @@ def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg:
                     verticalalignment='top',
                     bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 1.0},
                 )
-        axis.set_xlim(first, last)
-        axis.set_xlabel(f'time [s] from the start of the {"record" if from_start else "stretch"}')
+        axis.set_xlim(min(first, float(time_s[0])), max(last, float(time_s[-1])))
+        lowest.set_xlabel(
+            f'time [s] from the start of the {"record" if from_start else "stretch"}'
+        )
         axis.set_ylabel(f'speed [{unit_name}]')
     return figure
+
+
+def _probabilities(axis: Axes, time_s: Float64, regimes: Regimes) -> None:
+    """Stack the probability of each regime; what is never likely has no place in the legend."""
+    shares = {
+        name.replace('_', ' '): share
+        for name, share in regimes.probability.items()
+        if float(share.max()) > _SHOWN
+    }
+    colors = [_COLORS[list(regimes.probability).index(name.replace(' ', '_'))] for name in shares]
+    axis.stackplot(
+        time_s,
+        *shares.values(),
+        labels=list(shares),
+        colors=colors,
+        edgecolor='white',
+        linewidth=0.3,
+    )
+    axis.set_ylim(0.0, 1.0)
+    axis.set_ylabel('probability')
+    axis.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), fontsize='small')
 
 
 def _labels(

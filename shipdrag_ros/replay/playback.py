@@ -7,7 +7,6 @@ Also one window of it, given by hand, through the same estimator.
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,6 +20,7 @@ from shipdrag_ros.coastdown.events import (
     NoEstimate,
     NotCoastdown,
     Update,
+    WholeGlide,
 )
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
@@ -100,6 +100,13 @@ class ReplayResult:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def whole_glides(self) -> tuple[WholeGlide, ...]:
+        """
+        What she did without thrust where something but the water acted.
+        """
+        return tuple(event for event in self.events if isinstance(event, WholeGlide))
+
+    @property
     def not_coastdowns(self) -> tuple[NotCoastdown, ...]:
         """
         What was nearly a coastdown, and what was cut, in the order of their start.
@@ -168,9 +175,7 @@ def replay(
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
     told = None if stop is None else told_ns(run, stop)
-    if told is not None:  # the rules read no such thing
-        compare, used_parameters = False, dataclasses.replace(used_parameters, regimes='filter')
-    own = compare and _is_own(run, used_ship, used_parameters)
+    own = compare and told is None and _is_own(run, used_ship, used_parameters)
     return _as_on_board(run, used_ship, used_parameters, own, progress, told)
 
 

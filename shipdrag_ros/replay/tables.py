@@ -44,6 +44,8 @@ def facts(coastdown: EndedCoastdown) -> Table:
         first_ns = min([coastdown.start_ns, *(cut.start_ns for cut in coastdown.cuts)])
         delay = (coastdown.onset_detected_ns - first_ns) * 1e-9
         rows.append(('confirmed after', display.duration(delay)))
+    if coastdown.regimes is not None:
+        rows.append(('the model explains the record', words.explained(coastdown.regimes)))
     if coastdown.estimate is not None:
         rows.extend(tables.facts(coastdown.estimate).rows)
     return Table(('', ''), tuple(rows))

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import Event, Reset
+from shipdrag_ros.coastdown.events import EndedCoastdown, Event, Reset
 from shipdrag_ros.messages import Unreadable
-from shipdrag_ros.replay import InputCounts, ReplayResult
+from shipdrag_ros.replay import InputCounts, ReplayResult, words
 from shipdrag_ros.samples import MOTION_INPUTS
 
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
+_UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
 _SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
     'type': 'of a type that this input is not accepted in; `shipdrag info` lists the types',
@@ -49,7 +50,20 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
         *(f'{name}: {text}' for name, text in result.contradictions.items()),
         *_inputs(result.inputs),
         *_resets(result.events),
+        *_unexplained(result.events),
     )
+
+
+def _unexplained(events: Sequence[Event]) -> Iterator[str]:
+    for event in events:
+        if not isinstance(event, EndedCoastdown) or event.regimes is None:
+            continue
+        if event.regimes.explained < _UNEXPLAINED:
+            yield (
+                f'the record about {display.utc(event.start_ns)} is explained only '
+                f'{words.explained(event.regimes)}: she may have done what the model of regimes '
+                'does not know, or a sensor was wrong; look at the picture of what she did'
+            )
 
 
 def _inputs(inputs: Mapping[str, InputCounts]) -> Iterator[str]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from shipdrag_ros import __version__
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Regimes
 from shipdrag_ros.display import duration, plus_minus
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.replay import Recorded
@@ -24,6 +24,13 @@ ENDED_BY = {
     EndedBy.RECORD_END: 'the record ended',
     EndedBy.GIVEN: 'the window was given by hand',
 }
+
+
+def explained(regimes: Regimes) -> str:
+    """
+    Say how well the model of what she did explains the record, beside those it was learnt on.
+    """
+    return f'as well as {regimes.explained:.0%} of those that it was learnt on'
 
 
 def recorded_sentence(recorded: Recorded) -> str:

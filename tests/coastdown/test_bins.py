@@ -90,7 +90,7 @@ def test_a_line_through_what_is_there(there, seed: int) -> None:
 
 
 def test_the_longest_line_does_not_overflow() -> None:
-    # 4 x confirm_s at its upper bound, the speed from one end of its range to the other
+    # a slope window at its upper bound, the speed from one end of its range to the other
     time = np.arange(4802.0)
     bins = binned(LOG, time, np.linspace(-40.0, 40.0, len(time)), size=6000)
     slope, level, _ = line(bins, LOG, FIRST + 4800, 4800)

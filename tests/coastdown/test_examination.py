@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal
-from shipdrag_ros.coastdown.examination import Examination, estimate_examined, examine
-from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.coastdown.examination import Examination, examine
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -43,7 +43,7 @@ def window(*blocks: Block, before_s: float | None = None, end_s: float = LENGTH_
 
 
 def examined(*blocks: Block, **parameters: object) -> Examination:
-    return examine(window(*blocks), BOAT, Parameters(**parameters), steady=False)  # type: ignore[arg-type]
+    return examine(window(*blocks), BOAT, Parameters(**parameters))  # type: ignore[arg-type]
 
 
 def kept_s(found: Examination) -> tuple[float, float]:
@@ -108,65 +108,27 @@ def test_a_kick_in_the_glide_is_cut_out(kick: float, reason: str) -> None:
     assert reason in {cut.reason.value for cut in found.cuts if cut.start_ns > START_NS + 9e10}
 
 
-def test_the_run_down_after_an_onset_belongs_to_the_coastdown() -> None:
-    time_s = np.arange(-600.0, LENGTH_S)
-    shaft = np.where(time_s < 0.0, 12.0, 12.0 * np.exp(-np.maximum(time_s, 0.0) / 8.0))
-    inputs = [block(LOG, noisy(glide(time_s)), time_s), block(SHAFT, shaft, time_s)]
-    found = examine(window(*inputs, before_s=600.0), BOAT, Parameters())
-    assert is_whole(found)
-    given = examine(window(*inputs, before_s=135.0), BOAT, Parameters(), steady=False)
-    assert reasons(given) == {Dismissal.THRUST}
-    assert kept_s(given)[0] == pytest.approx(17.0, abs=3.0)
-
-
-def test_a_shaft_that_turns_on_after_an_onset_leaves_it_to_the_speed() -> None:
-    # a controllable propeller whose pitch nothing tells
-    time_s = np.arange(-600.0, LENGTH_S)
-    inputs = [
-        block(LOG, noisy(glide(time_s)), time_s),
-        block(SHAFT, np.full(len(time_s), 12.0), time_s),
-    ]
-    found = examine(window(*inputs, before_s=600.0), BOAT, Parameters())
-    assert is_whole(found)
-    assert any('no pitch is known' in note for note in found.notes)
-
-
-def after_an_onset(turning: np.ndarray, time_s: np.ndarray, speed: np.ndarray) -> Examination:
+def after_steady_sailing(
+    turning: np.ndarray, time_s: np.ndarray, speed: np.ndarray
+) -> Examination:
     inputs = [block(LOG, noisy(speed), time_s), block(SHAFT, turning, time_s)]
     return examine(window(*inputs, before_s=600.0), BOAT, Parameters())
 
 
-@pytest.mark.parametrize('level', [0.5, 1.0])
-def test_a_shaft_that_idles_and_stops_later_leaves_it_to_the_speed(level: float) -> None:
-    # zero pitch that nothing tells; the engine is stopped late in the glide
-    time_s = np.arange(-600.0, LENGTH_S)
-    turning = np.where(time_s < 10.0, 12.0, level * 12.0)
-    turning[time_s > 200.0] = 0.0
-    found = after_an_onset(turning, time_s, glide(time_s))
-    assert is_whole(found)
-    assert any('no pitch is known' in note for note in found.notes)
-
-
-def test_what_is_said_of_a_shaft_that_idles_does_not_contradict_itself() -> None:
-    time_s = np.arange(-600.0, LENGTH_S)
-    inputs = [
-        block(LOG, noisy(glide(time_s)), time_s),
-        block(SHAFT, np.full(len(time_s), 12.0), time_s),
-    ]
-    record = window(*inputs, before_s=600.0)
-    found = estimate_examined(record, BOAT, Parameters(), estimate_final)
-    assert found.estimate is not None
-    notes = ' '.join(found.estimate.notes)
-    assert notes.count('taken to idle at zero pitch') == 1
-    assert 'the shaft turns at 12 to 12 rad/s: with no thrust, as it is taken' in notes
-    assert 'if it drives the ship' not in notes
+def test_a_run_down_from_the_start_on_is_cut() -> None:
+    time_s = np.arange(-135.0, LENGTH_S)
+    shaft = np.where(time_s < 0.0, 12.0, 12.0 * np.exp(-np.maximum(time_s, 0.0) / 8.0))
+    inputs = [block(LOG, noisy(glide(time_s)), time_s), block(SHAFT, shaft, time_s)]
+    found = examine(window(*inputs, before_s=135.0), BOAT, Parameters())
+    assert reasons(found) == {Dismissal.THRUST}
+    assert kept_s(found)[0] == pytest.approx(17.0, abs=3.0)
 
 
 def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives() -> None:
     time_s = np.arange(-600.0, LENGTH_S)
     speed = np.where(time_s < 0.0, 4.0, 2.4 + 1.6 * np.exp(-np.maximum(time_s, 0.0) / 90.0))
     turning = 12.0 * np.where(time_s < 0.0, 1.0, 0.6)
-    found = after_an_onset(turning, time_s, speed)
+    found = after_steady_sailing(turning, time_s, speed)
     assert found.failure is not None
     assert 'the shaft turns' in found.failure
 
@@ -175,26 +137,14 @@ def test_power_taken_back_in_steps_is_no_windmilling() -> None:
     time_s = np.arange(-600.0, LENGTH_S)
     speed = 4.0 / (1.0 + 0.0045 * np.maximum(time_s, 0.0))
     turning = 12.0 * np.select([time_s < 0.0, time_s < 150.0], [1.0, 0.7], 0.45)
-    assert after_an_onset(turning, time_s, speed).failure is not None
+    assert after_steady_sailing(turning, time_s, speed).failure is not None
 
 
 def test_a_shaft_that_is_let_go_may_speed_up_to_windmill() -> None:
     time_s = np.arange(-600.0, LENGTH_S)
     speed = glide(time_s)
     turning = np.where(time_s < 0.0, 12.0, np.where(time_s < 40.0, 3.0, 0.5 * 3.0 * speed))
-    assert is_whole(after_an_onset(turning, time_s, speed))
-
-
-def test_a_short_rest_of_what_was_found_is_refused() -> None:
-    time_s = np.arange(-600.0, LENGTH_S)
-    turning = np.where(time_s < 260.0, 8.0, 0.0)
-    turning[time_s < 0.0] = 12.0
-    speed = np.where(time_s < 260.0, 2.8 + 1.2 * np.exp(-np.maximum(time_s, 0.0) / 90.0), 0.0)
-    speed[time_s < 0.0] = 4.0
-    speed[time_s >= 260.0] = glide(time_s[time_s >= 260.0], start_s=260.0, speed=2.85)
-    found = after_an_onset(turning, time_s, speed)
-    assert found.failure is not None
-    assert 'it takes 60 s, ' in found.failure
+    assert is_whole(after_steady_sailing(turning, time_s, speed))
 
 
 # what heading, track, rudder and log say
@@ -271,7 +221,7 @@ class TestSpeedAlone:
         one = Window.from_block(log, START_NS, START_NS + round(LENGTH_S * scale * 1e9))
         # the same motion in other units of time and length: decelerations are as for the boat
         ship = replace(BOAT, length_m=10.0 * scale, displaced_volume_m3=5.0 * scale**3)
-        found = examine(one, ship, Parameters(), steady=False)
+        found = examine(one, ship, Parameters())
         start_s, end_s = kept_s(found)
         return replace(
             found,
@@ -337,7 +287,7 @@ def test_a_brake_that_is_let_go_is_cut_and_nothing_else(seed: int) -> None:
     speed = held_at_first(120.0, 780.0)
     noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
     log = block(LOG, speed + noise, np.arange(780.0))
-    found = examine(window(log, end_s=780.0), ship, Parameters(), steady=False)
+    found = examine(window(log, end_s=780.0), ship, Parameters())
     assert [cut.reason for cut in found.cuts] == [Dismissal.BRAKE]
     assert kept_s(found) == (pytest.approx(120.0, abs=10.0), 780.0)
 
@@ -348,7 +298,7 @@ def test_a_brake_that_is_let_go_late_leaves_no_coastdown_before_it(seed: int) ->
     speed = held_at_first(75.0, 102.0, start=4.87)
     noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
     log = block(LOG, speed + noise, np.arange(102.0))
-    found = examine(window(log, end_s=102.0), ship, Parameters(), steady=False)
+    found = examine(window(log, end_s=102.0), ship, Parameters())
     assert {cut.reason for cut in found.cuts} == {Dismissal.BRAKE}
     assert found.failure is not None or kept_s(found)[0] > 68.0
 
@@ -400,6 +350,6 @@ def test_clean_coastdowns_of_a_ship_in_a_seaway_stay_whole(ship: Ship) -> None:
         record = sense(simulate(ship, scenario), sensors, seed=seed, start_ns=START_NS)
         start_ns = START_NS + 240 * 10**9
         one = Window.from_block(record, start_ns, START_NS + round((200.0 + duration_s) * 1e9))
-        if examine(one, ship, Parameters(), steady=False).cuts:
+        if examine(one, ship, Parameters()).cuts:
             cut.append(seed)
     assert len(cut) <= 1, cut

@@ -57,7 +57,7 @@ def examined(
     start_ns, end_ns = (round(each * 1e9) for each in window_s)
     window = Window.from_block(block, start_ns, end_ns, before_ns=int(stamps[0]))
     parameters = Parameters(froude_min=0.01, heading_convention=convention)
-    return estimate_examined(window, ship, parameters, estimate_final, steady=False)
+    return estimate_examined(window, ship, parameters, estimate_final)
 
 
 def kept_s(found: Examined) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from shipdrag_ros.coastdown.events import (
     Onset,
     Reset,
     Update,
+    WholeGlide,
 )
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
@@ -32,7 +33,6 @@ INPUTS = (LOG, Channel.SPEED_OVER_GROUND, Channel.POSITION, Channel.HEADING, Cha
 QUICK = Parameters(
     steady_s=300.0,
     slope_window_s=20.0,
-    confirm_s=40.0,
     window_s=150.0,
     update_s=7.0,
     data_stop_s=20.0,
@@ -84,7 +84,7 @@ def spoil(block: Block, seed: int) -> Block:
 def eventful(record, sensors) -> Block:
     """Two coastdowns, the second with a turn, on five inputs at five rates."""
     parts = []
-    for i, turns in enumerate(((), (Turn(200.0, 60.0, 0.02),))):
+    for i, turns in enumerate(((), (Turn(140.0, 60.0, 0.02),))):
         block = record(
             sensors=(
                 replace(sensors['log'], rate_hz=2.5),
@@ -93,12 +93,12 @@ def eventful(record, sensors) -> Block:
                 replace(sensors['compass'], rate_hz=2.0),
                 replace(sensors['shaft'], rate_hz=1.0),
             ),
-            lead_in_s=400.0,
-            duration_s=450.0,
+            lead_in_s=330.0,
+            duration_s=270.0,
             turns=turns,
             seed=i,
         )
-        shift = i * 850 * S
+        shift = i * 600 * S
         parts.append(
             replace(block, stamp_ns=block.stamp_ns + shift, receive_ns=block.receive_ns + shift)
         )
@@ -115,6 +115,12 @@ def run(ship, blocks) -> tuple[list, dict]:
     for block in blocks:
         events += monitor.update(block)
     return events + monitor.finish(), monitor.health()
+
+
+@pytest.fixture(scope='module')
+def said(ship, eventful) -> list:
+    """What is said of the whole of it."""
+    return run(ship, [eventful])[0]
 
 
 def cut(block: Block, places) -> list[Block]:
@@ -142,13 +148,13 @@ def thinned(block: Block, every) -> Block:
     return block[kept]
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     data=st.data(),
     seed=st.integers(0, 1000),
     every=st.tuples(*[st.integers(0, 4)] * len(INPUTS)).filter(any),
     globe=st.booleans(),
-    silence=st.tuples(st.integers(0, 1700), st.integers(0, 300)),
+    silence=st.tuples(st.integers(0, 1200), st.integers(0, 300)),
 )
 def test_where_the_record_is_cut_changes_no_bit(
     ship, eventful, bits, data, seed: int, every, globe: bool, silence
@@ -166,11 +172,11 @@ def test_where_the_record_is_cut_changes_no_bit(
 
 
 @settings(max_examples=6, deadline=None)
-@given(data=st.data(), into_s=st.integers(1, 250), seed=st.integers(0, 1000))
+@given(data=st.data(), into_s=st.integers(1, 200), seed=st.integers(0, 1000))
 def test_a_reset_in_mid_coastdown_is_a_fresh_start(
-    ship, eventful, bits, data, into_s: int, seed: int
+    ship, eventful, said, bits, data, into_s: int, seed: int
 ) -> None:
-    onset = next(event for event in run(ship, [eventful])[0] if isinstance(event, Onset))
+    onset = next(event for event in said if isinstance(event, Onset))
     place = int(np.searchsorted(eventful.receive_ns, onset.detected_ns + into_s * S))
     before, after = eventful[:place], spoil(eventful[place:], seed)
     first, monitor = watching(ship), watching(ship)
@@ -194,39 +200,39 @@ def test_sample_by_sample_changes_no_bit(ship, eventful, bits) -> None:
 
 
 def test_real_estimates_change_no_bit(ship, record, bits) -> None:
-    block = record(lead_in_s=300.0, duration_s=200.0)
+    block = record(lead_in_s=300.0, duration_s=120.0)
     whole, part = Monitor(ship, QUICK), Monitor(ship, QUICK)
     events = whole.update(block) + whole.finish()
-    again = [event for piece in cut(block, range(0, 500, 3)) for event in part.update(piece)]
+    again = [event for piece in cut(block, range(0, 420, 3)) for event in part.update(piece)]
     assert any(isinstance(event, Update) for event in events)
     assert bits(again + part.finish()) == bits(events)
 
 
-def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, bits) -> None:
+def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, said, bits) -> None:
     twice = eventful[np.repeat(np.arange(len(eventful)), 2)]
     strided = twice[::2]
     for array in (strided.stamp_ns, strided.value, strided.channel):
         array.flags.writeable = False
     assert not strided.value.flags.c_contiguous
-    assert bits(run(ship, [strided])) == bits(run(ship, [eventful]))
+    assert bits(run(ship, [strided])[0]) == bits(said)
 
 
 @pytest.fixture(scope='module')
 def long_record(record, sensors) -> Block:
-    """Ninety minutes with coastdowns, slow-downs and turns, the engine engaged between them."""
+    """An hour with coastdowns, slow-downs and turns, and even power for a while between them."""
     orders = []
-    for start in (0.0, 1100.0, 2300.0, 3300.0):
+    for start in (0.0, 1100.0, 2400.0):
         orders += [
             EngineOrder(start, shaft=0.0, thrust=0.0),
-            EngineOrder(start + 400.0, shaft=1.0, thrust=1.0),
+            EngineOrder(start + 300.0, shaft=1.0, thrust=1.0),
         ]
     orders.insert(4, EngineOrder(1900.0, shaft=0.7, thrust=0.5))
     return record(
         sensors=(sensors['log'], replace(sensors['radar'], sd=0.3), sensors['compass']),
         orders=tuple(orders),
-        turns=(Turn(1300.0, 60.0, 0.02), Turn(3900.0, 100.0, 0.01)),
-        lead_in_s=600.0,
-        duration_s=4800.0,
+        turns=(Turn(1250.0, 60.0, 0.02), Turn(2950.0, 100.0, 0.01)),
+        lead_in_s=400.0,
+        duration_s=3200.0,
     )
 
 
@@ -238,7 +244,7 @@ def long_records(ship, long_record) -> list:
 
 
 @settings(max_examples=8, deadline=None)
-@given(start_s=st.integers(1, 2800), globe=st.booleans())
+@given(start_s=st.integers(1, 2000), globe=st.booleans())
 def test_a_monitor_that_starts_later_says_the_same(
     ship, long_records, bits, start_s: int, globe: bool
 ) -> None:
@@ -247,7 +253,7 @@ def test_a_monitor_that_starts_later_says_the_same(
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
 
     def known(events) -> list:
-        spans = Onset | EndedCoastdown | NotCoastdown
+        spans = Onset | EndedCoastdown | NotCoastdown | WholeGlide
         return [
             event
             for event in events
@@ -264,4 +270,7 @@ def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:
     moved = in_arrival_order([replace(eventful, receive_ns=eventful.receive_ns + late)])
     events, health = run(ship, [moved])
     assert health['heading'].clock_offset_s == pytest.approx(1.0)
-    assert sum(isinstance(event, Onset) for event in events) == 2
+    # two stops, and the glide that goes on after the turn
+    ended = [event for event in events if isinstance(event, EndedCoastdown)]
+    standing = [event.ended_by for event in ended if not event.withdrawn]
+    assert standing[1:] == [EndedBy.TURN, EndedBy.RECORD_END]

@@ -72,13 +72,26 @@ def test_nothing_is_said_of_a_sound_record_and_the_words_name_what_to_do() -> No
         assert words in text
 
 
+@pytest.mark.parametrize('heard', [[LOG], [GROUND], [LOG, GROUND]])
+def test_a_ship_that_wanders_by_the_sea_glides_in_one_piece(heard: list[int]) -> None:
+    whole = 0
+    for seed in range(3):
+        block = faulty('none', SOUND, seed=seed)
+        monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+        events = [*monitor.update(block[np.isin(block.channel, heard)]), *monitor.finish()]
+        (ended,) = [event for event in events if hasattr(event, 'stands')]
+        start_s, end_s = ((at - START_NS) / SECOND_NS for at in (ended.start_ns, ended.end_ns))
+        whole += abs(start_s - LEAD_S) < 10.0 and end_s > LEAD_S + 400.0
+    assert whole == 3
+
+
 def test_the_window_of_a_coastdown_is_without_what_says_nothing() -> None:
     monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
     events = [*monitor.update(faulty('random', SOUND)), *monitor.finish()]
     (ended,) = [event for event in events if hasattr(event, 'stands')]
     window = monitor.ended_window(ended)
     assert not len(window.speed_through_water)
-    assert len(window.speed_over_ground) > 800
+    assert len(window.speed_over_ground) > 300
 
 
 def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -> None:
@@ -90,7 +103,7 @@ def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -
     events = [*monitor.update(block), *monitor.finish()]
     (ended,) = [event for event in events if hasattr(event, 'stands')]
     window = monitor.ended_window(ended)
-    assert len(window.speed_through_water) > 800
+    assert len(window.speed_through_water) > 300
     assert window.before is not None
     used_ns = window.before.speed_through_water.time_ns
     assert START_NS + 500 * SECOND_NS < used_ns[0] < START_NS + 700 * SECOND_NS
@@ -172,7 +185,7 @@ def test_where_a_log_is_left_out_that_is_the_reason_that_is_given_and_what_to_do
     assert sound.explained([was]) == [was]
     monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
     block = faulty('in knots', Channel.POSITION)
-    events = monitor.update(block[block.stamp_ns < START_NS + (LEAD_S + 80) * SECOND_NS])
+    events = monitor.update(block[block.stamp_ns < START_NS + (LEAD_S + 30) * SECOND_NS])
     events += monitor.finish()
     # a candidate that was dismissed, or a coastdown without an estimate
     failed = ('text', 'failure', 'reason')

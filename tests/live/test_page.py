@@ -64,7 +64,6 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         'use_sim_time': True,
         'steady_s': 400.0,
         'slope_window_s': 30.0,
-        'confirm_s': 60.0,
         'froude_min': 0.12,  # an early end
     }
     file = tmp_path / 'parameters.yaml'
@@ -97,7 +96,9 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         rehearsal.listen(until=lambda: rehearsal.estimates > 10, timeout_s=240.0)
         assert rehearsal.estimates > 10
     assert viewer.text('#ship') == 'Vitus Bering'
-    states = [word for word in (text.split(' ')[0] for text in said) if word != 'SLOWING:']
+    # a lead ends some seconds before it is clear what she does
+    between = ('SLOWING:', 'NOT')
+    states = [word for word in (text.split(' ')[0] for text in said) if word not in between]
     assert states[-2:] == ['STEADY', 'COASTDOWN'], said
     assert 'Now the reciprocal: steer ' in viewer.text('#action')
     assert float(viewer.text('#figure-force').split()[0]) > 100.0
@@ -124,8 +125,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     viewer.wait_for('#verdict', agreed)  # as the node says it; the curve is latched
     viewer.wait_for('#curve-say', 'clean hull')
     viewer.page.click('#engine-stopped')
-    # the node's own answer: the rules, which judge unless told otherwise, weigh no such thing
-    assert 'regimes: filter' in viewer.wait_for('#marked', 'recorded')
+    assert 'weighed with the readings' in viewer.wait_for('#marked', 'weighed')
 
     assert node.stop() == 0
     viewer.wait_for('#headline', 'NODE SILENT', within_s=240.0)

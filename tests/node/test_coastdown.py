@@ -28,7 +28,6 @@ PARAMETERS = {
     'use_sim_time': True,
     'steady_s': 120.0,
     'slope_window_s': 30.0,
-    'confirm_s': 60.0,
     'window_s': 600.0,
     'forecast_speeds': [3.0, 1.5],
 }
@@ -45,7 +44,7 @@ TYPES = {
 
 @cache
 def truth() -> Truth:
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=500.0)
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=400.0)
     return simulate(Ship.load(SHIP_FILE), scenario)
 
 

@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,10 @@ from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, 
 from shipdrag_ros.simulation.effects import parse
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
-LEAD_IN_S, COAST_S = 900.0, 900.0
+LEAD_IN_S, COAST_S = 660.0, 660.0
 SETTINGS = {
     'steady_s': 600.0,
     'slope_window_s': 30.0,
-    'confirm_s': 60.0,
     'data_stop_s': 20.0,
     'update_s': 30.0,
 }
@@ -46,6 +46,7 @@ SPEED = 120.0  # times as fast as life
 WITHIN_S = 400.0  # the first diagnosis of a machine compiles
 
 
+@cache
 def record(*effects: str) -> Block:
     """A coastdown, and a heading that goes on after the speeds have ceased."""
     scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=COAST_S)
@@ -59,9 +60,10 @@ def values_of(status: Any) -> dict[str, str]:
     return {item.key: item.value for item in status.values}
 
 
-def coastdown_of(block: Block) -> tuple[EndedCoastdown, Window]:
+@cache
+def a_coastdown() -> tuple[EndedCoastdown, Window]:
     monitor = Monitor(SHIP, PARAMETERS)
-    (ended,) = (event for event in monitor.update(block) if isinstance(event, EndedCoastdown))
+    (ended,) = (event for event in monitor.update(record()) if isinstance(event, EndedCoastdown))
     return ended, monitor.ended_window(ended)
 
 
@@ -138,13 +140,14 @@ def test_node_names_what_is_missing_as_the_verb_does(
 
 def test_monitor_hands_out_what_a_replay_reads_again() -> None:
     block = record()
-    ended, window = coastdown_of(block)
+    ended, window = a_coastdown()
     assert window.before is not None
+    assert ended.stop_ns is not None
     whole = Window.from_block(
         block,
-        ended.start_ns,
+        ended.stop_ns,
         ended.end_ns,
-        before_ns=ended.start_ns - round(PARAMETERS.steady_s * 1e9),
+        before_ns=ended.stop_ns - round(PARAMETERS.steady_s * 1e9),
     )
     for one, other in ((window, whole), (window.before, whole.before)):
         for name in STANDARD_INPUTS:
@@ -154,7 +157,7 @@ def test_monitor_hands_out_what_a_replay_reads_again() -> None:
 
 def test_nothing_hidden_gives_no_warning() -> None:
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
-    diagnosing.begin(*coastdown_of(record()))
+    diagnosing.begin(*a_coastdown())
     assert diagnosing.status.state is DiagnosisState.RUNNING
     status = result_of(diagnosing)
     assert status.found is not None
@@ -162,7 +165,7 @@ def test_nothing_hidden_gives_no_warning() -> None:
 
 
 def test_too_little_steady_record_is_told() -> None:
-    ended, window = coastdown_of(record())
+    ended, window = a_coastdown()
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
     diagnosing.begin(ended, replace(window, before=None))
     status = result_of(diagnosing)
@@ -171,7 +174,7 @@ def test_too_little_steady_record_is_told() -> None:
 
 
 def test_coastdown_without_estimate_is_not_diagnosed() -> None:
-    ended, window = coastdown_of(record())
+    ended, window = a_coastdown()
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
     diagnosing.begin(replace(ended, estimate=None, failure='withdrawn: 1 %'), window)
     status = result_of(diagnosing)
@@ -184,7 +187,7 @@ def test_process_that_dies_is_a_failure_that_harms_nothing(
 ) -> None:
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
-    diagnosing.begin(*coastdown_of(record()))
+    diagnosing.begin(*a_coastdown())
     status = result_of(diagnosing)
     assert status.state is DiagnosisState.FAILED
     assert 'exit 1' in status.reason
@@ -192,7 +195,7 @@ def test_process_that_dies_is_a_failure_that_harms_nothing(
 
 def test_end_of_the_node_does_not_wait_for_a_diagnosis() -> None:
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
-    ended, window = coastdown_of(record())
+    ended, window = a_coastdown()
     for _ in range(3):
         diagnosing.begin(ended, window)
     time.sleep(0.5)

@@ -154,11 +154,11 @@ def test_a_flood_on_one_input_delays_no_other(
             ground.publish(message.payload)
             peer.spin_for(0.1)
 
-    sail(5.0)
+    sail(4.0)
     calm = len(sent)
     flood = Driver(peer, PLAIN, twist, 20_000.0)
     try:
-        sail(15.0)
+        sail(10.0)
         diagnostics.wait_for(PART, 'over 1000 a second')
     finally:
         flood.close()

@@ -138,14 +138,17 @@ def test_a_reset_is_recorded_before_what_comes_of_it(desk: Desk) -> None:
     assert [row.topic for row in bag][2:4] == [f'{NODE}/events'] * 2
 
 
-def test_a_stop_that_is_told_is_recorded_and_of_no_use_to_the_rules(desk: Desk) -> None:
+def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk: Desk) -> None:
+    done, said = desk.session.engine_stopped(START_NS)
+    assert not done
+    assert 'of no use: no speed was read yet' in said
     desk.feed(speeds([0, 1]))
     done, said = desk.session.engine_stopped(START_NS + 2 * SECOND_NS)
-    assert not done
-    assert 'recorded, and of no use: the rules judge' in said
+    assert done
+    assert 'weighed with the readings' in said
     (bag,) = desk.bags()
     kinds = [read_event(row.payload).kind for row in bag if row.topic == f'{NODE}/events']
-    assert kinds == [EventKind.ENGINE_STOPPED]
+    assert kinds == [EventKind.ENGINE_STOPPED] * 2
 
 
 def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:

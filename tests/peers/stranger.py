@@ -47,7 +47,7 @@ def cdr_twist(stamp_ns: int, speed_m_s: float) -> bytes:
     return b'\x00\x01\x00\x00' + body + struct.pack('<6d', speed_m_s, *[0.0] * 5)
 
 
-def coasting(time_s: float, *, speed_m_s: float = 5.0, slowing_1_m: float = 4e-4) -> float:
+def coasting(time_s: float, *, speed_m_s: float = 5.0, slowing_1_m: float = 8e-4) -> float:
     """Return the speed of a ship whose drag goes with its square, since her engine stopped."""
     return speed_m_s / (1.0 + slowing_1_m * speed_m_s * max(time_s, 0.0))
 

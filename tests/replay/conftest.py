@@ -38,7 +38,7 @@ def sail(seed: int = 1, *, steady_s: float = 400.0, coast_s: float = 700.0) -> B
     track = np.where(
         t < steady_s, 8.0 * (t - steady_s), 3000.0 * np.log1p(8.0 * coasting / 3000.0)
     )
-    shaft = 10.0 * np.exp(-coasting / 8.0)
+    shaft = 10.0 * np.exp(-coasting)  # as the thrust, which is gone at once
     stamps = START_NS + np.round(t * 1e9).astype(np.int64)
     log = speed + rng.normal(0.0, 0.03, len(t))
     fixes = np.column_stack([track, 0.0 * track]) + rng.normal(0.0, 1.0, (len(t), 2))

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.regimes.bank import OUT
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.replay import pictures
 from shipdrag_ros.replay.hulls import RankedHull
@@ -33,8 +35,18 @@ def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdo
         NotCoastdown(start_ns + round(a * length_ns), start_ns + round(b * length_ns), reason, '')
         for a, b, reason in ((0.5, 0.8, Dismissal.THRUST), (0.9, 0.91, Dismissal.TURN))
     )
-    shown = replace(coastdown, cuts=cuts, stretch=((start_ns, 8.0), (end_ns, 1.0)))
-    axis = pictures.cut_picture(shown, None, 2e7).axes[0]
+    share = np.array([1.0, 0.0])
+    regimes = Regimes(
+        np.array([start_ns, end_ns]),
+        np.array([8.0, 1.0]),
+        {name: 1.0 - share if name == 'gliding' else 0.0 * share for name in OUT}
+        | {'driven': share},
+        0.0,
+        0.5,
+    )
+    shown = replace(coastdown, cuts=cuts, regimes=regimes)
+    axis, strip = pictures.cut_picture(shown, None, 2e7).axes
     assert [text.get_text() for text in axis.texts] == [cuts[0].reason.value]
     assert len(axis.patches) == len(cuts)
     assert axis.get_xlim() == pytest.approx((0.0, length_ns * 1e-9))
+    assert [text.get_text() for text in strip.get_legend().get_texts()] == ['driven', 'gliding']

@@ -98,7 +98,7 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
 ) -> None:
     messages = list(encode(voyage()))
     at = next(i for i, each in enumerate(messages) if each.log_ns > START_NS + 405e9)
-    session = live(ship, Parameters(update_s=30.0, regimes='filter'))
+    session = live(ship, Parameters(update_s=30.0))
     session.start(tmp_path / 'a.mcap')
     for message in messages[:at]:
         session.receive(message)

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from shipdrag_ros.coastdown.events import Reset
+import numpy as np
+
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Regimes, Reset
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.replay import InputCounts, warnings
 from shipdrag_ros.samples import Reason
@@ -13,7 +15,7 @@ from shipdrag_ros.samples import Reason
 SURPLUS = Unreadable.SURPLUS_JOINT.value
 
 
-def told(inputs: dict[str, InputCounts], *events: Reset) -> tuple[str, ...]:
+def told(inputs: dict[str, InputCounts], *events: Event) -> tuple[str, ...]:
     result = SimpleNamespace(
         run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events, contradictions={}
     )
@@ -52,6 +54,17 @@ def test_resets_are_told_and_many_are_counted() -> None:
     found = told({'position': InputCounts(1, 1, {})}, *resets)
     assert 'jump 0' in found[1]
     assert found[-1] == 'and 2 more times'
+
+
+def test_a_record_that_the_model_explains_badly_is_told() -> None:
+    nothing = np.zeros(0)
+    said = []
+    for explained in (0.04, 0.06):
+        regimes = Regimes(nothing.astype(np.int64), nothing, {}, 0.0, explained)
+        ended = EndedCoastdown(0, 1, None, EndedBy.SPEED, None, '', regimes=regimes)
+        said.append(told({'position': InputCounts(1, 1, {})}, ended))
+    assert 'only as well as 4% of those' in said[0][1]
+    assert said[1] == ('torn',)
 
 
 def test_every_reason_has_its_cause() -> None:

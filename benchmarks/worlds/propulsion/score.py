@@ -18,7 +18,6 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import in_arrival_order
 
 HELD_SHARE = 0.8
-REGIMES = os.environ.get('REGIMES', 'rules')  # which of the two judges, `rules` or `filter`
 SPANS = bool(os.environ.get('SPANS'))  # spans alone, without an estimate: a tenth of the time
 DRIVEN_S = 10.0
 INPUTS: dict[str, tuple[str, ...]] = {
@@ -108,7 +107,7 @@ def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) ->
 
 
 def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
-    parameters = Parameters(update_s=60.0, regimes=REGIMES)
+    parameters = Parameters(update_s=60.0)
     monitor = (
         Monitor(world.ship, parameters, estimate=None, final=lambda window, _, __: window)
         if SPANS

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import bear, thin
+from shipdrag_ros.coastdown.regimes.births import bear, driven, free, switch, thin
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, pushes, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
@@ -17,11 +17,12 @@ from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
     ADVANCE,
-    BEFORE,
+    AMID,
     BRAKE,
     COUNT,
     CURRENT,
     DRIVEN,
+    EXCESS,
     FIRST_A,
     GLIDE,
     GLIDED,
@@ -35,6 +36,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOG,
     LONGER,
     LOW,
+    N_FIX,
     OPEN,
     P0,
     P_VAR,
@@ -49,7 +51,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     STATES,
     STAYS,
     STAYS_WAY,
-    SWITCHES,
     THE_LOG,
     WAY,
     WEIGHT,
@@ -73,8 +74,8 @@ OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
     SPEED,
     FIT,
 ) = range(10)
-OUTS = 10  # and of even power, of the first one, mean speed, log predictive density
-_TURNING_RAD_S = 0.5  # a shaft below it drives no ship
+OUTS = 10  # and of even power, of the first one, mean speed, excess of the log density
+_TURNING_RAD_S = 0.05  # a shaft below it, times its pitch, drives no ship
 
 
 class Bank(NamedTuple):
@@ -118,22 +119,20 @@ class Bank(NamedTuple):
 
 @compiled(uncounted=True)
 def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
-    """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
+    """Give birth to the first histories: driven evenly, or not; any instrument may lie."""
     all_ = bank.histories
     hull = setting.hull
     both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
-        by_log = not np.isnan(log) and liar != THE_LOG
+        by_log = log > 0.0 and liar != THE_LOG  # the logarithm of rest is of no use
         speed = log if by_log else track
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        for regime in (DRIVEN, GLIDE):
-            chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
+        for regime in (DRIVEN, AMID):
+            chance = n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
-            if not chance > 0.0:
-                continue
             chance *= math.exp(-0.5 * off * off)
             j = all_.used[0]
             all_.used[0] = j + 1
@@ -150,21 +149,19 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
             x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
-            p[WAY, WAY] = 1e4
+            x[WAY] = 0.5 * setting.step_s * speed
+            p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
+            p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
-            f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
+            f[WEIGHT] = math.log(chance)
             f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
-            f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
-            if regime == DRIVEN:
-                x[OPEN], p[OPEN, OPEN] = x[LN_U], p[LN_U, LN_U]
-                # the same error: she is in balance
-                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.9 * p[LN_U, LN_U]
-            else:
-                w[COUNT], w[GLIDED] = 1, 1
-                all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
+            driven(all_, j, hull)
+            if regime == AMID:
+                law = hull_law(hull, max(x[LN_U], hull.sails))[0] + x[LN_A]
+                f[FIRST_A] = math.exp(law)
+                free(all_, j, OPEN, 0.0, (n.AMID[1] * f[FIRST_A]) ** 2)
 
 
 @compiled(uncounted=True)
@@ -180,19 +177,21 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
         value = said[SHAFTS + k]
         if np.isnan(value):
             continue
-        if known and abs(revs[k]) > _TURNING_RAD_S * 1e-3:
+        if known and abs(revs[k]) > _TURNING_RAD_S:
             nu = value / revs[k]
             said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
             said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
         if learns:
-            revs[k] += gain * (value - revs[k])
+            revs[k] += (gain if revs[k] != 0.0 else 1.0) * (value - revs[k])
             learnt = True
     said[GONE] = np.nan
-    if not np.isnan(said[HIGH]) and speed > 0.0:
+    if np.isnan(said[HIGH]):
+        bank.first[2] = np.nan
+    elif speed > 0.0:
         before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
-        free = 1.0 / n.NO_THRUST_SEEN
-        if before > free >= now:
-            part = (before - free) / (before - now)
+        gone = 1.0 / n.NO_THRUST_SEEN
+        if before > gone >= now:
+            part = (before - gone) / (before - now)
             said[GONE] = (bank.histories.clock[0] - 1.5 + part) * step_s
         bank.first[2] = now
     if learns and (learnt or not known):
@@ -214,20 +213,20 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
     pushed = bank.what[i, last] == LEVEL
     if pushed == pushes(bank, i, now_s):
         return
-    if pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+    if pushed and bank.ramp[i, last] == 0.0:  # by the level as it is known now, not yet
+        w[COUNT] = last
+    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
         bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
         w[GLIDED] = 1
-    elif not pushed and w[COUNT] < SWITCHES:
-        bank.at[i, last + 1], bank.what[i, last + 1] = now_s, LEVEL
-        bank.ramp[i, last + 1] = 0.0
-        w[COUNT] += 1
+    elif not pushed:
+        switch(bank, i, now_s, LEVEL, 0.0)
 
 
 @compiled(uncounted=True)
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
-    for k in range(FIT):
+    for k in range(OUTS):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
     for i in range(all_.used[0]):
@@ -243,16 +242,20 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
                 out[P_GLIDING] += share
             else:
                 out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
-            if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
-                out[P_EVEN] += share
+                if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                    out[P_EVEN] += share
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
             out[P_RUN_DOWN if running else P_GLIDING] += share
+        elif regime == AMID:
+            out[P_DRIVEN] += share
+            out[P_EVEN] += share  # under power, and nothing to tell
         elif regime == BRAKE:
             out[P_BRAKED] += share
         else:
             out[P_TURNING] += share
         out[SPEED] += share * math.exp(all_.mean[i, LN_U])
+        out[FIT] += share * f[EXCESS]
 
 
 _SETTING = BankSetting(
@@ -260,7 +263,6 @@ _SETTING = BankSetting(
     0.0,
     0.0,
     0,
-    0.0,
     0.0,
 )  # its types are all that counts
 
@@ -282,11 +284,10 @@ def step(bank: Bank, setting: BankSetting) -> None:
         _sum_up(bank, setting)
         bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
     all_.clock[0] += 1
-    _shafts(bank, setting.step_s, bank.out[P_EVEN], bank.out[SPEED])
+    _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
         bear(all_, setting, both, not np.isnan(said[RATE]))
-    before = 0.0
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
@@ -295,4 +296,3 @@ def step(bank: Bank, setting: BankSetting) -> None:
     thin(all_, setting)
     _sum_up(bank, setting)
     listen(bank.noise, setting, said, bank.out[P_STEADY])
-    bank.out[FIT] = before

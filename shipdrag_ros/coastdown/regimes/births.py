@@ -9,19 +9,23 @@ import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.motion import balance, hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
+    AMID,
     BEFORE,
+    BEHIND,
     BRAKE,
     COUNT,
     DRIVEN,
     FIRST_A,
     FREE,
     GLIDE,
+    GLIDE_KIND,
     GLIDE_TURN,
     GLIDED,
+    GUST_A,
     HELD,
     KEPT,
     KIND,
@@ -29,6 +33,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LIAR,
     LN_A,
     LN_U,
+    NOBODY,
     OPEN,
     P0,
     P_VAR,
@@ -55,10 +60,11 @@ from shipdrag_ros.coastdown.regimes.state import (
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 
-_PARENTS = 7.0  # nats below the best: a history that still has children
+_PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have children, in turn
 _LOST = 16.0  # and one that is dropped
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
+_NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
 _ROOT = math.sqrt(2.0 * math.pi)
 
@@ -80,13 +86,32 @@ def _copy(bank: Histories, i: int, j: int) -> None:
 
 
 @compiled(uncounted=True)
-def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
-    """Give a state a prior of its own."""
+def free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
+    """
+    Give a state a prior of its own.
+    """
     for k in range(STATES):
         bank.spread[j, row, k] = 0.0
         bank.spread[j, k, row] = 0.0
     bank.mean[j, row] = mean
     bank.spread[j, row, row] = var
+
+
+@compiled(uncounted=True)
+def switch(bank: Histories, i: int, now_s: float, regime: int, ramp_s: float) -> None:
+    """
+    Write down a switch.
+    """
+    w = bank.whole[i]
+    if w[COUNT] == SWITCHES:  # the oldest is forgotten
+        for k in range(SWITCHES - 1):
+            bank.at[i, k] = bank.at[i, k + 1]
+            bank.what[i, k] = bank.what[i, k + 1]
+            bank.ramp[i, k] = bank.ramp[i, k + 1]
+        w[COUNT] -= 1
+    bank.at[i, w[COUNT]], bank.what[i, w[COUNT]] = now_s, regime
+    bank.ramp[i, w[COUNT]] = ramp_s
+    w[COUNT] += 1
 
 
 @compiled(uncounted=True)
@@ -100,7 +125,8 @@ def _born(
 ) -> int:
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
     j = bank.used[0]
-    if j >= ROOM or not share > 0.0:
+    # one that is not likelier would be dropped at once
+    if j >= ROOM or not share > 0.0 or bank.number[i, BEHIND] + math.log(share) < -_LOST:
         return -1
     _copy(bank, i, j)
     bank.used[0] = j + 1
@@ -108,15 +134,7 @@ def _born(
     f[WEIGHT] += math.log(share)
     f[SINCE], f[RAMP_S] = now_s, ramp_s
     w[REGIME] = regime
-    if w[COUNT] == SWITCHES:  # the oldest is forgotten
-        for k in range(SWITCHES - 1):
-            bank.at[j, k] = bank.at[j, k + 1]
-            bank.what[j, k] = bank.what[j, k + 1]
-            bank.ramp[j, k] = bank.ramp[j, k + 1]
-        w[COUNT] -= 1
-    bank.at[j, w[COUNT]], bank.what[j, w[COUNT]] = now_s, regime
-    bank.ramp[j, w[COUNT]] = ramp_s
-    w[COUNT] += 1
+    switch(bank, j, now_s, regime, ramp_s)
     return int(j)
 
 
@@ -126,30 +144,35 @@ def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
     law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
-    _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+    free(bank, j, OPEN, 0.0, n.WIND_SD**2)
 
 
 @compiled(uncounted=True)
 def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
     if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
-        j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
+        j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
         if j >= 0:
-            _glide(bank, j, setting.hull)
+            free(bank, j, OPEN, 0.0, n.WIND_SD**2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
-    for k in range(len(n.RUN_DOWN_S)):
-        ramp_s = n.RUN_DOWN_S[k] * setting.pace
+    last = bank.whole[i, COUNT] - 1
+    idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
+    for k in range(1 if idles else len(n.RUN_DOWN_S)):
+        ramp_s = _NO_RAMP_S if idles else n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
-            part = chance * setting.hull.run_down[k] * n.DRAGGED_SHARE[kind]
+            part = chance * (1.0 if idles else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
+            if idles:  # it is the same glide
+                bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
-            bank.whole[j, KIND] = kind
+            bank.number[j, BEFORE] = x[OPEN]
+            _glide(bank, j, setting.hull)
+            bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
             bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
             bank.number[j, REVS] = np.nan
-            bank.number[j, BEFORE] = x[OPEN]
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
             x[POWER] += tied * n.DRAGGED[kind]
@@ -157,15 +180,15 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
-            _glide(bank, j, setting.hull)
 
 
 @compiled(uncounted=True)
 def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the engine go to another level, or engage."""
     f = bank.number[i]
-    engaged = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
-    base = bank.mean[i, OPEN] if engaged else f[BEFORE]
+    regime = bank.whole[i, REGIME]
+    engaged = regime in (DRIVEN, LEVEL)
+    base = balance(bank.mean[i], f, regime, now_s)[0] if engaged else f[BEFORE]
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     for k in range(len(n.LEVELS)):
         for m in range(2 * ramps):
@@ -176,12 +199,16 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
                 continue
             bank.whole[j, KIND] = m % 2
             bank.number[j, FREE] = n.WINDMILL[0]
-            if bank.whole[i, REGIME] == GLIDE and bank.whole[i, KIND] == WINDMILLS:
+            if regime == GLIDE and bank.whole[i, KIND] == WINDMILLS:
                 revs = f[REVS]
                 bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
-            _free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
+            free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
+            if not engaged:  # what the screw dragged is over
+                drag = n.DRAGGED[bank.whole[i, KIND]]
+                bank.mean[j, LN_A] -= drag
+                bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[bank.whole[i, KIND]] * drag
 
 
 @compiled(uncounted=True)
@@ -192,9 +219,16 @@ def _turns(
         j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
             if regime == TURN:
-                bank.number[j, BEFORE] = bank.mean[i, OPEN]
-                bank.number[j, REVS] = np.nan
-            _free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
+                f, x, p = bank.number[j], bank.mean[i], bank.spread[i]
+                f[BEFORE], f[REVS] = balance(x, f, bank.whole[i, REGIME], now_s)[0], np.nan
+                # what the level before it taught
+                f[A0], f[A_VAR], f[P0], f[P_VAR] = (
+                    x[LN_A],
+                    p[LN_A, LN_A],
+                    x[POWER],
+                    p[POWER, POWER],
+                )
+            free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
 @compiled(uncounted=True)
@@ -205,11 +239,11 @@ def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
                 _glide(bank, j, setting.hull)
-                bank.number[j, REVS] = np.nan
-                bank.whole[j, KIND] = STANDS
+                bank.number[j, BEFORE], bank.number[j, REVS] = bank.mean[i, OPEN], np.nan
+                bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
-            _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+            free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
 
 
 @compiled(uncounted=True)
@@ -220,7 +254,31 @@ def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: f
         before = bank.number[i, BEFORE]
         bank.number[j, RAMP_FROM], bank.number[j, REVS] = before, np.nan
         bank.whole[j, KIND] = 0
-        _free(bank, j, OPEN, before, 0.02**2)
+        free(bank, j, OPEN, before, 0.02**2)
+
+
+@compiled(uncounted=True)
+def _settles(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """End the manoeuvre that the record began in: she is in balance."""
+    j = _born(bank, i, now_s, chance, DRIVEN, 1.0)
+    if j >= 0:
+        bank.whole[j, COUNT] = 0
+        driven(bank, j, setting.hull)
+
+
+@compiled(uncounted=True)
+def driven(bank: Histories, j: int, hull: HullPrior) -> None:
+    """
+    Put a history in balance at its speed, without a switch.
+    """
+    x, p, f = bank.mean[j], bank.spread[j], bank.number[j]
+    f[SINCE], f[BEFORE], f[RAMP_S] = -1e9, x[LN_U], 1.0
+    f[FIRST_A] = f[GUST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+    free(bank, j, OPEN, x[LN_U], p[LN_U, LN_U])
+    # the same error: she is in balance
+    for k in range(STATES):
+        if k != OPEN:
+            p[k, OPEN] = p[OPEN, k] = 0.9 * p[LN_U, k]
 
 
 @compiled(uncounted=True)
@@ -247,62 +305,79 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
         The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
-    hours = setting.step_s / 3600.0
     parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
         best = max(best, bank.number[i, WEIGHT])
     for i in range(parents):
-        f, w = bank.number[i], bank.whole[i]
-        if f[WEIGHT] < best - _PARENTS:
-            continue
-        regime = w[REGIME]
-        age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
-        if both and w[LIAR] == 0:
-            _lies(bank, i, THE_LOG, n.LIES * hours)
-            _lies(bank, i, THE_TRACK, n.LIES * hours)
-        if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
-            w[REGIME] = regime = DRIVEN
-            f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
-            f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
-        left = 0.0  # hazard of all that it may switch to
-        if regime in (DRIVEN, LEVEL):
-            if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
-                continue
-            stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
-            if age_s < n.MANOEUVRING_S * setting.pace:
-                after = w[GLIDED] == 1
-                stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
-                rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
-                stop = n.MANOEUVRE * stops
-                level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
-                turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
-            if not np.isnan(setting.told_s):
-                off = (now_s - setting.told_s) / n.TOLD[1]
-                stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
-            _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-            _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
-            _levels(bank, i, setting, now_s, level * hours)
-            _turns(bank, i, setting, now_s, turn * hours, TURN)
-            left = stop + level + turn
-        elif regime == GLIDE:
-            _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
-            left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
-            if steered:
-                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-                left += n.GLIDE_TURN
-            _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
-        elif regime == BRAKE:
-            _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
-            _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
-            left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
+        bank.number[i, BEHIND] = bank.number[i, WEIGHT] - best
+    likelier = np.inf
+    for least in _PARENTS:  # the likeliest first: there may be no room for the children of all
+        for i in range(parents):
+            if least <= bank.number[i, BEHIND] < likelier:
+                _children(bank, setting, i, now_s, both, steered)
+        likelier = least
+
+
+@compiled(uncounted=True)
+def _children(
+    bank: Histories, setting: BankSetting, i: int, now_s: float, both: bool, steered: bool
+) -> None:
+    """Let a history switch to all that it may."""
+    f, w = bank.number[i], bank.whole[i]
+    hours = setting.step_s / 3600.0
+    regime = w[REGIME]
+    age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
+    if both and w[LIAR] == NOBODY:
+        _lies(bank, i, THE_LOG, n.LIES * hours)
+        _lies(bank, i, THE_TRACK, n.LIES * hours)
+    if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
+        w[REGIME] = regime = DRIVEN
+        w[KIND] = 0
+        f[GUST_A] = math.exp(hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A])
+        f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
+        f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+    left = 0.0  # hazard of all that it may switch to
+    if regime in (DRIVEN, LEVEL):
+        if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
+            return
+        stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
+        if age_s < n.MANOEUVRING_S * setting.pace:
+            after = w[GLIDED] == 1
+            stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
+            rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
+            stop = n.MANOEUVRE * stops
+            level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
+            turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+        if not np.isnan(setting.told_s):
+            off = (now_s - setting.told_s) / n.TOLD[1]
+            stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
+        _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
+        _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
+        _levels(bank, i, setting, now_s, level * hours)
+        _turns(bank, i, setting, now_s, turn * hours, TURN)
+        left = stop + level + turn
+    elif regime == GLIDE:
+        _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
+        if steered:
+            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            left += n.GLIDE_TURN
+        _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
+    elif regime == BRAKE:
+        _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
+        _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
+        left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
+    elif regime == AMID:
+        _settles(bank, i, setting, now_s, n.AMID[3] * hours)
+        left = float(n.AMID[3])
+    else:
+        if regime == TURN:
+            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
         else:
-            if regime == TURN:
-                _back(bank, i, setting, now_s, n.TURN_OUT * hours)
-            else:
-                _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
-            left = float(n.TURN_OUT)
-        f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
+            _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+        left = float(n.TURN_OUT)
+    f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
 
 @compiled(uncounted=True)
@@ -311,7 +386,8 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     w, v = bank.whole[i], bank.whole[j]
     last = w[COUNT] - 1
     if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
-        return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
+        first = w[COUNT] == 0 and v[COUNT] == 0 and w[REGIME] == v[REGIME]
+        return bool(first and w[LIAR] == v[LIAR])
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False
     if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
@@ -325,17 +401,20 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
 @compiled(uncounted=True)
 def thin(bank: Histories, setting: BankSetting) -> None:
     """
-    Weigh against the best; merge and keep the likeliest now and then.
+    Weigh against the best and keep the likeliest; merge now and then.
     """
     count = bank.used[0]
     best = -np.inf
     for i in range(count):
         best = max(best, bank.number[i, WEIGHT])
+    if best == -np.inf:  # it begins anew
+        bank.used[0] = 0
+        return
     total = 0.0
     for i in range(count):
         total += math.exp(bank.number[i, WEIGHT] - best)
     norm = best + math.log(total)
-    due = bank.clock[0] % _THIN_EVERY == 0 or count > ROOM - 2 * KEPT
+    due = bank.clock[0] % _THIN_EVERY == 0
     now_s = bank.clock[0] * setting.step_s
     kept = 0
     for i in range(count):
@@ -347,10 +426,10 @@ def thin(bank: Histories, setting: BankSetting) -> None:
         kept += 1
     bank.used[0] = kept
     if not due:
+        _keep_best(bank)  # or the next births find no room
         return
     _merge(bank, now_s, setting.pace)
-    if bank.used[0] > KEPT:
-        _keep_best(bank)
+    _keep_best(bank)
 
 
 @compiled(uncounted=True)
@@ -386,6 +465,8 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
 @compiled(uncounted=True)
 def _keep_best(bank: Histories) -> None:
     count = bank.used[0]
+    if count <= KEPT:
+        return
     low, high = -_LOST - 1.0, 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)

@@ -16,7 +16,7 @@ from shipdrag_ros.ship.baseline import ittc57
 
 # Taylor's wetted-surface coefficient of ordinary hulls; C_T = 1.25 C_F + 0.0004
 _TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4
-_HUMP = 0.45  # Froude number above which waves make less, not more
+_HUMP = 0.45  # Froude number from which on waves make no more
 _POINTS = 64
 _SPEEDS = (0.03, 1.2)  # Froude numbers of the table
 
@@ -103,8 +103,9 @@ def _friction(ship: Ship, speed: Float64) -> Float64:
 
 def _generic(ship: Ship, speed: Float64) -> Float64:
     """Return the curve of a hull of which length and volume are known: friction and waves."""
-    froude = np.minimum(speed / float(ship.speed(1.0)), _HUMP)
-    return np.asarray(_friction(ship, speed) + np.log1p((froude / n.WAVES) ** 4))
+    at_hump = np.minimum(speed, float(ship.speed(_HUMP)))
+    waves = _friction(ship, at_hump) + 4.0 * np.log(at_hump / float(ship.speed(n.WAVES)))
+    return np.logaddexp(_friction(ship, speed), waves)
 
 
 def _baseline(ship: Ship, speed: Float64) -> tuple[Float64, Float64, Float64] | None:

@@ -13,11 +13,14 @@ from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
     ADVANCE,
+    AMID,
     BEFORE,
     BRAKE,
     COUNT,
     CURRENT,
     DRIVEN,
+    EDDY,
+    EXCESS,
     FIRST_A,
     FREE,
     GLIDE,
@@ -25,6 +28,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GONE,
     GROUND,
     GUST,
+    GUST_A,
     HELD,
     HIGH,
     KIND,
@@ -38,6 +42,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     LOW,
     MEAN_LAG,
     MEAN_U,
+    N_EDDY,
+    N_EDDY_S,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -77,6 +83,9 @@ _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
 _ROOT = math.sqrt(2.0 * math.pi)
+_WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
+_LONGEST = math.log(float(n.LOG_LAG_MOST) / _LAG_S)
+_REVERSED = -0.05  # of the steady revs
 
 
 @compiled(inline=True, uncounted=True)
@@ -86,6 +95,13 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
     i = int(min(max(math.floor(place), 0.0), len(hull.curve) - 2.0))
     slope = hull.curve[i + 1] - hull.curve[i]
     return hull.curve[i] + (place - i) * slope, slope / hull.step
+
+
+@compiled(inline=True, uncounted=True)
+def _bounded(hull: HullPrior, log_u: float) -> float:
+    """Return ln u of a hull that is at rest at least, and no faster than any."""
+    last = hull.first + (len(hull.curve) - 1.0) * hull.step
+    return float(min(max(log_u, hull.first - 1.0), last + 2.0))
 
 
 @compiled(inline=True, uncounted=True)
@@ -109,14 +125,22 @@ def _thrust_left(f: Float64, now_s: float) -> float:
     return float(left * left)
 
 
+@compiled(inline=True, uncounted=True)
+def balance(x: Float64, f: Float64, regime: int, now_s: float) -> tuple[float, float]:
+    """Return ln of the speed at which thrust and water would balance now, and part of the ramp."""
+    if regime == TURN:
+        return f[BEFORE], 0.0
+    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S]) if regime == LEVEL else 1.0
+    return f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share if share < 1.0 else x[OPEN], share
+
+
 @compiled(uncounted=True)
 def pushes(bank: Histories, i: int, now_s: float) -> bool:
     """Say whether the screw of a history pushes."""
     f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
     if w[REGIME] != LEVEL:
-        return bool(w[REGIME] == DRIVEN or w[REGIME] == TURN)
-    share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-    target = f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share
+        return w[REGIME] in (DRIVEN, TURN)
+    target = balance(x, f, LEVEL, now_s)[0]
     free = f[FREE] if w[KIND] == 1 else 0.0
     rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
     return bool(rho * n.NO_THRUST > 1.0)
@@ -130,12 +154,7 @@ def _force(
     a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
     left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
     if regime in (DRIVEN, LEVEL, TURN):
-        target, share = x[OPEN], 1.0
-        if regime == TURN:
-            target, share = f[BEFORE], 0.0
-        elif regime == LEVEL:
-            share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-            target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
+        target, share = balance(x, f, regime, now_s)
         rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
@@ -148,6 +167,8 @@ def _force(
     more = 0.0
     if regime == BRAKE:
         more = by_open = -math.exp(min(x[OPEN], 3.0)) * f[FIRST_A]
+    elif regime == AMID:
+        left, more, by_open = 0.0, x[OPEN], 1.0
     elif regime == GLIDE:
         more, by_open = -x[OPEN] * f[FIRST_A], -f[FIRST_A]
     net = -a * left + x[GUST] + more
@@ -170,7 +191,7 @@ def predict(
     bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
 ) -> float:
     """
-    Carry a history to the end of the bin; return its deceleration there [m/s^2].
+    Carry a history to the end of the bin; return its acceleration there [m/s^2].
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime = bank.whole[i, REGIME]
@@ -178,7 +199,7 @@ def predict(
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
-    keep_c = math.exp(-dt / (n.CURRENT_S * pace))
+    keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
     slowing = mean_u = mean_lag = 0.0
@@ -207,7 +228,7 @@ def predict(
             p[LAG, k] = work[3, k]
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
-            p[CURRENT, k] *= keep_c
+            p[EDDY, k] *= keep_e
         for k in range(STATES):
             new = (
                 l_l * p[k, LN_U] + l_a * p[k, LN_A] + l_o * p[k, OPEN]
@@ -219,28 +240,35 @@ def predict(
             p[k, LN_U], p[k, WAY] = new, way
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
-            p[k, CURRENT] *= keep_c
+            p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
             p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
-        # the wind that she meets falls less than her own way
-        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * a * max(a, f[FIRST_A])
+        elif regime == AMID:
+            p[OPEN, OPEN] += (n.AMID[2] * f[FIRST_A]) ** 2 * dt / (60.0 * pace)
+        # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
+        full, now = f[GUST_A], a
+        if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
+            now = min(a, full)
+        gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
-        p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
+        p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
         lagged = keep_f * x[LAG] - u * change
         mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
         x[LAG] = lagged
-        x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
+        x[LN_U] = _bounded(setting.hull, x[LN_U] + change)
         mean_u += 0.5 * (u + math.exp(x[LN_U])) / _PARTS
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
-        x[CURRENT] *= keep_c
+        x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
     f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
@@ -256,9 +284,13 @@ def _take(
     off: float,
     variance: float,
     bad: float,
-    least: float,
-) -> float:
-    """Update by one reading, good or bad; return its log density."""
+    hull: HullPrior,
+) -> tuple[float, float]:
+    """
+    Update by one reading, as usual, of more scatter, or bad.
+
+    Return its log density, and how much more than its expectation that is.
+    """
     total = variance
     for j in range(STATES):
         row = 0.0
@@ -267,19 +299,21 @@ def _take(
                 row += p[j, k] * h[k]
         work[0, j] = row
         total += h[j] * row
-    good = (1.0 - n.BAD) * math.exp(-0.5 * off * off / total) / (_ROOT * math.sqrt(total))
-    density = good + n.BAD * bad
-    share = good / density
-    if share > 1e-6:
-        around = share * (1.0 - share) * off * off / total
+    wider = total + (_WIDER * _WIDER - 1.0) * variance
+    usual = (1.0 - n.BAD - _WIDE) * math.exp(-0.5 * off * off / total) / math.sqrt(total)
+    wide = _WIDE * math.exp(-0.5 * off * off / wider) / math.sqrt(wider)
+    density = (usual + wide) / _ROOT + n.BAD * bad
+    usual, wide = usual / (_ROOT * density), wide / (_ROOT * density)
+    if usual + wide > 1e-6:
+        gain = usual / total + wide / wider
+        around = (usual / total**2 + wide / wider**2 - gain * gain) * off * off
         for j in range(STATES):
-            gain = work[0, j] / total
-            x[j] += share * gain * off
+            x[j] += gain * work[0, j] * off
             for k in range(j + 1):
-                p[j, k] += (around - share) * gain * work[0, k]
+                p[j, k] += (around - gain) * work[0, j] * work[0, k]
                 p[k, j] = p[j, k]
-        x[LN_U] = max(x[LN_U], least)
-    return math.log(density)
+        x[LN_U] = _bounded(hull, x[LN_U])
+    return math.log(density), 0.5 + math.log(density * _ROOT * math.sqrt(total))
 
 
 @compiled(inline=True, uncounted=True)
@@ -293,6 +327,7 @@ def _untrue(f: Float64, column: int, value: float, wide: float, bad: float) -> f
     off = value - f[column]
     stays = 0.0 if np.isnan(off) else n.STUCK * _normal(off, wide)
     density = stays + (1.0 - n.STUCK) * bad
+    f[EXCESS] += 0.5 + math.log(density * _ROOT * wide)
     share = stays / density
     f[column] = value if share < 0.1 else f[column] + 0.1 * share * off
     return math.log(density)
@@ -330,13 +365,8 @@ def _driving(
 ) -> float:
     """Return the density of the revs of a screw that drives."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
-    target, settled = x[OPEN], True
-    if regime == TURN:
-        target = f[BEFORE]
-    elif regime == LEVEL:
-        share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-        target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        settled = share == 1.0
+    target, share = balance(x, f, regime, now_s)
+    settled = regime == TURN or share == 1.0
     at = math.exp(min(target - log_first, 1.0))
     if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
         free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
@@ -347,7 +377,8 @@ def _driving(
     else:
         gain = 0.1 if settled else 1.0
         density = _as_usual(f, nu, at, gain, gain)
-    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    # with fewer turns a metre it drives nothing
+    f[REVS] = min(max(f[REVS], 1.0 / _S), max(1.0 / at, 1.3) if several else 1.3)
     if not settled:  # on its way to the level, or one of several that turns as before
         least = 0.0 if several else min(0.8 * math.exp(x[OPEN] - log_first), 0.9)
         density = 0.5 * density + (0.5 / (1.1 - least) if least < nu < 1.1 else 0.0)
@@ -391,7 +422,8 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         f[REVS] = nu
         # or anything below its last: it runs down
         return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
-    f[REVS] = nu
+    if kind == HELD:  # a sensor that is stuck stays where it was
+        f[REVS] = nu
     moves = 0.1 if kind == HELD else 0.01
     return (1.0 - moves) * _off(nu, revs) + moves
 
@@ -410,9 +442,11 @@ def _shaft(
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
-    if low < -0.05:
+    if low < _REVERSED:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
-    if regime in (DRIVEN, LEVEL, TURN):
+    if regime == AMID:
+        density = 0.8 if 0.0 < nu < 1.25 else 0.0
+    elif regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
         if several and regime != LEVEL:  # they turn alike
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
@@ -440,6 +474,8 @@ def _stop_seen(bank: Histories, i: int, nu: float, now_s: float, step_s: float) 
     first_s = now_s - 0.5 * step_s
     if w[REGIME] != GLIDE or w[KIND] >= HELD or w[COUNT] == 0 or f[SINCE] != first_s:
         return
+    if bank.at[i, w[COUNT] - 1] != first_s:  # she glided before
+        return
     later = step_s * min(max(1.0 - 2.5 * (1.0 - nu), 0.0), 1.0)
     f[SINCE] += later
     bank.at[i, w[COUNT] - 1] = f[SINCE]
@@ -451,10 +487,19 @@ def _thrust_seen(bank: Histories, i: int, gone_s: float, before_s: float) -> Non
     f, w = bank.number[i], bank.whole[i]
     if np.isnan(gone_s) or w[REGIME] != GLIDE or w[KIND] >= HELD:
         return
-    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0:
+    if f[SINCE] + f[RAMP_S] > before_s and w[COUNT] > 0 and bank.at[i, w[COUNT] - 1] == f[SINCE]:
         f[SINCE] = min(f[SINCE], gone_s - 0.1)
         f[RAMP_S] = gone_s - f[SINCE]
         bank.at[i, w[COUNT] - 1], bank.ramp[i, w[COUNT] - 1] = f[SINCE], f[RAMP_S]
+
+
+@compiled(inline=True, uncounted=True)
+def _forget(x: Float64, p: Float64, which: int, mean: float, var: float) -> None:
+    """Give a state its prior again."""
+    x[which] = mean
+    for k in range(STATES):
+        p[which, k] = p[k, which] = 0.0
+    p[which, which] = var
 
 
 @compiled(uncounted=True)
@@ -472,11 +517,10 @@ def _by_way(
         h[j] = 0.0
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
-    gained = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull.first - 1.0)
-    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again
-        for k in range(STATES):
-            p[WAY, k] = p[k, WAY] = 0.0
-        p[WAY, WAY] = 1e4
+    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull)
+    f[EXCESS] += excess
+    if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
+        _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
     return gained
 
 
@@ -488,7 +532,8 @@ def _by_shafts(
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
     shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
-    gained = n.SHAFT_TEMPER * shown
+    # a slow error of revs does not turn their sign
+    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
     if young and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
@@ -497,15 +542,6 @@ def _by_shafts(
     _thrust_seen(bank, i, said[GONE], now_s - 1.5 * step_s)
     _stop_seen(bank, i, said[HIGH], now_s, step_s)
     return float(gained)
-
-
-@compiled(inline=True, uncounted=True)
-def _forget(x: Float64, p: Float64, which: int, mean: float, var: float) -> None:
-    """Give a state its prior again."""
-    x[which] = mean
-    for k in range(STATES):
-        p[which, k] = p[k, which] = 0.0
-    p[which, which] = var
 
 
 @compiled(uncounted=True)
@@ -519,15 +555,14 @@ def weigh(
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[STATES]
-    gained = 0.0
+    gained = f[EXCESS] = 0.0
     bad = float(n.BAD_DENSITY)
-    least = setting.hull.first - 1.0  # at rest
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
         if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
             wide = 1.5 * math.hypot(noise[N_LOG], noise[N_WANDER])
-            wide = wide if which == LOG else noise[N_GROUND]
+            wide = wide if which == LOG else math.hypot(noise[N_GROUND], noise[N_EDDY])
             gained += _untrue(f, STAYS, said[which], wide, bad)
             continue
         u = math.exp(x[LN_U])
@@ -537,30 +572,37 @@ def weigh(
         expected = u + f[MEAN_U]
         sd = noise[N_LOG]
         if which == LOG:
-            longer, lags = math.exp(min(max(x[LONGER], -3.0), 3.0)), x[LAG] + f[MEAN_LAG]
-            h[WANDER], h[LAG], h[LONGER] = 1.0, longer, longer * lags
+            longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
+            h[WANDER], h[LAG] = 1.0, longer
+            h[LONGER] = longer * lags if x[LONGER] < _LONGEST else 0.0
             expected += x[WANDER] + longer * lags
         else:
-            h[CURRENT] = 1.0
-            expected += x[CURRENT] - setting.pace * _GROUND_LAG_S * slowing
+            h[CURRENT] = h[EDDY] = 1.0
+            expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
+        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, setting.hull)
+        gained += shown
+        f[EXCESS] += excess
     if not np.isnan(said[ADVANCE]):
         gained += _by_way(bank, i, setting, noise, said[ADVANCE], work)
+    else:  # the next fix begins the way anew
+        way = 0.5 * setting.step_s * (math.exp(x[LN_U]) + x[CURRENT])
+        _forget(x, p, WAY, way, noise[N_FIX] ** 2)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way
         sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
-        turning = regime in (TURN, GLIDE_TURN)
+        turning = regime in (TURN, GLIDE_TURN, AMID)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
-    f[WEIGHT] += gained
-    if regime in (DRIVEN, TURN):
+    # a covariance that rounding broke weighs nothing
+    f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
+    if regime in (DRIVEN, TURN, AMID):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The noise of a steady record: small filters of a driven ship, averaged by their evidence."""
+"""
+The noise of a steady record: small filters of a driven ship, averaged by their evidence.
+
+What log and speed over ground differ by is followed too: what both say is the ship.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     GROUND,
     LOG,
+    N_EDDY,
+    N_EDDY_S,
     N_FIX,
     N_GROUND,
     N_GUST,
@@ -23,16 +29,19 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_WANDER,
     N_WANDER_S,
     NOISES,
+    RANGES,
     RATE,
     BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import Float64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
 _WALKS = len(n.TRACK_WALK)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
+_STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
+_APART = 3  # log less speed over ground
 _DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
 
@@ -43,14 +52,17 @@ class NoiseFilters(NamedTuple):
 
     Attributes
     ----------
-    mean, spread : (3, FILTERS, states), (3, FILTERS, states, states)
-        For log, speed over ground and fixes.
-    evidence : (3, FILTERS)
+    mean, spread : (4, FILTERS, states), (4, FILTERS, states, states)
+        For log, speed over ground, fixes, and the first less the second.
+    evidence : (4, FILTERS)
         Faded log likelihood.
-    last, jump : (3, 2), (3,)
+    last, jump : (4, 2), (4,)
         Last readings; mean size of their differences.
-    seen : (3,) int64
-        Readings.
+    seen : (4,)
+        Readings of a driven ship.
+    coarse : (2, 2)
+        Of log and speed over ground: share of bins in which every second reads the same, and mean
+        range of the seconds of a bin.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
     queue : (delay, NOISES)
@@ -64,7 +76,8 @@ class NoiseFilters(NamedTuple):
     evidence: Float64
     last: Float64
     jump: Float64
-    seen: Int64
+    seen: Float64
+    coarse: Float64
     rate: Float64
     queue: Float64
     used: Float64
@@ -75,14 +88,15 @@ class NoiseFilters(NamedTuple):
         """
         Return filters that have seen nothing.
         """
-        first = np.array([0.08, 0.03, 60.0, 0.1, 0.1, 10.0, 0.6, 0.01])
+        first = np.array([0.08, 0.03, 60.0, 0.03, 60.0, 0.1, 0.1, 10.0, 0.6, 0.01])
         return cls(
-            np.zeros((3, FILTERS, _STATES)),
-            np.zeros((3, FILTERS, _STATES, _STATES)),
-            np.zeros((3, FILTERS)),
-            np.full((3, 2), np.nan),
-            np.zeros(3),
-            np.zeros(3, np.int64),
+            np.zeros((4, FILTERS, _STATES)),
+            np.zeros((4, FILTERS, _STATES, _STATES)),
+            np.zeros((4, FILTERS)),
+            np.full((4, 2), np.nan),
+            np.zeros(4),
+            np.zeros(4),
+            np.zeros((2, 2)),
             np.zeros(2),
             np.tile(first, (_DELAY, 1)),
             first,
@@ -93,7 +107,7 @@ class NoiseFilters(NamedTuple):
 @compiled(inline=True, uncounted=True)
 def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
     """Return gust, slow error and its time, white noise and walk of a filter."""
-    gust = n.GUST[k % _GUSTS]
+    gust = 0.0 if which == _APART else n.GUST[k % _GUSTS]
     k //= _GUSTS
     if which == 2:
         return (
@@ -113,15 +127,18 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
     """
     Learn from a bin, by the probability that she was driven evenly, and age what is used.
     """
-    for which in range(3):
+    for which in range(4):
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
+        value = said[LOG] - said[GROUND] if which == _APART else value
         if not np.isnan(value):
+            if which <= GROUND:
+                _coarse(noise, which, said[RANGES + which], driven)
             _one(noise, setting, which, value, driven)
     if not np.isnan(said[RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
-        clipped = min(abs(said[RATE]), 3.0 * sd)
+        clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
-        noise.rate[1] += 1.0
+        noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
     slot = noise.queue[0]
     for row in range(_DELAY - 1):
@@ -134,6 +151,30 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         noise.used[k] = newest[k] if young else slot[k]
 
 
+@compiled(inline=True, uncounted=True)
+def _coarse(noise: NoiseFilters, which: int, spread: float, driven: float) -> None:
+    """Learn how often the seconds of a bin read the same, and their mean range."""
+    coarse = noise.coarse[which]
+    gain = driven / min(noise.seen[which] + 1.0, n.MEMORY_S / n.BIN_S)
+    coarse[0] += gain * ((1.0 if spread == 0.0 else 0.0) - coarse[0])
+    coarse[1] += gain * (spread - coarse[1])
+
+
+@compiled(inline=True, uncounted=True)
+def _rounding_of(noise: NoiseFilters, which: int) -> float:
+    """Return the sd of what a display rounds off: less, the more often its readings differ."""
+    same, spread = noise.coarse[which]
+    return float(same * spread / ((1.0 - same) * math.sqrt(12.0))) if spread > 0.0 else 0.0
+
+
+@compiled(inline=True, uncounted=True)
+def _rounding(noise: NoiseFilters, which: int) -> float:
+    """Return that of an instrument, or of the log less the speed over ground."""
+    if which == _APART:
+        return math.hypot(_rounding_of(noise, LOG), _rounding_of(noise, GROUND))
+    return _rounding_of(noise, which) if which <= GROUND else 0.0
+
+
 @compiled(uncounted=True)
 def _one(
     noise: NoiseFilters, setting: BankSetting, which: int, value: float, driven: float
@@ -142,37 +183,38 @@ def _one(
     speed = value / step if which == 2 else value
     count = noise.seen[which]
     last = noise.last[which]
-    if count > 0 and not np.isnan(last[0]):
+    if not np.isnan(last[0]):
         size = abs(value - last[0])
         if count > 8:
-            size = min(size, 4.0 * noise.jump[which])
-        gain = driven / min(count, n.MEMORY_S / n.BIN_S)
+            size = min(size, max(4.0 * noise.jump[which], n.WHITE_FLOOR * abs(value)))
+        gain = driven / min(max(count, 1.0), n.MEMORY_S / n.BIN_S)
         noise.jump[which] += gain * (size - noise.jump[which])
     last[0] = value
-    noise.seen[which] = count + 1
-    if count < 4 or not speed > 0.0:
+    noise.seen[which] = count + driven
+    if count < 4 or not (speed > 0.0 or which == _APART):
         for k in range(FILTERS):
-            _start(noise.mean[which, k], noise.spread[which, k], max(speed, 1e-3))
+            _start(noise.mean[which, k], noise.spread[which, k], speed, max(abs(speed), 1e-3))
         return
     spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
-    size = noise.mean[which, 0, 1]
+    size = noise.mean[0 if which == _APART else which, 0, 1]
     spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
     walks = _WALKS * _GUSTS * _WHITES
-    for k in range(walks if which == 2 else FILTERS):
+    stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
+    for k in range(0, walks if which == 2 else FILTERS, stride):
         gained = _filter(noise, setting, which, k, value, spread, a)
         noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
 
 
 @compiled(uncounted=True)
-def _start(x: Float64, p: Float64, speed: float) -> None:
+def _start(x: Float64, p: Float64, speed: float, size: float) -> None:
     for j in range(_STATES):
         x[j] = 0.0
         for k in range(_STATES):
             p[j, k] = 0.0
     x[0] = x[1] = speed
-    p[0, 0] = p[1, 1] = (0.05 * speed) ** 2
+    p[0, 0] = p[1, 1] = (0.05 * size) ** 2
     p[3, 3] = 1e-4
 
 
@@ -190,7 +232,9 @@ def _filter(
     x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
     gust, wander, wander_s, white, walk = _parts(which, k)
     dt, pace = setting.step_s, setting.pace
-    keep = math.exp(-dt * min(_STEEP * a / max(x[1], 1e-3), 1.0 / dt))
+    keep = 1.0  # no hull brings back what they differ by
+    if which != _APART:
+        keep = math.exp(-dt * min(_STEEP * a / max(x[1], 1e-3), 1.0 / dt))
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (wander_s * pace))
     way = dt if which == 2 else 0.0
     # rows of the transition: speed, engine, gust, slow error, way
@@ -212,12 +256,15 @@ def _filter(
     x[0] = keep * x[0] + (1.0 - keep) * x[1] + dt * x[2]
     x[2] *= keep_g
     x[3] *= keep_b
-    p[1, 1] += (n.POWER_DRIFT * x[1]) ** 2 * dt / (600.0 * pace)
+    if which == _APART:
+        p[0, 0] += 2.0 * n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
+    else:
+        p[1, 1] += (n.POWER_DRIFT * x[1]) ** 2 * dt / (600.0 * pace)
     p[2, 2] += (1.0 - keep_g * keep_g) * (gust * a) ** 2
     p[3, 3] += (1.0 - keep_b * keep_b) * wander * wander
     p[4, 4] += walk * walk * dt
     first, second = (4, 4) if which == 2 else (0, 3)
-    variance = (white * spread) ** 2 + 1e-12
+    variance = (white * spread) ** 2 + _rounding(noise, which) ** 2 + 1e-12
     off = -x[4] if which == 2 else value - x[0] - x[3]
     gain = work[_STATES]
     total = variance
@@ -235,6 +282,18 @@ def _filter(
     return float(density)
 
 
+@compiled(inline=True, uncounted=True)
+def _evidence(noise: NoiseFilters, which: int, k: int) -> float:
+    """Return that of a filter: neither of two speeds wanders by more than what they differ by."""
+    found = noise.evidence[which, k]
+    if which < 2 and noise.seen[_APART] >= 8:
+        first, most = k - k % (_GUSTS * _WHITES), -np.inf
+        for white in range(_WHITES):
+            most = max(most, noise.evidence[_APART, first + white * _GUSTS])
+        found += most
+    return float(found)
+
+
 @compiled(uncounted=True)
 def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
     """Average the filters of each instrument by their evidence; the gust is the log's first."""
@@ -245,10 +304,10 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
         filters = _WALKS * _GUSTS * _WHITES if which == 2 else FILTERS
         best = -np.inf
         for k in range(filters):
-            best = max(best, noise.evidence[which, k])
+            best = max(best, _evidence(noise, which, k))
         total = g = b = t = w = q = 0.0
         for k in range(filters):
-            share = math.exp(noise.evidence[which, k] - best)
+            share = math.exp(_evidence(noise, which, k) - best)
             gust, wander, wander_s, white, walk = _parts(which, k)
             total += share
             g += share * math.log(gust)
@@ -259,16 +318,15 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
         spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
         step = setting.step_s if which == 2 else 1.0
         spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
-        white = math.exp(w / total) * spread
+        white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
         if which == 0:
             out[N_WANDER], out[N_WANDER_S] = math.exp(b / total), math.exp(t / total)
             out[N_LOG] = white
         elif which == 1:
-            out[N_GROUND] = math.sqrt(white**2 + math.exp(2.0 * b / total))
-            if noise.seen[0] < 8:
-                out[N_GROUND] = white
+            out[N_EDDY], out[N_EDDY_S] = math.exp(b / total), math.exp(t / total)
+            out[N_GROUND] = white
         else:
             out[N_FIX], out[N_WALK] = white, math.exp(q / total)
     if noise.rate[1] > 8.0:

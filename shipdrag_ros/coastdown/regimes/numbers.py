@@ -54,6 +54,7 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
 LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
+LOG_LAG_MOST = _number('LOG_LAG_MOST', 30.0, 's', 'no filter of a log is longer')
 LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
@@ -103,9 +104,16 @@ MEMORY_S = _number('MEMORY_S', 1200.0, 's', 'over which noise is learnt')
 FROZEN_S = _number('FROZEN_S', 120.0, 's', 'age of the noise that is used')
 BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
+WIDE = _grid('WIDE', (0.05, 3.0), '1', 'share of readings that scatter more, and by what factor')
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
+AMID = _grid(
+    'AMID',
+    (0.05, 0.3, 0.1, 12.0),
+    '1, of the resistance, the same in a minute, 1/h',
+    'a record begins while she gathers way: share, acceleration, its change, the end of it',
+)
 SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 
 # switches, each an hour
@@ -133,7 +141,7 @@ RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.55, 0.22, 0.18, 0.05), '1', 'short b
 RUN_DOWN_FILE_SD = _number('RUN_DOWN_FILE_SD', 0.5, 'ln', 'of what a ship file says of it')
 LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a telegraph')
 LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
-LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')
+LEVELS_SD = _grid('LEVELS_SD', (0.3, 0.12, 0.12, 0.12, 0.12, 0.12), 'ln', 'of each')
 LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
 BRAKES = _grid('BRAKES', (0.4, 1.0, 2.5), 'of the first resistance', 'astern power, tugs')
@@ -148,14 +156,29 @@ STEADY_TURNS = _number('STEADY_TURNS', 0.03, '1', 'share of bins with a yaw like
 SHAFT_TEMPER = _number('SHAFT_TEMPER', 0.35, '1', 'of its log likelihood: errors last a minute')
 SHAFT_SD = _grid('SHAFT_SD', (0.015, 0.04), '1', 'its own error, and that of an expectation')
 SHAFT_FIRST_SD = _number('SHAFT_FIRST_SD', 0.12, '1', 'of what a level should have')
-WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.72), '1', 'over u / U: mean, sd, most; 108 glides')
+WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.85), '1', 'over u / U: mean, sd, most; 108 glides')
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss
-ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.03), '1', 'P(gliding) above, and again below')
+ANNOUNCE = _grid(
+    'ANNOUNCE',
+    (0.7, 0.03, 0.002),
+    '1',
+    'P(gliding) above; below, with that of the glide announced: an end is not taken back',
+)
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
+
+EXPLAINED_SHARE = _grid(
+    'EXPLAINED_SHARE', (0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0), '1', 'of the records learnt on'
+)
+EXPLAINED = _grid(
+    'EXPLAINED',
+    (-1.27, -0.18, -0.12, -0.06, 0.0, 0.05, 0.09, 0.28),
+    'nats a reading',
+    'by which these are explained less well: log density over its expectation',
+)
 
 
 def table() -> str:

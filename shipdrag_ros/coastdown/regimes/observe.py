@@ -16,7 +16,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_place,
     mean_turning,
 )
-from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RATE, SHAFTS
+from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Channel, Float64
 
@@ -37,6 +37,20 @@ def _mean_speed(bins: Bins, source: int, last: int, width: int) -> float:
     low, high = totals[before & mask], totals[last & mask]
     count = high[COUNT] - low[COUNT]
     return (high[SPEED] - low[SPEED]) / (PER_UNIT * count) if count > 0 else np.nan
+
+
+@compiled(inline=True, uncounted=True)
+def _range(bins: Bins, source: int, last: int, width: int) -> float:
+    """Return the range of the speeds of the seconds of a bin and of the one before it."""
+    totals = bins.speeds[source]
+    mask = len(totals) - 1
+    newest = bins.closed[source]
+    low, high = np.inf, -np.inf
+    for second in range(max(last - width, newest - mask + 1), min(last, newest) + 1):
+        if totals[second & mask, COUNT] != totals[(second - 1) & mask, COUNT]:
+            speed = (totals[second & mask, SPEED] - totals[(second - 1) & mask, SPEED]) / PER_UNIT
+            low, high = min(low, speed), max(high, speed)
+    return high - low if high >= low else np.nan
 
 
 @compiled(inline=True, uncounted=True)
@@ -71,6 +85,8 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
         said[k] = np.nan
     said[LOG] = _mean_speed(bins, _LOG, last, width)
     said[GROUND] = _mean_speed(bins, _GROUND, last, width)
+    said[RANGES] = _range(bins, _LOG, last, width)
+    said[RANGES + 1] = _range(bins, _GROUND, last, width)
     for track in _TRACKS:
         if mean_place(bins, track, last, width)[3] == 0:
             continue

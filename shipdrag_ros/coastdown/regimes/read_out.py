@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the histories say of the past: coastdowns with their dates, and why they end."""
+"""What the histories say of the past: the probability of each regime, and the coastdowns."""
 
 from __future__ import annotations
 
@@ -9,21 +9,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.bank import Bank
+from shipdrag_ros.coastdown.regimes.bank import (
+    OUT,
+    P_BRAKED,
+    P_DRIVEN,
+    P_ENGAGED,
+    P_GLIDING,
+    P_RUN_DOWN,
+    P_TURNING,
+    Bank,
+)
 from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     COUNT,
+    DRIVEN,
     GLIDE,
+    GLIDE_KIND,
     GLIDE_TURN,
     HELD,
-    KIND,
     LEVEL,
     SWITCHES,
     TURN,
     WEIGHT,
     BankSetting,
 )
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
+
+_LIKELY = 0.5
+_UNPOWERED = (GLIDE, BRAKE, GLIDE_TURN)
+_ACTED = (BRAKE, GLIDE_TURN)  # something but the water
 
 
 class SmoothedGlide(NamedTuple):
@@ -32,107 +46,167 @@ class SmoothedGlide(NamedTuple):
 
     Attributes
     ----------
-    stop_s, date_s, begin_s, end_s
-        Medians of when the thrust began to fall, of when an abrupt stop would have cost as much
-        speed or a shaft shows the thrust gone, of when it was gone, and of the end [s of the
-        bank].
+    stop_s, start_s, begin_s, end_s
+        Medians of when the thrust began to fall, of the date, of when the thrust was gone, and of
+        the end [s of the bank].
     begin_sd_s
         Standard deviation of `begin_s`.
-    probability
-        The largest in it.
     after
         Regime that follows; -1 where none does.
     """
 
     stop_s: float
-    date_s: float
+    start_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
-    probability: float
     after: int
 
 
-class _Stretches(NamedTuple):
-    """Every glide of every history: stop, date, begin, end, weight, and what follows."""
+class Spans(NamedTuple):
+    """
+    Every regime of every history, (n,) each.
 
-    stop_s: Float64
-    date_s: Float64
+    `date_s` and `gone_s` are of a glide: when an abrupt stop would have cost as much speed, or a
+    shaft shows that the thrust is gone, and when it was gone; `after` the regime that follows, -1
+    where none does; `again` whether she has glided before.
+    """
+
+    what: Int64
     begin_s: Float64
+    date_s: Float64
+    gone_s: Float64
     end_s: Float64
     weight: Float64
-    after: NDArray[np.int64]
+    after: Int64
+    again: NDArray[np.bool_]
+
+    def part(self, chosen: NDArray[np.bool_]) -> Spans:
+        """
+        Return some of them.
+        """
+        return Spans(
+            self.what[chosen],
+            self.begin_s[chosen],
+            self.date_s[chosen],
+            self.gone_s[chosen],
+            self.end_s[chosen],
+            self.weight[chosen],
+            self.after[chosen],
+            self.again[chosen],
+        )
 
 
-def _stretches(bank: Bank, setting: BankSetting) -> _Stretches:
+def spans_of(bank: Bank, setting: BankSetting) -> Spans:
+    """
+    List the regimes that the histories have gone through.
+    """
     all_ = bank.histories
-    count = int(all_.used[0])
+    used = int(all_.used[0])
     now_s = int(all_.clock[0]) * setting.step_s
-    weight = np.exp(all_.number[:count, WEIGHT])
-    switches = all_.whole[:count, COUNT]
-    at, what, ramp = all_.at[:count], all_.what[:count], all_.ramp[:count]
-    rows, columns = np.nonzero((np.arange(SWITCHES) < switches[:, np.newaxis]) & (what == GLIDE))
-    last = columns + 1 >= switches[rows]
-    following = np.minimum(columns + 1, SWITCHES - 1)
-    end = np.where(last, now_s, at[rows, following])
-    stop, lasts = at[rows, columns], ramp[rows, columns]
-    seen = (setting.shafts > 0) & (all_.whole[rows, KIND] < HELD)
+    count = all_.whole[:used, COUNT, np.newaxis]
+    # she is driven from the start on, up to the first switch
+    at = np.concatenate([np.zeros((used, 1)), all_.at[:used]], axis=1)
+    what = np.concatenate([np.full((used, 1), DRIVEN), all_.what[:used]], axis=1)
+    ramp = np.concatenate([np.zeros((used, 1)), all_.ramp[:used]], axis=1)
+    place = np.arange(SWITCHES + 1)
+    last = place == count
+    end = np.where(last, now_s, np.roll(at, -1, axis=1))
+    ramp = np.where(what == GLIDE, ramp, 0.0)
+    gone = np.minimum(at + ramp, end)
+    seen = (setting.shafts > 0) & (all_.whole[:used, GLIDE_KIND, np.newaxis] < HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
-    date = np.minimum(stop + np.where(seen, lasts, lasts / 3.0), end)
-    begin = np.minimum(stop + lasts, end)
-    after = np.where(last, -1, what[rows, following])
-    return _Stretches(stop, date, begin, end, weight[rows], after)
+    date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
+    after = np.where(last, -1, np.roll(what, -1, axis=1))
+    is_glide = what == GLIDE
+    again = np.cumsum(is_glide, axis=1) - is_glide > 0
+    weight = np.broadcast_to(np.exp(all_.number[:used, WEIGHT, np.newaxis]), what.shape)
+    there = (place <= count) & (end > at)
+    return Spans(what, at, date, gone, end, weight, after, again).part(there)
 
 
-def _gliding(found: _Stretches, bins: int, step_s: float) -> Float64:
+def _over_time(
+    weight: Float64, begin_s: Float64, end_s: Float64, bins: int, step_s: float
+) -> Float64:
     edges = np.zeros(bins + 1)
-    first = np.clip(np.rint(found.begin_s / step_s).astype(int), 0, bins)
-    last = np.clip(np.rint(found.end_s / step_s).astype(int), 0, bins)
-    np.add.at(edges, first, found.weight)
-    np.add.at(edges, last, -found.weight)
+    np.add.at(edges, np.clip(np.rint(begin_s / step_s).astype(int), 0, bins), weight)
+    np.add.at(edges, np.clip(np.rint(end_s / step_s).astype(int), 0, bins), -weight)
     return np.cumsum(edges)[:-1]
 
 
-def glides(bank: Bank, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
+def _probability(found: Spans, bins: int, step_s: float) -> Float64:
+    return _over_time(found.weight, found.begin_s, found.end_s, bins, step_s)
+
+
+def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
+    """
+    Return the probability of each regime in each bin since the start, given all that came.
+    """
+    engaged = (found.what == LEVEL) & found.again
+    chosen = {
+        P_DRIVEN: (found.what == DRIVEN) | ((found.what == LEVEL) & ~engaged),
+        P_BRAKED: found.what == BRAKE,
+        P_TURNING: (found.what == TURN) | (found.what == GLIDE_TURN),
+        P_ENGAGED: engaged,
+    }
+    glide = found.part(found.what == GLIDE)
+    of = {
+        number: _probability(found.part(which), bins, step_s) for number, which in chosen.items()
+    }
+    of[P_RUN_DOWN] = _over_time(glide.weight, glide.begin_s, glide.gone_s, bins, step_s)
+    of[P_GLIDING] = _over_time(glide.weight, glide.gone_s, glide.end_s, bins, step_s)
+    return {name: of[number] for number, name in enumerate(OUT)}
+
+
+def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
     """
     Read the coastdowns out of all histories.
 
     Parameters
     ----------
+    found
+        From `spans_of`.
     speed : (bins,)
-        Mean speed in each bin [m/s]: what keeps it, glides no more.
+        Mean speed in each bin [m/s]: a ship that keeps it glides no more.
     """
-    found, step_s = _stretches(bank, setting), setting.step_s
-    likely = _gliding(found, int(bank.histories.clock[0]), step_s)
-    inside = np.concatenate([[False], likely > n.HOLD[0], [False]])
-    edges = np.flatnonzero(inside[1:] != inside[:-1]).reshape(-1, 2)
-    all_of = []
-    for first, last in edges:
+    found, step_s = found.part(found.what == GLIDE), setting.step_s
+    likely = _over_time(found.weight, found.gone_s, found.end_s, len(speed), step_s)
+    all_of: list[SmoothedGlide] = []
+    for first, last in _stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())
-        if peak < n.HOLD[1]:
+        # a glide that was not over at a doubt goes on after it
+        if peak < n.HOLD[1] or (all_of and first * step_s < all_of[-1].end_s):
             continue
-        shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
+        shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.gone_s, first * step_s)
         one = shared > 0.5 * (last - first) * step_s
         if not one.any():
             continue
-        glide = _one(_Stretches(*(each[one] for each in found)), peak)
-        end_s = min(glide.end_s, _even_s(speed, glide, step_s))
-        if end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
-            all_of.append(glide._replace(end_s=end_s))
+        glide = _one(found.part(one))
+        even_s = _even_s(speed, glide, step_s)
+        if even_s < glide.end_s:
+            glide = glide._replace(end_s=even_s, after=LEVEL)
+        if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
+            all_of.append(glide)
     return all_of
 
 
-def _one(found: _Stretches, peak: float) -> SmoothedGlide:
+def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    padded = np.concatenate([[False], inside, [False]])
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
+
+
+def _one(found: Spans) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
-    stop, date, begin, end = (
-        _median(each, share) for each in (found.stop_s, found.date_s, found.begin_s, found.end_s)
+    stop, start, begin, end = (
+        _median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
-    mean = float(share @ found.begin_s)
-    sd = float(np.sqrt(max(share @ found.begin_s**2 - mean**2, 0.0)))
+    mean = float(share @ found.gone_s)
+    sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
     codes = np.arange(-1, GLIDE_TURN + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
-    return SmoothedGlide(min(stop, date), date, max(date, begin), end, sd, peak, after)
+    return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
 
 
 def _median(value: Float64, share: Float64) -> float:
@@ -154,13 +228,32 @@ def _even_s(speed: Float64, glide: SmoothedGlide, step_s: float) -> float:
     return float('inf')
 
 
-def other_regime(bank: Bank) -> int:
+def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float]]:
     """
-    Return the likeliest regime now that is no glide: the reason of a dismissal.
+    Return the stretches [s] without thrust in which something but the water acted.
     """
-    all_ = bank.histories
-    count = int(all_.used[0])
-    weight = np.exp(all_.number[:count, WEIGHT])
-    regime = all_.whole[:count, 0]
-    sums = [weight[regime == code].sum() for code in (LEVEL, BRAKE, TURN, GLIDE_TURN)]
-    return (LEVEL, BRAKE, TURN, GLIDE_TURN)[int(np.argmax(sums))]
+    likely, acted = (
+        _probability(found.part(np.isin(found.what, codes)), bins, step_s)
+        for codes in (_UNPOWERED, _ACTED)
+    )
+    return [
+        (first * step_s, last * step_s)
+        for first, last in _stretches(likely > _LIKELY)
+        if acted[first:last].max() > _LIKELY
+    ]
+
+
+def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | None:
+    """
+    Return the regime, no glide, in which she lost most of her speed from a bin to the slowest.
+
+    None where she lost none.
+    """
+    last = first + int(np.argmin(speed[first:])) + 1
+    lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
+    codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
+    losses = [
+        float(_probability(found.part(found.what == code), len(speed), step_s)[first:last] @ lost)
+        for code in codes
+    ]
+    return codes[int(np.argmax(losses))] if max(losses) > 0.0 else None

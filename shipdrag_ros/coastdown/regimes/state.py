@@ -17,12 +17,13 @@ SWITCHES = 12  # that a history remembers
 
 # the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
 # of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], and ln of
-# the log's own lag over that
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER = range(10)
-STATES = 10
+# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], ln of
+# the log's own lag over that, and slow error of the speed over ground [m/s]
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(11)
+STATES = 11
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
+AMID = 6  # the record begins amid a manoeuvre under power
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
@@ -31,11 +32,14 @@ DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
 STAYS, STAYS_WAY = 12, 13
 MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
-COLUMNS = 16
+GUST_A = 16  # resistance under even power, of which gusts are parts [m/s^2]
+EXCESS = 17  # log density of the bin's readings of motion, over its expectation
+BEHIND = 18  # log weight less that of the best, before births
+COLUMNS = 19
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
-# number of switches, whether she has glided
-REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
-WHOLE = 5
+# number of switches, whether she has glided, how the screw was dragged then
+REGIME, KIND, LIAR, COUNT, GLIDED, GLIDE_KIND = range(6)
+WHOLE = 6
 NOBODY, THE_LOG, THE_TRACK = range(3)
 WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 
@@ -43,12 +47,13 @@ WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
 GONE = 10  # when revs over speed fell through those without thrust [s since the start]
-SAID = 11
+RANGES = 11  # and that after it: range of the seconds of log and of speed over ground
+SAID = 13
 
-# noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
-# speed over ground and fixes, their walk, sd of the rate of turn
-N_GUST, N_WANDER, N_WANDER_S, N_LOG, N_GROUND, N_FIX, N_WALK, N_RATE = range(8)
-NOISES = 8
+# noise in use: gust over resistance, sd and time of the slow error of log and speed over ground,
+# white noise of log, speed over ground and fixes, their walk, sd of the rate of turn
+N_GUST, N_WANDER, N_WANDER_S, N_EDDY, N_EDDY_S, N_LOG, N_GROUND, N_FIX, N_WALK, N_RATE = range(10)
+NOISES = 10
 
 
 class Histories(NamedTuple):
@@ -65,7 +70,6 @@ class Histories(NamedTuple):
         Columns as above.
     at, what, ramp : (ROOM, SWITCHES)
         When each switch was [s since the start], the regime entered and its ramp [s].
-    scratch : (ROOM,)
     """
 
     used: Int64
@@ -77,7 +81,6 @@ class Histories(NamedTuple):
     at: Float64
     what: Int64
     ramp: Float64
-    scratch: Float64
 
     @classmethod
     def fresh(cls) -> Histories:
@@ -94,7 +97,6 @@ class Histories(NamedTuple):
             np.zeros((ROOM, SWITCHES)),
             np.zeros((ROOM, SWITCHES), np.int64),
             np.zeros((ROOM, SWITCHES)),
-            np.zeros(ROOM),
         )
 
 
@@ -110,8 +112,6 @@ class BankSetting(NamedTuple):
         Length of a bin [s], and over that of the table.
     shafts
         How many are read.
-    glides
-        Probability that the record begins in a glide.
     told_s
         When a person says that the engine was stopped [s since the start]; NaN where nobody does.
     """
@@ -120,14 +120,11 @@ class BankSetting(NamedTuple):
     step_s: float
     pace: float
     shafts: int
-    glides: float
     told_s: float
 
     @classmethod
-    def of(
-        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0
-    ) -> BankSetting:
+    def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan)

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, newest_bin
-from shipdrag_ros.coastdown.events import Dismissal, EndedBy
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import (
+    FIT,
     OUT,
     P_EVEN,
     P_GLIDING,
@@ -21,17 +23,43 @@ from shipdrag_ros.coastdown.regimes.bank import (
 )
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.observe import observe
-from shipdrag_ros.coastdown.regimes.read_out import SmoothedGlide, glides, other_regime
-from shipdrag_ros.coastdown.regimes.state import BRAKE, GLIDE_TURN, LEVEL, LOW, TURN, BankSetting
-from shipdrag_ros.samples import SHAFTS, Float64
+from shipdrag_ros.coastdown.regimes.read_out import (
+    SmoothedGlide,
+    Spans,
+    glides,
+    slowed_by,
+    smoothed,
+    spans_of,
+    unpowered,
+)
+from shipdrag_ros.coastdown.regimes.state import (
+    ADVANCE,
+    BRAKE,
+    COUNT,
+    GLIDE,
+    GLIDE_TURN,
+    GROUND,
+    LEVEL,
+    LOG,
+    LOW,
+    TURN,
+    WEIGHT,
+    BankSetting,
+)
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
-_LEAD_S = 900  # of record before what woke it
+LEAD_S = 900  # of record before what woke it
 _LATE = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
+_FULL_S = 6 * 3600.0  # of record that it remembers
+_ASKED_EVERY = 60  # bins
 _EVEN = 0.95
+_DOUBTED = 0.5
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
-_RAN_DOWN_S = 40.0  # a run-down that no shaft shows and that is no part of the glide
+_RAN_DOWN_S = 40.0  # a run-down that is worth a word
+_ASTERN = -0.05  # of the steady revs times pitch
+_ASTERN_S = 30.0  # about the end of a glide
 
 _ENDED = {
     LEVEL: EndedBy.ENGINE,
@@ -49,15 +77,49 @@ _WHY = {
 
 class Dated(NamedTuple):
     """
-    A glide in seconds since the epoch; `slow_s` is how long its thrust ran down before it.
+    A glide in seconds since the epoch.
+
+    Attributes
+    ----------
+    stop_s, start_s, begin_s, end_s
+        When the thrust began to fall, the date, when it was gone, and the end. The date is where
+        a shaft shows the thrust gone, or an abrupt stop would have cost as much speed.
+    begin_sd_s
+        Standard deviation of `begin_s`.
+    ran_down
+        Whether the thrust ran down for so long, and no shaft shows how, that it is no part of
+        the glide.
+    ended_by
+        What followed; None where she glides on.
     """
 
+    stop_s: float
+    start_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
-    slow_s: float
-    probability: float
-    after: int
+    ran_down: bool
+    ended_by: EndedBy | None
+
+    def since(self, begin_s: float) -> Dated:
+        """
+        Return the part of it after its begin.
+        """
+        return self._replace(
+            stop_s=begin_s, start_s=begin_s, begin_s=begin_s, begin_sd_s=0.0, ran_down=False
+        )
+
+    @property
+    def cuts(self) -> tuple[NotCoastdown, ...]:
+        """The run-down before it, if it was a long one."""
+        if not self.ran_down:
+            return ()
+        text = (
+            f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the end '
+            f'of that, ± {self.begin_sd_s:.0f} s'
+        )
+        first_ns, last_ns = round(self.stop_s * SECOND_NS), round(self.begin_s * SECOND_NS)
+        return (NotCoastdown(first_ns, last_ns, Dismissal.THRUST, text),)
 
 
 class RegimeFilter:
@@ -66,25 +128,38 @@ class RegimeFilter:
 
     Parameters
     ----------
-    bins
-        Of the monitor.
-    ship, width
-        Its length and volume; seconds in a bin of the bank.
-    number
-        The second that woke it; the record before it is taken too.
+    ship
+        Its length and volume.
+    width
+        Seconds in a bin of the bank.
+    first
+        Second from which on the record is taken.
+    shafts
+        How many are read.
     """
 
-    def __init__(self, bins: Bins, ship: Ship, width: int, number: int) -> None:
-        shafts = sum(newest_bin(bins, int(each)) > number - _LEAD_S for each in SHAFTS)
+    def __init__(self, ship: Ship, width: int, first: int, *, shafts: int = 0) -> None:
         self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
         self._bank = Bank.fresh()
         self._width = width
-        self._next = (number - _LEAD_S) // width + 1
+        self._next = first // width + 1
         self._first = self._next
-        self._woken = number
+        self._woken = first
         self._out: list[Float64] = []
+        self._low: list[float] = []
+        self._read = 0  # readings of motion
         self._even_s = 0.0
-        self._astern = False
+
+    @classmethod
+    def woken(cls, bins: Bins, ship: Ship, width: int, number: int) -> RegimeFilter:
+        """
+        Return one that was woken in second `number`; the record before it is taken too.
+        """
+        first = number - LEAD_S
+        shafts = sum(newest_bin(bins, int(each)) > first for each in SHAFTS)
+        made = cls(ship, width, first, shafts=shafts)
+        made._woken = number
+        return made
 
     @staticmethod
     def width(slope_window_s: float) -> int:
@@ -103,21 +178,43 @@ class RegimeFilter:
         observe(bins, last, self._width, self._setting.step_s, self._bank.said)
         step(self._bank, self._setting)
         self._next += 1
-        if self._bank.histories.clock[0] == 0:
-            self._first = self._next
+        if not self._bank.histories.used[0]:  # nothing was said yet, or no history bears it
+            told_s, self._first = self.told_s, self._next
+            self.tell(told_s)
+            if self._bank.histories.clock[0] > 0:
+                self._bank, self._out, self._low = Bank.fresh(), [], []
             return True
         self._out.append(self._bank.out.copy())
+        self._low.append(float(self._bank.said[LOW]))
+        self._read += int(np.count_nonzero(~np.isnan(self._bank.said[[LOG, GROUND, ADVANCE]])))
         even = self._bank.out[P_EVEN] > _EVEN
         self._even_s = self._even_s + self._width if even else 0.0
-        low = self._bank.said[LOW]
-        self._astern = not math.isnan(low) and low < -0.05
         return True
 
     def tell(self, stop_s: float) -> None:
         """
         Take it from a person that the engine was stopped [s since the epoch].
         """
-        self._setting = self._setting._replace(told_s=stop_s - self._first * self._width)
+        self._setting = self._setting._replace(told_s=stop_s - self._zero_s)
+
+    @property
+    def told_s(self) -> float:
+        """The stop that a person told [s since the epoch]; NaN where nobody did."""
+        return self._setting.told_s + self._zero_s
+
+    @property
+    def caught_up(self) -> bool:
+        """Whether the record before it was woken has been taken."""
+        return self._next * self._width > self._woken
+
+    @property
+    def _zero_s(self) -> int:
+        return self._first * self._width
+
+    @property
+    def probability(self) -> dict[str, float]:
+        """The probability of each regime now."""
+        return {name: float(self._bank.out[k]) for k, name in enumerate(OUT)}
 
     @property
     def gliding(self) -> float:
@@ -125,10 +222,26 @@ class RegimeFilter:
         out = self._bank.out
         return float(out[P_RUN_DOWN] + out[P_GLIDING])
 
+    def gliding_since(self, second: float) -> float:
+        """
+        Return the probability of a glide that began before a second [s since the epoch].
+        """
+        all_ = self._bank.histories
+        used = int(all_.used[0])
+        each, last = np.arange(used), all_.whole[:used, COUNT] - 1
+        glides = (last >= 0) & (all_.what[each, last] == GLIDE)
+        before = self._zero_s + all_.at[each, last] <= second
+        return float(np.exp(all_.number[:used, WEIGHT])[glides & before].sum())
+
     @property
     def slow(self) -> float:
         """Mean speed now [m/s]; infinite before the first."""
         return float(self._bank.out[SPEED]) if self._out else math.inf
+
+    @property
+    def even(self) -> bool:
+        """Whether she is likelier under even power than not."""
+        return not self._out or float(self._bank.out[P_EVEN]) >= _DOUBTED
 
     @property
     def asleep(self) -> bool:
@@ -137,54 +250,102 @@ class RegimeFilter:
         return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
 
     @property
-    def doubted(self) -> bool:
-        """Whether even power was ever unlikely since it woke."""
-        return any(float(out[P_EVEN]) < 0.5 for out in self._out)
+    def full(self) -> bool:
+        """Whether it remembers so much that it should begin anew."""
+        return len(self._out) * self._width > _FULL_S
+
+    @property
+    def due(self) -> bool:
+        """Whether it should be asked for glides that were over before anybody noticed."""
+        return len(self._out) % _ASKED_EVERY == 0
 
     def glides(self) -> list[Dated]:
         """
         Return the coastdowns so far, in order.
         """
-        if not self._out:
-            return []
-        speed = np.array([out[SPEED] for out in self._out])
-        return [self._dated(each) for each in glides(self._bank, self._setting, speed)]
+        return [self._dated(each) for each in glides(self._spans, self._setting, self._speed)]
+
+    @property
+    def _spans(self) -> Spans:
+        return spans_of(self._bank, self._setting)
+
+    @property
+    def _speed(self) -> Float64:
+        return np.array([out[SPEED] for out in self._out])
 
     def _dated(self, glide: SmoothedGlide) -> Dated:
-        zero = self._first * self._width
-        slow_s = glide.begin_s - glide.stop_s
-        slow = not self._setting.shafts and slow_s > _RAN_DOWN_S * self._setting.pace
+        zero, pace = self._zero_s, self._setting.pace
+        slow = not self._setting.shafts and glide.begin_s - glide.stop_s > _RAN_DOWN_S * pace
         return Dated(
-            zero + (glide.begin_s if slow else glide.date_s),
+            zero + glide.stop_s,
+            zero + (glide.begin_s if slow else glide.start_s),
+            zero + glide.begin_s,
             zero + glide.end_s,
             glide.begin_sd_s,
-            slow_s if slow else 0.0,
-            glide.probability,
-            glide.after,
+            slow,
+            self._ended_by(glide),
         )
 
-    def ended_by(self, after: int) -> EndedBy:
-        """
-        Return why a glide ended, by the regime after it, or else by that of now.
-        """
-        if self._astern:
+    def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
+        if glide.after < 0:
+            return None
+        around = _ASTERN_S * self._setting.pace
+        first, last = (
+            max(round((glide.end_s + off) / self._width), 0) for off in (-around, around)
+        )
+        if any(low < _ASTERN for low in self._low[first : last + 1]):
             return EndedBy.ASTERN
-        return _ENDED[after if after in _ENDED else other_regime(self._bank)]
+        return _ENDED.get(glide.after)
 
-    def dismissal(self) -> tuple[Dismissal, str]:
+    def dismissal(self, since_s: float) -> NotCoastdown | None:
         """
-        Return why what is going on is no coastdown, with a text.
-        """
-        if self._astern:
-            return Dismissal.ASTERN, 'a propeller was reversed'
-        reason, text = _WHY[other_regime(self._bank)]
-        most = max(float(out[P_RUN_DOWN] + out[P_GLIDING]) for out in self._out)
-        return reason, f'{text}: P(gliding) was never above {most:.2f}'
+        Say what it was that was no coastdown.
 
-    def probabilities(self) -> tuple[Float64, dict[str, Float64]]:
+        None where even power was never unlikely, or nothing slowed her.
+
+        Parameters
+        ----------
+        since_s
+            From when on it was not said yet [s since the epoch].
         """
-        Return times since the epoch [s] and the probability of each regime at each.
+        if not self._out:
+            return None
+        since = math.ceil(max((since_s - self._zero_s) / self._width, 0.0))
+        table = np.array(self._out)
+        doubted = since + np.flatnonzero(table[since:, P_EVEN] < _DOUBTED)
+        if not len(doubted) or table[doubted, SPEED].argmin() == 0:
+            return None
+        first, last = int(doubted[0]), int(doubted[-1]) + 1
+        regime = slowed_by(self._spans, table[:, SPEED], first, self._width)
+        if regime is None:
+            return None
+        reason, text = _WHY[regime]
+        if any(low < _ASTERN for low in self._low[first:last]):
+            reason, text = Dismissal.ASTERN, 'a propeller was reversed'
+        most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
+        start_ns, end_ns = (
+            round((self._zero_s + k * self._width) * SECOND_NS) for k in (first, last)
+        )
+        said = f'{text}: P(gliding) was {most:.2f} at most'
+        return NotCoastdown(start_ns, end_ns, reason, said)
+
+    def whole_glides(self) -> list[tuple[float, float]]:
         """
-        table = np.array(self._out).reshape(len(self._out), -1)
-        time_s = np.asarray((self._first + 1.0 + np.arange(len(table))) * self._width, np.float64)
-        return time_s, {name: table[:, k] for k, name in enumerate(OUT)} if len(table) else {}
+        Return the stretches without thrust in which something but the water acted [s].
+        """
+        zero = self._zero_s
+        found = unpowered(self._spans, len(self._out), self._setting.step_s)
+        return [(zero + first_s, zero + last_s) for first_s, last_s in found]
+
+    def regimes(self) -> Regimes | None:
+        """
+        Return the probability of each regime over time, given all that came.
+        """
+        if not self._out:
+            return None
+        middle_s = self._zero_s + (np.arange(len(self._out)) + 0.5) * self._width
+        probability = smoothed(self._spans, len(self._out), self._setting.step_s)
+        time_ns = np.round(middle_s * SECOND_NS).astype(np.int64)
+        excess = sum(float(out[FIT]) for out in self._out) / max(self._read, 1)
+        explained = float(np.interp(excess, n.EXPLAINED, n.EXPLAINED_SHARE))
+        return Regimes(time_ns, self._speed, probability, excess, explained)

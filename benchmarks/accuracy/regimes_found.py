@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Coastdowns found and manoeuvres left alone, in one table; no r(v) is estimated.
+
+Cases are those of `propulsion_found --quick` and, of another author, a ship that the sea makes
+wander (`vouching`). Half an hour of one core for six seeds.
+
+    python -m benchmarks.accuracy.regimes_found [--seeds 61 63 65]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections import defaultdict
+
+import numpy as np
+
+os.environ['SPANS'] = '1'
+
+from benchmarks._tables import table
+from benchmarks.accuracy.propulsion_found import others, stops
+from benchmarks.accuracy.vouching import LEAD_S, START_NS, faulty, ship_of
+from benchmarks.worlds.propulsion.score import SUITES, Row, score
+from benchmarks.worlds.propulsion.tables import MIDDLE_S
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import SECOND_NS, Channel
+
+LOG, GROUND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
+HEARD = {'log': [LOG], 'speed over ground': [GROUND], 'both': [LOG, GROUND]}
+
+
+def of(some: list[Row], within_s: float) -> str:
+    """Return how many are dated as near, of those that are found."""
+    found = [row for row in some if row.found]
+    return f'{sum(abs(row.dated_s) < within_s for row in found)} of {len(found)}'
+
+
+def column(coasts: list[Row], none: list[Row]) -> list[str]:
+    """Return the figures of one suite of inputs."""
+    middle = [row for row in coasts if row.glide_s >= MIDDLE_S]
+    late = [row.delay_s for row in coasts if row.found]
+    announced = np.nanquantile(late, [0.5, 0.9]) if late else [np.nan, np.nan]
+    return [
+        f'{sum(row.found for row in coasts)} of {len(coasts)}',
+        f'{sum(row.found for row in middle)} of {len(middle)}',
+        f'{sum(row.found and row.long for row in coasts)} of {sum(row.long for row in coasts)}',
+        of(coasts, 5.0),
+        of(coasts, 20.0),
+        f'{announced[0]:.0f}, {announced[1]:.0f}',
+        f'{sum(row.wrong > 0 for row in none)} + '
+        f'{sum(row.idle > 0 and not row.wrong for row in none)} of {len(none)}',
+        f'{sum(row.wrong_live > 0 for row in none)} of {len(none)}',
+    ]
+
+
+NAMES = (
+    'found', 'from 3 min', 'long ones', 'dated within 5 s', 'within 20 s',
+    'announced after, median and 90 % [s]', 'no coastdowns left as one, + an idling screw',
+    'announced that were none',
+)  # fmt: skip
+
+
+def wandering(heard: list[Channel], seeds: int = 10) -> str:
+    """Return how many glides of a ship that the sea makes wander are found in one piece."""
+    whole = 0
+    for seed in range(seeds):
+        block = faulty('none', GROUND, seed=seed)
+        monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
+        events = [*monitor.update(block[np.isin(block.channel, heard)]), *monitor.finish()]
+        ended = [event for event in events if hasattr(event, 'stands') and event.stands]
+        spans = [((e.start_ns - START_NS) / SECOND_NS, e.end_ns - e.start_ns) for e in ended]
+        whole += len(spans) == 1 and abs(spans[0][0] - LEAD_S) < 20.0 and spans[0][1] > 4e11
+    return f'{whole} of {seeds}'
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--seeds', type=int, nargs='+', default=[61, 63, 65])
+    seeds = parser.parse_args().seeds
+    coasts: dict[str, list[Row]] = defaultdict(list)
+    none: dict[str, list[Row]] = defaultdict(list)
+    for seed in seeds:
+        for made, rows in ((stops, coasts), (others, none)):
+            for case in made(range(seed, seed + 1), True):
+                for row in score(case, SUITES):
+                    rows[row.suite].append(row)
+    columns = [column(coasts[suite], none[suite]) for suite in SUITES]
+    print(*table((f'seeds {seeds}', *SUITES), zip(NAMES, *columns, strict=True)), sep='\n')
+    print()
+    print(
+        *table(
+            ('a ship that wanders, in one piece', *HEARD), [('', *map(wandering, HEARD.values()))]
+        ),
+        sep='\n',
+    )
+
+
+if __name__ == '__main__':
+    main()
