@@ -28,6 +28,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GONE,
     GROUND,
     HIGH,
+    LAG,
     LEVEL,
     LIAR,
     LN_A,
@@ -155,6 +156,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             x[WAY] = 0.5 * setting.step_s * speed
             p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
+            p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
@@ -165,10 +167,10 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             if regime == AMID:
                 amid(all_, j, setting, 0)
             if claimed:
-                levels(all_, j, setting, 0.0, float(len(n.ENGINE)))
+                levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:
                     odds = n.TOLD[0] / (1.0 - n.TOLD[0])
-                    glides(all_, j, setting, 0.0, len(n.ENGINE) * odds)
+                    glides(all_, j, setting, -setting.step_s, len(n.ENGINE) * odds)
 
 
 @compiled(uncounted=True)

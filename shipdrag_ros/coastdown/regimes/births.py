@@ -24,6 +24,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDE_KIND,
     GLIDE_TURN,
     GLIDED,
+    GUST,
     GUST_A,
     HELD,
     KEPT,
@@ -147,6 +148,8 @@ def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
     free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+    if setting.engine > 0.0:  # what an engine gave is over
+        free(bank, j, GUST, 0.0, 0.0)
 
 
 @compiled(uncounted=True)
@@ -162,7 +165,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     learnt = bank.whole[i, REGIME] == LEVEL
     last = bank.whole[i, COUNT] - 1
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
-    already, any_ = idles or now_s == 0.0, bank.whole[i, REGIME] == AMID
+    already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
     for each in range(downs * (len(n.ODD) if any_ else 1)):
         k, odd = each % downs, each // downs
@@ -239,6 +242,7 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     x, f = bank.mean[j], bank.number[j]
     if setting.engine > 0.0:
         f[FIRST_A] = n.ENGINE[kind] * setting.engine
+        free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
     else:
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
         f[FIRST_A] = math.exp(law)

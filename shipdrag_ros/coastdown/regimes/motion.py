@@ -255,6 +255,8 @@ def predict(
         if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
+        if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
+            gusts = f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -588,8 +590,8 @@ def weigh(
         if claimed and value < 0.0:  # astern: an engine, or a ship at rest
             value = -value
             if regime != AMID:
-                rest = math.exp(-0.5 * (value / math.exp(setting.hull.first)) ** 2)
-                gained += math.log(n.BAD + (1.0 - n.BAD) * rest)
+                drifts = math.exp(-0.5 * (value / math.exp(setting.hull.first)) ** 2)
+                gained += math.log(n.BAD + (1.0 - n.BAD) * drifts)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
             h[WANDER], h[LAG] = 1.0, longer
@@ -599,6 +601,9 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
+        if claimed:  # a ship at rest is never quite so
+            rest = math.exp(setting.hull.first - 1.0)
+            sd = math.hypot(sd, rest * (rest / u) ** 4)
         shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
         gained += shown
         f[EXCESS] += excess
