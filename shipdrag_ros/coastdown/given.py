@@ -209,9 +209,8 @@ class _Judge:
 
     def _to_rest(self, end: int) -> int:
         """Return the last bin, where she is all but at rest from there on: that tells nothing."""
-        rest = np.abs(self._binned.speed[end:]) < self._slow
-        stops = self._reading.probability[:, end:].argmax(axis=0) == BRAKES
-        return len(self._binned.said) if np.all(rest & ~stops) else end
+        rest = np.abs(self._binned.speed[end - 1 :]) < self._slow
+        return len(self._binned.said) if np.all(rest) else end
 
     def _swing(self, span: _SPAN) -> float:
         """Return the angle over which the heading swings in some bins [rad]."""

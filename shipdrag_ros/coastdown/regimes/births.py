@@ -351,9 +351,8 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
     hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
     told = 0.0  # hazard of a stop that a person tells
     if not np.isnan(setting.told_s):
-        sd = n.TOLD[1] * (setting.pace if claimed else 1.0)
-        off = (now_s - setting.told_s) / sd
-        told = n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * sd)
+        off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
+        told = n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
     parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
