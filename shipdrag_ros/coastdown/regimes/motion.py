@@ -256,7 +256,7 @@ def predict(
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
         if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
-            gusts = f[FIRST_A] ** 2
+            gusts = (n.ENGINE[bank.whole[i, KIND]] * setting.engine) ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
