@@ -244,8 +244,8 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     """
     x, f = bank.mean[j], bank.number[j]
     if setting.engine > 0.0:
-        f[FIRST_A] = 0.0
-        free(bank, j, GUST, 0.0, (n.ENGINE[kind] * setting.engine) ** 2)
+        f[FIRST_A] = n.ENGINE[kind] * setting.engine
+        free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
     else:
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
         f[FIRST_A] = math.exp(law)

@@ -256,7 +256,7 @@ def predict(
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
         if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
-            gusts = (n.ENGINE[bank.whole[i, KIND]] * setting.engine) ** 2
+            gusts = f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -459,7 +459,7 @@ def _shaft(
         f[REVS] = nu
         if np.isnan(before) or (stands and before >= n.CREEPS):
             return math.log(n.BAD if stands else 1.0)
-        return math.log(0.97 * _off(nu, before) + 0.03)
+        return math.log(0.99 * _off(nu, before) + 0.01)
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0
     elif regime in (DRIVEN, LEVEL, TURN):
@@ -587,11 +587,8 @@ def weigh(
         h[LN_U] = u
         expected = u + f[MEAN_U]
         sd, value = noise[N_LOG], said[which]
-        if claimed and value < 0.0:  # astern: an engine, or a ship at rest
-            value = -value
-            if regime != AMID:
-                drifts = math.exp(-0.5 * (value / math.exp(setting.hull.first)) ** 2)
-                gained += math.log(n.BAD + (1.0 - n.BAD) * drifts)
+        if claimed and regime == AMID:  # an engine may drive her astern
+            value = abs(value)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
             h[WANDER], h[LAG] = 1.0, longer
