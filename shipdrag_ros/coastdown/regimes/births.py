@@ -34,6 +34,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LIAR,
     LN_A,
     LN_U,
+    LONGER,
     NOBODY,
     OPEN,
     P0,
@@ -246,6 +247,7 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     if setting.engine > 0.0:
         f[FIRST_A] = n.ENGINE[kind] * setting.engine
         free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
+        free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
     else:
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
         f[FIRST_A] = math.exp(law)
