@@ -268,14 +268,14 @@ class _Judge:
         speed = self._binned.speed[first:last]
         if 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
             return Dismissal.SLOW, f'she is all but at rest, at {np.nanmax(speed):.2g} m/s'
+        if np.nansum(speed) < 0.0:
+            fastest = -float(np.nanmin(speed))
+            return Dismissal.ASTERN, f'the ship goes astern, at up to {fastest:.2g} m/s'
         if regime == GLIDES and kept is None:
             return Dismissal.PLATEAU, 'nothing of it slows her for long enough'
         if regime == ENGINES:
             turning = self._binned.said[first:last, SHAFTS : SHAFTS + 4]
             revs = np.nan_to_num(turning / np.maximum(self._most_revs, 1e-9))
-            if np.nansum(speed) < 0.0:
-                fastest = -float(np.nanmin(speed))
-                return Dismissal.ASTERN, f'the ship goes astern, at up to {fastest:.2g} m/s'
             if self._reversed(turning):
                 return Dismissal.ASTERN, 'the propeller is reversed'
             if np.abs(revs).max(initial=0.0) > n.CREEPS:
