@@ -171,12 +171,14 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
     already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
-    for each in range(downs * (len(n.ODD) if any_ else 1)):
+    odds = len(n.ODD) if any_ and bank.whole[i, GLIDED] == 0 else 1  # later she is known
+    for each in range(downs * odds):
         k, odd = each % downs, each // downs
         ramp_s = _NO_RAMP_S if already else n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
             part = chance * (1.0 if already else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
-            j = _born(bank, i, now_s, part * n.ODD_SHARE[odd] if any_ else part, GLIDE, ramp_s)
+            share = part * n.ODD_SHARE[odd] if odds > 1 else part
+            j = _born(bank, i, now_s, share, GLIDE, ramp_s)
             if j < 0:
                 continue
             if idles:  # it is the same glide

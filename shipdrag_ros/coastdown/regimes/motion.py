@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GLIDED,
     GONE,
     GROUND,
     GUST,
@@ -626,7 +627,7 @@ def weigh(
         gained += _by_shafts(bank, i, setting, said, log_first)
     # a covariance that rounding broke weighs nothing
     f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
-    if regime in (DRIVEN, TURN, AMID):
+    if regime in (DRIVEN, TURN) or (regime == AMID and bank.whole[i, GLIDED] == 0):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])
