@@ -9,7 +9,9 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
+    FIRST_TRACK,
     PER_UNIT,
+    SOURCES,
     SPEED,
     Bins,
     displacement,
@@ -18,7 +20,7 @@ from shipdrag_ros.coastdown.bins import (
 )
 from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Channel, Float64
+from shipdrag_ros.samples import KIND, Channel, Float64
 
 _LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
 _TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
@@ -54,6 +56,19 @@ def _range(bins: Bins, source: int, last: int, width: int) -> float:
 
 
 @compiled(inline=True, uncounted=True)
+def _speaking(bins: Bins, kind: int, last: int, width: int) -> int:
+    """Return the first instrument of a kind that says something in a bin, or the first."""
+    for source in SOURCES:
+        if KIND[source] == kind and (
+            not np.isnan(_mean_speed(bins, source, last, width))
+            if kind < FIRST_TRACK
+            else mean_place(bins, source, last, width)[3] > 0
+        ):
+            return int(source)
+    return kind
+
+
+@compiled(inline=True, uncounted=True)
 def _apart(one: float, other: float) -> float:
     return math.atan2(math.sin(one - other), math.cos(one - other))
 
@@ -83,11 +98,13 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
     """
     for k in range(len(said)):
         said[k] = np.nan
-    said[LOG] = _mean_speed(bins, _LOG, last, width)
-    said[GROUND] = _mean_speed(bins, _GROUND, last, width)
-    said[RANGES] = _range(bins, _LOG, last, width)
-    said[RANGES + 1] = _range(bins, _GROUND, last, width)
-    for track in _TRACKS:
+    log, ground = _speaking(bins, _LOG, last, width), _speaking(bins, _GROUND, last, width)
+    said[LOG] = _mean_speed(bins, log, last, width)
+    said[GROUND] = _mean_speed(bins, ground, last, width)
+    said[RANGES] = _range(bins, log, last, width)
+    said[RANGES + 1] = _range(bins, ground, last, width)
+    for kind in _TRACKS:
+        track = _speaking(bins, kind, last, width)
         if mean_place(bins, track, last, width)[3] == 0:
             continue
         time, east, north = displacement(bins, track, last, width)
