@@ -367,20 +367,25 @@ class Monitor:
             glides = regimes.gliding > again or same > over
             if glides and not slow and not regimes.full:
                 return []
-            events = self._end_glide(regimes, number, EndedBy.SPEED if slow else None)
+            why = EndedBy.SPEED if slow else EndedBy.RESET if regimes.full else None
+            events = self._end_glide(regimes, number, why)
             return events + (self._rest(regimes, number) if slow else [])
         if slow and not regimes.caught_up:  # long ago: she has sailed since
             return []
         if slow or regimes.asleep:
             return self._rest(regimes, number)
-        if regimes.gliding < announce:
-            unlikely = regimes.gliding < float(numbers.HOLD[0])
-            return self._anew(regimes, number) if regimes.full and unlikely else []
-        dated = self._unreported(regimes)
-        if not dated:
+        if regimes.full:
+            return self._anew(regimes, number)
+        glides = regimes.gliding > announce
+        if not glides and not regimes.due:
             return []
-        events = [event for each in dated[:-1] for event in self._all_of(each, regimes, number)]
-        return [*events, self._begin(dated[-1], number)]
+        events = []
+        for each in self._unreported(regimes):
+            if glides and each.ended_by is None:
+                return [*events, self._begin(each, number)]
+            if glides or each.end_s < number - LEAD_S:
+                events += self._all_of(each, regimes, number)
+        return events
 
     def _all_of(
         self,
@@ -394,7 +399,14 @@ class Monitor:
         return [self._begin(dated, number), *self._end(dated, regimes, otherwise, last_ns)]
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
-        return [each for each in regimes.glides() if each.begin_s >= self._reported_s]
+        """Return the glides that were not told; of one that was said to have ended, the rest."""
+        since_s = self._reported_s
+        after = [each for each in regimes.glides() if each.end_s >= since_s + numbers.SHORTEST_S]
+        return [
+            each if each.begin_s >= since_s else each.since(since_s)
+            for each in after
+            if each.begin_s >= since_s or each.ended_by is None
+        ]
 
     def _begin(self, dated: Dated, number: int) -> Onset:
         start = max(int(dated.start_s), 1)

@@ -336,9 +336,10 @@ class Vouching:
                 return replace(event, text=told(event.text))
             if isinstance(event, NoEstimate):
                 return replace(event, reason=told(event.reason))
-            if isinstance(event, EndedCoastdown) and event.failure:
+            if isinstance(event, EndedCoastdown):
                 cuts = tuple(replace(cut, text=told(cut.text)) for cut in event.cuts)
-                return replace(event, failure=told(event.failure), cuts=cuts)
+                failure = event.failure and told(event.failure)
+                return replace(event, failure=failure, cuts=cuts)
             return event
 
         return [of(event) for event in events]

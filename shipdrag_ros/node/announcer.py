@@ -31,6 +31,7 @@ from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 
 SILENCE_SAID_AFTER_S = 10.0
 COMPILING_SAID_AFTER_S = 3.0  # to load what was kept is faster
+_LATE_S = 900.0  # a coastdown that is found so late is over
 AGAIN_S = 10.0  # a finding that comes and goes is said this often at most
 _NS = 1e-9
 _LOOK = (
@@ -65,10 +66,9 @@ def line_of(event: Event) -> LogLine | None:
     match event:
         case Onset(start_ns, detected_ns):
             seen_s = (detected_ns - start_ns) * _NS
-            return LogLine(
-                f'a coastdown began at {utc(start_ns)}, confirmed {seen_s:.0f} s later: '
-                'hold rudder and engine'
-            )
+            hold = ': hold rudder and engine' if seen_s < _LATE_S else ''
+            text = f'a coastdown began at {utc(start_ns)}, confirmed {seen_s:.0f} s later'
+            return LogLine(f'{text}{hold}')
         case EndedCoastdown():
             return _ended(event)
         case NotCoastdown():
@@ -126,6 +126,8 @@ class Announcer:
         self._silence_said = False
         self._compiling_said = False
         self._compiled: Compiling | None = None
+        self._cuts: tuple[NotCoastdown, ...] = ()  # of the last coastdown
+        self._withdrawn = False
 
     def compiling(self, work: Compiling | None, waiting: int) -> None:
         """
@@ -157,6 +159,10 @@ class Announcer:
         Say what the monitor reports.
         """
         line = line_of(event)
+        if isinstance(event, EndedCoastdown):  # why it was withdrawn is said
+            self._cuts, self._withdrawn = event.cuts, event.withdrawn
+        elif isinstance(event, NotCoastdown) and event in self._cuts:
+            line = None if self._withdrawn else LogLine(f'cut from the coastdown: {event.text}')
         if line is not None:
             self._say(line.text, warning=line.warning)
 

@@ -130,7 +130,7 @@ def dismissed_glides(result: ReplayResult) -> list[Window]:
     return [
         window_between(result, glide.start_ns, glide.end_ns, steady=True, apart=apart)
         for glide in result.whole_glides
-        if not result.coastdowns
+        if all(each.withdrawn for each in result.coastdowns)
     ]
 
 

@@ -32,6 +32,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LIAR,
     LN_A,
     LN_U,
+    NOBODY,
     OPEN,
     P0,
     P_VAR,
@@ -313,7 +314,7 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             continue
         regime = w[REGIME]
         age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
-        if both and w[LIAR] == 0:
+        if both and w[LIAR] == NOBODY:
             _lies(bank, i, THE_LOG, n.LIES * hours)
             _lies(bank, i, THE_TRACK, n.LIES * hours)
         if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:

@@ -34,7 +34,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import Float64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
 _WALKS = len(n.TRACK_WALK)
@@ -58,8 +58,8 @@ class NoiseFilters(NamedTuple):
         Faded log likelihood.
     last, jump : (4, 2), (4,)
         Last readings; mean size of their differences.
-    seen : (4,) int64
-        Readings.
+    seen : (4,)
+        Readings of a driven ship.
     coarse : (2, 2)
         Of log and speed over ground: share of bins in which every second reads the same, and mean
         range of the seconds of a bin.
@@ -76,7 +76,7 @@ class NoiseFilters(NamedTuple):
     evidence: Float64
     last: Float64
     jump: Float64
-    seen: Int64
+    seen: Float64
     coarse: Float64
     rate: Float64
     queue: Float64
@@ -95,7 +95,7 @@ class NoiseFilters(NamedTuple):
             np.zeros((4, FILTERS)),
             np.full((4, 2), np.nan),
             np.zeros(4),
-            np.zeros(4, np.int64),
+            np.zeros(4),
             np.zeros((2, 2)),
             np.zeros(2),
             np.tile(first, (_DELAY, 1)),
@@ -138,7 +138,7 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
         clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
-        noise.rate[1] += 1.0
+        noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
     slot = noise.queue[0]
     for row in range(_DELAY - 1):
@@ -183,14 +183,14 @@ def _one(
     speed = value / step if which == 2 else value
     count = noise.seen[which]
     last = noise.last[which]
-    if count > 0 and not np.isnan(last[0]):
+    if not np.isnan(last[0]):
         size = abs(value - last[0])
         if count > 8:
             size = min(size, max(4.0 * noise.jump[which], n.WHITE_FLOOR * abs(value)))
-        gain = driven / min(count, n.MEMORY_S / n.BIN_S)
+        gain = driven / min(max(count, 1.0), n.MEMORY_S / n.BIN_S)
         noise.jump[which] += gain * (size - noise.jump[which])
     last[0] = value
-    noise.seen[which] = count + 1
+    noise.seen[which] = count + driven
     if count < 4 or not (speed > 0.0 or which == _APART):
         for k in range(FILTERS):
             _start(noise.mean[which, k], noise.spread[which, k], speed, max(abs(speed), 1e-3))

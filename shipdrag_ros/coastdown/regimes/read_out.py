@@ -243,9 +243,9 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     ]
 
 
-def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int:
+def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | None:
     """
-    Return the regime, no glide, in which she lost most of her speed since a bin.
+    Return the regime, no glide, in which she lost most of her speed since a bin, if in any.
     """
     lost = -np.diff(speed[first:], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
@@ -253,4 +253,4 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int:
         float(_probability(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
         for code in codes
     ]
-    return codes[int(np.argmax(losses))]
+    return codes[int(np.argmax(losses))] if max(losses) > 0.0 else None

@@ -53,6 +53,7 @@ LEAD_S = 900  # of record before what woke it
 _LATE = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _FULL_S = 6 * 3600.0  # of record that it remembers
+_ASKED_EVERY = 60  # bins
 _EVEN = 0.95
 _DOUBTED = 0.5
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
@@ -99,6 +100,14 @@ class Dated(NamedTuple):
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
+
+    def since(self, begin_s: float) -> Dated:
+        """
+        Return the part of it after its begin.
+        """
+        return self._replace(
+            stop_s=begin_s, start_s=begin_s, begin_s=begin_s, begin_sd_s=0.0, ran_down=False
+        )
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
@@ -169,10 +178,11 @@ class RegimeFilter:
         observe(bins, last, self._width, self._setting.step_s, self._bank.said)
         step(self._bank, self._setting)
         self._next += 1
-        if self._bank.histories.clock[0] == 0:
-            self._first = self._next
-            told_s = self._setting.told_s - self._width  # of a first bin that is later by one
-            self._setting = self._setting._replace(told_s=told_s)
+        if not self._bank.histories.used[0]:  # nothing was said yet, or no history bears it
+            told_s, self._first = self.told_s, self._next
+            self.tell(told_s)
+            if self._bank.histories.clock[0] > 0:
+                self._bank, self._out, self._low = Bank.fresh(), [], []
             return True
         self._out.append(self._bank.out.copy())
         self._low.append(float(self._bank.said[LOW]))
@@ -244,6 +254,11 @@ class RegimeFilter:
         """Whether it remembers so much that it should begin anew."""
         return len(self._out) * self._width > _FULL_S
 
+    @property
+    def due(self) -> bool:
+        """Whether it should be asked for glides that were over before anybody noticed."""
+        return len(self._out) % _ASKED_EVERY == 0
+
     def glides(self) -> list[Dated]:
         """
         Return the coastdowns so far, in order.
@@ -299,7 +314,10 @@ class RegimeFilter:
         if not len(doubted) or table[doubted, SPEED].argmin() == 0:
             return None
         first, last = int(doubted[0]), int(doubted[-1]) + 1
-        reason, text = _WHY[slowed_by(self._spans, table[:, SPEED], first, self._width)]
+        regime = slowed_by(self._spans, table[:, SPEED], first, self._width)
+        if regime is None:
+            return None
+        reason, text = _WHY[regime]
         if any(low < _ASTERN for low in self._low[first:last]):
             reason, text = Dismissal.ASTERN, 'a propeller was reversed'
         most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
