@@ -129,6 +129,16 @@ class Window:
         none: Series = getattr(self, FURTHER[name])
         return Series(none.time_ns[:0], none.value[:0], none.variance[:0])
 
+    def each(self, *kinds: str) -> tuple[Series, ...]:
+        """
+        Return the series of kinds of input, the first instrument of each first.
+        """
+        return tuple(
+            self.series(name)
+            for kind in kinds
+            for name in (kind, *(each for each in self.further if FURTHER[each] == kind))
+        )
+
     @property
     def motion(self) -> tuple[str, ...]:
         """Inputs that show how the ship moves: the first of each kind, and others heard."""
