@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shipdrag_ros.samples import FURTHER
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -40,6 +42,10 @@ TRACK_LABELS = {
     'speed_over_ground': ('Speed over ground', 'm/s'),
     'position': ('Distance along the track', 'm'),
     'position_across': ('Distance to port of the track', 'm'),
+}
+TRACK_LABELS |= {
+    name: (f'{TRACK_LABELS[kind][0]}, {name[-1]}', TRACK_LABELS[kind][1])
+    for name, kind in FURTHER.items()
 }
 
 

@@ -139,6 +139,24 @@ class Window:
             for name in (kind, *(each for each in self.further if FURTHER[each] == kind))
         )
 
+    def one_of_each(self) -> Window:
+        """
+        Return a window with one instrument of each kind, the first that was heard; a note says so.
+        """
+        if not self.further:
+            return self
+        heard = [name for name in self.motion if len(self.series(name))]
+        chosen = {FURTHER.get(name, name): name for name in reversed(heard)}
+        left = sorted(set(heard) - set(chosen.values()))
+        notes = (f'not used beside another of the kind: {", ".join(left)}',) if left else ()
+
+        def alone(window: Window) -> Window:
+            changes: dict[str, Any] = {kind: window.series(name) for kind, name in chosen.items()}
+            return replace(window, further={}, **changes)
+
+        before = None if self.before is None else alone(self.before)
+        return replace(alone(self), before=before, notes=(*self.notes, *notes))
+
     @property
     def motion(self) -> tuple[str, ...]:
         """Inputs that show how the ship moves: the first of each kind, and others heard."""
