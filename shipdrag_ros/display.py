@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.samples import FURTHER
-
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -43,10 +41,15 @@ TRACK_LABELS = {
     'position': ('Distance along the track', 'm'),
     'position_across': ('Distance to port of the track', 'm'),
 }
-TRACK_LABELS |= {
-    name: (f'{TRACK_LABELS[kind][0]}, {name[-1]}', TRACK_LABELS[kind][1])
-    for name, kind in FURTHER.items()
-}
+
+
+def track_label(name: str) -> tuple[str, str]:
+    """
+    Return label and unit of what an input of the motion measures.
+    """
+    kind = name.rstrip('_23')  # of further instruments
+    label, unit = TRACK_LABELS.get(kind, (name, ''))
+    return (label if kind == name else f'{label}, {name[-1]}'), unit
 
 
 class Link(str):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shipdrag_ros import display
-from shipdrag_ros.display import TRACK_LABELS, Table, force_unit, power_unit, speed_unit
+from shipdrag_ros.display import Table, force_unit, power_unit, speed_unit, track_label
 from shipdrag_ros.estimation import words
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
@@ -148,8 +148,7 @@ def facts(estimate: Estimate) -> Table:
         (
             'noise found',
             ', '.join(
-                f'{sd:.3g} {TRACK_LABELS.get(name, ("", ""))[1]} {name}'
-                for name, sd in estimate.noise_sd.items()
+                f'{sd:.3g} {track_label(name)[1]} {name}' for name, sd in estimate.noise_sd.items()
             ),
         ),
         ('valid range', f'Fr {low:.3f} to {high:.3f}'),
