@@ -26,7 +26,7 @@ from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
-FILTER = Parameters(update_s=60.0)
+SLOW_UPDATES = Parameters(update_s=60.0)
 LOG = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03, coloured=GaussMarkov(0.01, 30.0))
 SHAFT = Sensor(channel=Channel.SHAFT, sd=0.05)
 TRACK = Sensor(channel=Channel.POSITION, sd=1.0)
@@ -38,7 +38,7 @@ def window_only(window, ship, parameters):
 
 
 def events_of(ship, block: Block, places=()) -> list:
-    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+    monitor = Monitor(ship, SLOW_UPDATES, estimate=None, final=window_only)
     events = []
     for first, last in zip([0, *places], [*places, len(block)], strict=True):
         events += monitor.update(block[first:last])
@@ -83,7 +83,7 @@ def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
     orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.3, thrust=0.07))
     block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
-    monitor = Monitor(ship, replace(FILTER, update_s=5.0))
+    monitor = Monitor(ship, replace(SLOW_UPDATES, update_s=5.0))
     updates = of(Update, [*monitor.update(block), *monitor.finish()])
     made = [each.forecast is not None for each in updates]
     assert any(made)
@@ -193,7 +193,7 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
     at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
     starts = []
     for told in (False, True):
-        monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+        monitor = Monitor(ship, SLOW_UPDATES, estimate=None, final=window_only)
         events = monitor.update(block[:at])
         if told:
             monitor.engine_stopped(START_NS + 900 * S)
@@ -214,7 +214,7 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
 def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(ship, record, lead_s) -> None:
     block = record(sensors=(LOG,), seed=2, lead_in_s=lead_s)
     at = int(np.searchsorted(block.stamp_ns, START_NS + round((lead_s + 5.0) * S)))
-    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+    monitor = Monitor(ship, SLOW_UPDATES, estimate=None, final=window_only)
     events = monitor.update(block[:at])
     assert monitor.engine_stopped(int(block.receive_ns[at - 1])) == ''
     events += [*monitor.update(block[at:]), *monitor.finish()]
@@ -225,7 +225,7 @@ def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(ship, record, l
 def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:
     block = record(sensors=(LOG,), seed=2, orders=(), duration_s=900.0)
     at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
-    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+    monitor = Monitor(ship, SLOW_UPDATES, estimate=None, final=window_only)
     events = monitor.update(block[:at])
     monitor.engine_stopped(START_NS + 900 * S)
     events += [*monitor.update(block[at:]), *monitor.finish()]

@@ -15,6 +15,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     A_VAR,
     AMID,
     BEFORE,
+    BEHIND,
     BRAKE,
     COUNT,
     DRIVEN,
@@ -59,7 +60,7 @@ from shipdrag_ros.coastdown.regimes.state import (
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 
-_PARENTS = 7.0  # nats below the best: a history that still has children
+_PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have children, in turn
 _LOST = 16.0  # and one that is dropped
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
@@ -124,7 +125,8 @@ def _born(
 ) -> int:
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
     j = bank.used[0]
-    if j >= ROOM or not share > 0.0:
+    # one that is not likelier would be dropped at once
+    if j >= ROOM or not share > 0.0 or bank.number[i, BEHIND] + math.log(share) < -_LOST:
         return -1
     _copy(bank, i, j)
     bank.used[0] = j + 1
@@ -303,69 +305,79 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
         The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
-    hours = setting.step_s / 3600.0
     parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
         best = max(best, bank.number[i, WEIGHT])
     for i in range(parents):
-        f, w = bank.number[i], bank.whole[i]
-        if f[WEIGHT] < best - _PARENTS:
-            continue
-        regime = w[REGIME]
-        age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
-        if both and w[LIAR] == NOBODY:
-            _lies(bank, i, THE_LOG, n.LIES * hours)
-            _lies(bank, i, THE_TRACK, n.LIES * hours)
-        if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
-            w[REGIME] = regime = DRIVEN
-            w[KIND] = 0
-            f[GUST_A] = math.exp(
-                hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A]
-            )
-            f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
-            f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
-        left = 0.0  # hazard of all that it may switch to
-        if regime in (DRIVEN, LEVEL):
-            if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
-                continue
-            stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
-            if age_s < n.MANOEUVRING_S * setting.pace:
-                after = w[GLIDED] == 1
-                stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
-                rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
-                stop = n.MANOEUVRE * stops
-                level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
-                turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
-            if not np.isnan(setting.told_s):
-                off = (now_s - setting.told_s) / n.TOLD[1]
-                stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
-            _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-            _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
-            _levels(bank, i, setting, now_s, level * hours)
-            _turns(bank, i, setting, now_s, turn * hours, TURN)
-            left = stop + level + turn
-        elif regime == GLIDE:
-            _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
-            left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
-            if steered:
-                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
-                left += n.GLIDE_TURN
-            _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
-        elif regime == BRAKE:
-            _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
-            _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
-            left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
-        elif regime == AMID:
-            _settles(bank, i, setting, now_s, n.AMID[3] * hours)
-            left = float(n.AMID[3])
+        bank.number[i, BEHIND] = bank.number[i, WEIGHT] - best
+    likelier = np.inf
+    for least in _PARENTS:  # the likeliest first: there may be no room for the children of all
+        for i in range(parents):
+            if least <= bank.number[i, BEHIND] < likelier:
+                _children(bank, setting, i, now_s, both, steered)
+        likelier = least
+
+
+@compiled(uncounted=True)
+def _children(
+    bank: Histories, setting: BankSetting, i: int, now_s: float, both: bool, steered: bool
+) -> None:
+    """Let a history switch to all that it may."""
+    f, w = bank.number[i], bank.whole[i]
+    hours = setting.step_s / 3600.0
+    regime = w[REGIME]
+    age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
+    if both and w[LIAR] == NOBODY:
+        _lies(bank, i, THE_LOG, n.LIES * hours)
+        _lies(bank, i, THE_TRACK, n.LIES * hours)
+    if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
+        w[REGIME] = regime = DRIVEN
+        w[KIND] = 0
+        f[GUST_A] = math.exp(hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A])
+        f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
+        f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+    left = 0.0  # hazard of all that it may switch to
+    if regime in (DRIVEN, LEVEL):
+        if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
+            return
+        stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
+        if age_s < n.MANOEUVRING_S * setting.pace:
+            after = w[GLIDED] == 1
+            stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
+            rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
+            stop = n.MANOEUVRE * stops
+            level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
+            turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+        if not np.isnan(setting.told_s):
+            off = (now_s - setting.told_s) / n.TOLD[1]
+            stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
+        _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
+        _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
+        _levels(bank, i, setting, now_s, level * hours)
+        _turns(bank, i, setting, now_s, turn * hours, TURN)
+        left = stop + level + turn
+    elif regime == GLIDE:
+        _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
+        if steered:
+            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            left += n.GLIDE_TURN
+        _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
+    elif regime == BRAKE:
+        _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
+        _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
+        left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
+    elif regime == AMID:
+        _settles(bank, i, setting, now_s, n.AMID[3] * hours)
+        left = float(n.AMID[3])
+    else:
+        if regime == TURN:
+            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
         else:
-            if regime == TURN:
-                _back(bank, i, setting, now_s, n.TURN_OUT * hours)
-            else:
-                _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
-            left = float(n.TURN_OUT)
-        f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
+            _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+        left = float(n.TURN_OUT)
+    f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
 
 @compiled(uncounted=True)
