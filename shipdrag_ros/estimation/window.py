@@ -141,14 +141,24 @@ class Window:
 
     def one_of_each(self) -> Window:
         """
-        Return a window with one instrument of each kind, the first that was heard; a note says so.
+        Return a window with one instrument of each kind, the first that was heard.
+
+        A note names the others, and says what a speed reads against that of the one used.
         """
         if not self.further:
             return self
         heard = [name for name in self.motion if len(self.series(name))]
         chosen = {FURTHER.get(name, name): name for name in reversed(heard)}
-        left = sorted(set(heard) - set(chosen.values()))
-        notes = (f'not used beside another of the kind: {", ".join(left)}',) if left else ()
+        notes = []
+        for name in heard:
+            used, reads = self.series(chosen[FURTHER.get(name, name)]), self.series(name)
+            if used is reads:
+                continue
+            notes.append(f'{name} is not used beside {chosen[FURTHER.get(name, name)]}')
+            if reads.value.ndim == 1:
+                beside = np.interp(reads.time_ns, used.time_ns, used.value)
+                more = float(np.median(reads.value) / np.median(beside)) - 1.0
+                notes[-1] += f', against which it reads {100.0 * more:+.1f} %'
 
         def alone(window: Window) -> Window:
             changes: dict[str, Any] = {kind: window.series(name) for kind, name in chosen.items()}
