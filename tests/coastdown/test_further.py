@@ -71,6 +71,19 @@ def test_the_second_one_carries_on_where_the_first_falls_silent(
     assert (ended.end_ns - alone.end_ns) * 1e-9 == pytest.approx(COAST_S - 200.0, abs=2.0)
 
 
+@pytest.mark.parametrize('off', [-0.05, 0.05])
+def test_a_second_log_in_another_scale_makes_no_step_where_it_carries_on(
+    ship: Ship, off: float
+) -> None:
+    silent = Sensor(channel=FIRST, sd=0.03, gaps_s=((LEAD_S + 200.0, LEAD_S + 300.0),))
+    block = sailed(ship, silent, Sensor(channel=SECOND, sd=0.03))
+    other = (block.channel == SECOND)[:, None]
+    block = replace(block, value=np.where(other, 1.0 + off, 1.0) * block.value)
+    _, events = watched(ship, block)
+    (ended,) = (event for event in events if isinstance(event, EndedCoastdown))
+    assert ended.ended_by is EndedBy.RECORD_END
+
+
 def test_the_second_one_alone_is_a_log_as_well(ship: Ship) -> None:
     (one,) = (e for e in watched(ship, sailed(ship, Sensor(channel=FIRST, sd=0.03)))[1][-1:])
     block = sailed(ship, Sensor(channel=FIRST, sd=0.03))

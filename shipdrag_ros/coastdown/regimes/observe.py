@@ -19,6 +19,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
 )
 from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
+from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND, Channel, Float64
 
@@ -26,6 +27,7 @@ _LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
 _TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
 _HEADING = int(Channel.HEADING)
 _SHAFT, _SHAFT_2, _PITCH = int(Channel.SHAFT), int(Channel.SHAFT_2), int(Channel.PITCH)
+_BESIDE = 120  # seconds over which two instruments are compared
 _COURSE = 6  # bins of a way that shows a course
 
 
@@ -69,6 +71,18 @@ def _speaking(bins: Bins, kind: int, last: int, width: int) -> int:
 
 
 @compiled(inline=True, uncounted=True)
+def _level(bins: Bins, source: int, first: int) -> float:
+    """Return what the first of a kind read over what another did, when both were last heard."""
+    until = bins.closed[first]
+    if source == first or until == NEVER:
+        return 1.0
+    other = _mean_speed(bins, source, until, _BESIDE)
+    # a step from one scale to the other would be a loss of speed
+    level = _mean_speed(bins, first, until, _BESIDE) / other if other != 0.0 else np.nan
+    return level if level > 0.0 else 1.0
+
+
+@compiled(inline=True, uncounted=True)
 def _apart(one: float, other: float) -> float:
     return math.atan2(math.sin(one - other), math.cos(one - other))
 
@@ -99,8 +113,8 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
     for k in range(len(said)):
         said[k] = np.nan
     log, ground = _speaking(bins, _LOG, last, width), _speaking(bins, _GROUND, last, width)
-    said[LOG] = _mean_speed(bins, log, last, width)
-    said[GROUND] = _mean_speed(bins, ground, last, width)
+    said[LOG] = _mean_speed(bins, log, last, width) * _level(bins, log, _LOG)
+    said[GROUND] = _mean_speed(bins, ground, last, width) * _level(bins, ground, _GROUND)
     said[RANGES] = _range(bins, log, last, width)
     said[RANGES + 1] = _range(bins, ground, last, width)
     for kind in _TRACKS:
