@@ -245,12 +245,15 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
 
 def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | None:
     """
-    Return the regime, no glide, in which she lost most of her speed since a bin, if in any.
+    Return the regime, no glide, in which she lost most of her speed from a bin to the slowest.
+
+    None where she lost none.
     """
-    lost = -np.diff(speed[first:], prepend=speed[max(first - 1, 0)])
+    last = first + int(np.argmin(speed[first:])) + 1
+    lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
     losses = [
-        float(_probability(found.part(found.what == code), len(speed), step_s)[first:] @ lost)
+        float(_probability(found.part(found.what == code), len(speed), step_s)[first:last] @ lost)
         for code in codes
     ]
     return codes[int(np.argmax(losses))] if max(losses) > 0.0 else None
