@@ -11,9 +11,9 @@ Gaussians of fixed covariance, so that an evidence is a sum.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -60,7 +60,7 @@ _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
 _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
-_MOST_WRONG = 4  # sources at once that say nothing of her; more are not looked into
+_FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 _STILL = 0.5  # share of minutes of a source that was wrong just before
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
@@ -190,16 +190,22 @@ def sound_probabilities(
     """
     names, found = sorted(speeds, key=_RANK.__getitem__), {}
     in_a_scale: dict[int, list[float]] = {name: [] for name in names}
-    for count in range(max(0, len(names) - _MOST_WRONG), len(names) + 1):
+
+    @cache
+    def measured(*sound: int) -> float:
+        return _measured({name: speeds[name] for name in sound}, craft)
+
+    least = 0 if len(names) <= _FEW else len(names) - _MOST_WRONG
+    for count in range(least, len(names) + 1):
         for sound in combinations(names, count):
             part = {name: speeds[name] for name in sound}
-            logs, ratio = [_measured(part, craft)] if sound else [], {}
+            logs, ratio = [measured(*sound)] if sound else [], {}
             for name in names:
                 share = _STILL if name in doubted else _WRONG_SHARE[_KIND[name]]
                 logs.append(math.log(1.0 - share if name in sound else share))
                 if name not in sound:
                     nothing = _evidence(_nothing(), speeds[name])
-                    beside = _beside(name, part, speeds[name], scales or {}, craft)
+                    beside = _beside(name, part, speeds[name], scales or {}, craft, measured)
                     each = [
                         math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing,
                         math.log(_IN_A_SCALE[_KIND[name]]) + beside - (logs[0] if sound else 0.0),
@@ -222,6 +228,7 @@ def _beside(
     speed: Float64,
     scales: Mapping[tuple[int, int], Scaled],
     craft: Craft,
+    measured: Callable[..., float],
 ) -> float:
     """Return the log evidence of sound sources and of one that is the ship in a wrong scale."""
     if _KIND[name] == _METRES and sound:
@@ -233,8 +240,8 @@ def _beside(
     # a track has no scale, and no current is between it and a speed over ground
     for other in sorted(sound, key=_RANK.__getitem__, reverse=_KIND[name] != _LOG):
         if (name, other) in scales:
-            both = _in_order({**sound, name: speed})
-            return _log_sum([scales[name, other].log_odds + _measured(both, craft), found])
+            both = measured(*_in_order({**sound, name: speed}))
+            return _log_sum([scales[name, other].log_odds + both, found])
     return found
 
 
