@@ -73,7 +73,9 @@ class RunRows:
             name: series for name in CODES if len(series := window.series(name)) >= LEAST_STAMPS
         }
         if not inputs:
-            found = ', '.join(f'{name} {len(window.series(name))}' for name in window.motion)
+            found = ', '.join(
+                f'{name} {len(window.series(name))}' for name in CODES if name in window.motion
+            )
             raise EstimationError(
                 f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
                 'one of them: give a longer window'
