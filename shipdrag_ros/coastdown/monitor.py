@@ -400,13 +400,13 @@ class Monitor:
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
         """Return the glides that were not told; of one that was said to have ended, the rest."""
-        since_s = self._reported_s
-        after = [each for each in regimes.glides() if each.end_s >= since_s + numbers.SHORTEST_S]
-        return [
-            each if each.begin_s >= since_s else each.since(since_s)
-            for each in after
-            if each.begin_s >= since_s or each.ended_by is None
-        ]
+        since_s, found = self._reported_s, []
+        for each in regimes.glides():
+            if each.begin_s >= since_s:
+                found.append(each)
+            elif each.ended_by is None and each.end_s >= since_s + numbers.SHORTEST_S:
+                found.append(each.since(since_s))
+        return found
 
     def _begin(self, dated: Dated, number: int) -> Onset:
         start = max(int(dated.start_s), 1)

@@ -116,6 +116,15 @@ def test_a_log_that_shows_tenths_of_a_knot_shows_no_manoeuvre(ship, record, seed
     assert not of(NotCoastdown, events)
 
 
+def test_a_compass_that_is_first_heard_in_a_glide_does_not_end_it(ship, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], replace(sensors['compass'], sd=0.01)))
+    heard = (block.channel != Channel.HEADING) | (
+        block.stamp_ns > block.stamp_ns[0] + 1100 * 10**9
+    )
+    (ended,) = of(EndedCoastdown, events_of(ship, block[heard]))
+    assert ended.ended_by is EndedBy.RECORD_END
+
+
 @pytest.mark.parametrize('apart_s', [20.0, 90.0])
 def test_of_several_shafts_the_last_that_stops_counts(ship, record, apart_s) -> None:
     orders = (

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from rclpy.logging import get_logger
 
-from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
 from shipdrag_ros.messages.heard import ERROR, OK, WARN
 from shipdrag_ros.node.announcer import Announcer, line_of
 from shipdrag_ros.node.health import InputState
@@ -41,3 +41,17 @@ def test_a_glide_that_was_dismissed_by_its_speed_is_worth_a_look() -> None:
     turned = line_of(replace(near, reason=Dismissal.TURN, text='she turned'))
     assert turned is not None
     assert turned.text == 'nearly a coastdown: she turned'
+
+
+def test_what_was_cut_from_a_coastdown_is_no_near_miss(capfd: pytest.CaptureFixture[str]) -> None:
+    cut = NotCoastdown(0, 10**10, Dismissal.THRUST, 'the thrust ran down for 10 s')
+    ended = EndedCoastdown(
+        10**10, 10**12, 10**11, EndedBy.ENGINE, None, 'too short', None, cuts=(cut,)
+    )
+    announcer = Announcer(get_logger('announcer_of_cuts'))
+    for one in (ended, replace(ended, withdrawn=True)):
+        announcer.event(one)
+        announcer.event(cut)
+    lines = [line for line in capfd.readouterr().err.splitlines() if 'announcer_of_cuts' in line]
+    # of one that was withdrawn, why is said already
+    assert [': cut from the coastdown: the thrust' in line for line in lines] == [0, 1, 0]
