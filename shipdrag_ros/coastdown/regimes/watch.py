@@ -287,6 +287,8 @@ class RegimeFilter:
         )
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
+        if glide.after < 0:
+            return None
         around = _ASTERN_S * self._setting.pace
         first, last = (
             max(round((glide.end_s + off) / self._width), 0) for off in (-around, around)
