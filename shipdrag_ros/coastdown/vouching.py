@@ -30,8 +30,9 @@ from shipdrag_ros.coastdown.bins import (
     smoothing,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
-from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, means, scaled
+from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, log_sum, means, scaled
 from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.samples import KIND, SECOND_NS, Block, Channel, Float64, Int64
 
@@ -117,15 +118,20 @@ def _in_order(speeds: Mapping[int, Float64]) -> dict[int, Float64]:
 
 
 def _evidence(mixture: SpeedMixture, speed: Float64) -> float:
-    precision, factor = mixture
-    return _log_sum((factor - 0.5 * ((precision @ speed) @ speed)).tolist())
+    return log_sum(_log_densities(*mixture, speed))
 
 
-def _log_sum(logs: list[float]) -> float:
-    most = max(logs)
-    if most == -math.inf:
-        return most
-    return most + math.log(math.fsum(math.exp(each - most) for each in logs))
+@compiled('float64[::1](float64[:, :, ::1], float64[::1], float64[::1])')
+def _log_densities(precision: Float64, factor: Float64, speed: Float64) -> Float64:
+    """Return of each Gaussian of a mixture its share of the density there, as a logarithm."""
+    size, each = len(speed), factor.copy()
+    for part in range(len(factor)):
+        for row in range(size):
+            along = 0.5 * precision[part, row, row] * speed[row]
+            for column in range(row):
+                along += precision[part, row, column] * speed[column]
+            each[part] -= along * speed[row]
+    return each
 
 
 def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
@@ -142,9 +148,8 @@ def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     pace = through / craft.slow_m_s
     rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
     other = {**speeds, **{source: -each for source, each in of_logs.items()}}
-    return min(rare, 0.0) + _log_sum(
-        [ahead, _evidence(mixture, np.concatenate(list(other.values())))]
-    )
+    astern = _evidence(mixture, np.concatenate(list(other.values())))
+    return min(rare, 0.0) + float(np.logaddexp(ahead, astern))
 
 
 class Soundness(NamedTuple):
@@ -195,6 +200,7 @@ def sound_probabilities(
     def measured(*sound: int) -> float:
         return _measured({name: speeds[name] for name in sound}, craft)
 
+    nothing = {name: _evidence(_nothing(), speeds[name]) for name in names}
     least = 0 if len(names) <= _FEW else len(names) - _MOST_WRONG
     for count in range(least, len(names) + 1):
         for sound in combinations(names, count):
@@ -204,21 +210,21 @@ def sound_probabilities(
                 share = _STILL if name in doubted else _WRONG_SHARE[_KIND[name]]
                 logs.append(math.log(1.0 - share if name in sound else share))
                 if name not in sound:
-                    nothing = _evidence(_nothing(), speeds[name])
                     beside = _beside(name, part, speeds[name], scales or {}, craft, measured)
-                    each = [
-                        math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing,
-                        math.log(_IN_A_SCALE[_KIND[name]]) + beside - (logs[0] if sound else 0.0),
-                    ]
-                    ratio[name] = each[1] - _log_sum(each)
-                    logs.append(_log_sum(each))
+                    beside += math.log(_IN_A_SCALE[_KIND[name]]) - (logs[0] if sound else 0.0)
+                    other = math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing[name]
+                    logs.append(float(np.logaddexp(other, beside)))
+                    ratio[name] = beside - logs[-1]
             found[sound] = math.fsum(logs)
             for name, share in ratio.items():
                 in_a_scale[name].append(found[sound] + share)
-    total = _log_sum(list(found.values()))
+    total = float(np.logaddexp.reduce(list(found.values())))
     return Soundness(
         {sound: math.exp(each - total) for sound, each in found.items()},
-        {name: math.exp(_log_sum(logs) - total) for name, logs in in_a_scale.items()},
+        {
+            name: math.exp(float(np.logaddexp.reduce(logs)) - total)
+            for name, logs in in_a_scale.items()
+        },
     )
 
 
@@ -241,7 +247,7 @@ def _beside(
     for other in sorted(sound, key=_RANK.__getitem__, reverse=_KIND[name] != _LOG):
         if (name, other) in scales:
             both = measured(*_in_order({**sound, name: speed}))
-            return _log_sum([scales[name, other].log_odds + both, found])
+            return float(np.logaddexp(scales[name, other].log_odds + both, found))
     return found
 
 
@@ -470,9 +476,11 @@ def _scales(
 def _means(bins: Bins, source: int, last: int) -> Float64:
     """Return means of the speed [m/s] up to a second; none where one is missing."""
     totals, newest = bins.speeds[source], int(bins.closed[source])
+    if newest < last - LOOK_S:
+        return np.empty(0)
     edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
     each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
-    if newest < last - LOOK_S or not each[:, COUNT].all():
+    if not each[:, COUNT].all():
         return np.empty(0)
     return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
 
