@@ -21,6 +21,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.problem import families_declared
+from shipdrag_ros.samples import FURTHER
 from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating_measurements
 
 DOCS = Path(__file__).resolve().parent
@@ -76,6 +77,7 @@ def inputs() -> str:
     rows = (
         [f'`{name}`', ', '.join(_short(kind) for kind in kinds), _INPUT_MEANING[name]]
         for name, kinds in TOPICS.items()
+        if name not in FURTHER
     )
     return _table(['topic', 'types accepted', 'meaning'], rows)
 

@@ -43,6 +43,15 @@ TRACK_LABELS = {
 }
 
 
+def track_label(name: str) -> tuple[str, str]:
+    """
+    Return label and unit of what an input of the motion measures.
+    """
+    kind = name.rstrip('_23')  # of further instruments
+    label, unit = TRACK_LABELS.get(kind, (name, ''))
+    return (label if kind == name else f'{label}, {name[-1]}'), unit
+
+
 class Link(str):
     """
     The text of a cell that leads somewhere; where nothing can be followed it is the text alone.

@@ -8,7 +8,7 @@ interleaved. Cutting the sequence into other blocks changes nothing downstream.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
 
@@ -33,7 +33,7 @@ class Channel(IntEnum):
     `POSITION` and `POSITION_GEODETIC` are two encodings of the one input
     `position`: only the window that uses a position knows where to put the
     origin of its plane. The input `shaft` carries up to four shafts, and the
-    pitch of each.
+    pitch of each. `..._2` and `..._3` are further instruments of the kind.
     """
 
     SPEED_THROUGH_WATER = 0  # forward [m/s], unused
@@ -52,15 +52,26 @@ class Channel(IntEnum):
     PITCH_2 = 13  # of the propeller of SHAFT_2, and so on
     PITCH_3 = 14
     PITCH_4 = 15
+    SPEED_THROUGH_WATER_2 = 16  # as those without a number
+    SPEED_THROUGH_WATER_3 = 17
+    SPEED_OVER_GROUND_2 = 18
+    SPEED_OVER_GROUND_3 = 19
+    POSITION_2 = 20
+    POSITION_3 = 21
+    POSITION_GEODETIC_2 = 22
+    POSITION_GEODETIC_3 = 23
+
+    @property
+    def kind(self) -> Channel:
+        """The channel of the first one of its kind."""
+        return Channel[self.name.rstrip('_234')]
 
     @property
     def input(self) -> str:
         """The name of the input (topic) that carries this channel."""
-        if self is Channel.POSITION_GEODETIC:
-            return 'position'
-        if self in SHAFTS or self in PITCHES:
+        if self.kind in (Channel.SHAFT, Channel.PITCH):
             return 'shaft'
-        return self.name.lower()
+        return self.name.lower().replace('_geodetic', '')
 
 
 SHAFTS = (Channel.SHAFT, Channel.SHAFT_2, Channel.SHAFT_3, Channel.SHAFT_4)
@@ -68,6 +79,20 @@ PITCHES = (Channel.PITCH, Channel.PITCH_2, Channel.PITCH_3, Channel.PITCH_4)
 """The pitch of each of `SHAFTS`, in their order."""
 INPUTS: tuple[str, ...] = tuple(dict.fromkeys(channel.input for channel in Channel))
 MOTION_INPUTS: tuple[str, ...] = ('speed_through_water', 'position', 'speed_over_ground')
+GEODETIC: Mapping[Channel, Channel] = {
+    each: Channel[each.name.replace('POSITION', 'POSITION_GEODETIC')]
+    for each in (Channel.POSITION, Channel.POSITION_2, Channel.POSITION_3)
+}
+"""The other encoding of each position in metres."""
+KIND = np.array([int(channel.kind) for channel in Channel])
+"""Of each channel, that of the first one of its kind; for compiled code."""
+FURTHER: Mapping[str, str] = {
+    channel.input: channel.kind.input for channel in Channel if channel.input != channel.kind.input
+}
+"""Inputs of further instruments, and the input of the first one of the kind."""
+
+ALL_MOTION: tuple[str, ...] = (*MOTION_INPUTS, *FURTHER)
+"""Inputs that show how the ship moves, those of further instruments too."""
 
 
 class Reason(IntEnum):

@@ -37,7 +37,7 @@ from shipdrag_ros.messages import (
 )
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import FURTHER, Block
 
 
 def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) -> list[Run]:
@@ -179,7 +179,7 @@ def info(run: Run) -> BagInfo:
         compression=', '.join(sorted(kind or 'none' for kind in compressions)) or 'none',
         indexed=all(part.contents.indexed for part in run.parts),
         topics=tuple(TopicRate(topic, _rate_hz(topic, duration_s)) for topic in run.topics),
-        missing=tuple(name for name in TOPICS if name not in found),
+        missing=tuple(name for name in TOPICS if name not in found and name not in FURTHER),
         attachments={name: len(text.encode()) for name, text in run.attachments.items()},
         software=run.software,
         node=run.node,

@@ -19,21 +19,24 @@ import numpy as np
 
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Channel, Float64, Int64
+from shipdrag_ros.samples import KIND, Channel, Float64, Int64
 
-BINNED = len(Channel)
-SOURCES = int(Channel.POSITION_GEODETIC) + 1  # of these, a speed can be had from; best first
-EARTH_RADIUS_M = 6_371_008.8  # mean; the third digit of a speed does not matter here
-
-FIRST_TRACK = int(Channel.POSITION)  # this source and those after it are positions
+CHANNELS = len(Channel)
+FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are positions
 _GEODETIC = int(Channel.POSITION_GEODETIC)
+KINDS = _GEODETIC + 1  # of these, a speed can be had from
+SOURCES = np.argsort(KIND, kind='stable')[: int((KIND < KINDS).sum())]
+"""Channels that a speed can be had from, best first."""
+RANK = np.argsort(np.argsort(KIND, kind='stable'), kind='stable')
+"""Of each channel, its place among `SOURCES`; of others, behind."""
+EARTH_RADIUS_M = 6_371_008.8  # mean; the third digit of a speed does not matter here
 
 # Far finer than any sensor, and coarse enough that the centred sums of a line over an hour and
 # a half fit into 63 bits.
 PER_SECOND = 1000
 PER_UNIT = 1e6  # m/s, m, rad/s, cosine and sine
 PER_DEGREE = 1e11
-UNIT = np.array([PER_DEGREE if c == _GEODETIC else PER_UNIT for c in range(BINNED)])
+UNIT = np.array([PER_DEGREE if kind == _GEODETIC else PER_UNIT for kind in KIND])
 # A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
 TURNING_RAD_S = 0.5
 PITCH_LEAST = 1e-3  # a pitch below it is none
@@ -61,7 +64,7 @@ class Bins(NamedTuple):
     places : (channels, slots, 4) int64
         Totals up to a bin: bins, time [ms] and the two columns; cosine and sine for a
         heading. Not of the speeds as read.
-    speeds : (sources, slots, 5) int64
+    speeds : (channels, slots, 5) int64
         Totals up to a bin: bins, time [ms], speed, time^2, time x speed. The speed from
         positions is by differences, left out where there are too few.
 
@@ -86,13 +89,13 @@ class Bins(NamedTuple):
         """
         slots = 1 << size.bit_length()  # the total before the oldest bin is needed too
         return cls(
-            np.full(BINNED, NEVER),
-            np.zeros(BINNED, np.int64),
-            np.zeros((BINNED, 3)),
-            np.zeros(BINNED),
-            np.full(BINNED, NEVER),
-            np.zeros((BINNED, slots, 4), np.int64),
-            np.zeros((SOURCES, slots, 5), np.int64),
+            np.full(CHANNELS, NEVER),
+            np.zeros(CHANNELS, np.int64),
+            np.zeros((CHANNELS, 3)),
+            np.zeros(CHANNELS),
+            np.full(CHANNELS, NEVER),
+            np.zeros((CHANNELS, slots, 4), np.int64),
+            np.zeros((CHANNELS, slots, 5), np.int64),
         )
 
 
@@ -179,7 +182,7 @@ def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     if n0 == 0 or n1 == 0:
         return np.nan, np.nan, np.nan
     time = t1 - t0 + width
-    if channel == _GEODETIC:
+    if KIND[channel] == _GEODETIC:
         north = math.radians((a1 - a0) / PER_DEGREE) * EARTH_RADIUS_M
         latitude = math.radians((a + a1) / PER_DEGREE)
         east = math.radians((b1 - b0) / PER_DEGREE) * math.cos(latitude) * EARTH_RADIUS_M

@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.bins import (
     newest_bin,
 )
 from shipdrag_ros.coastdown.tracking import rep103_yaw
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import KIND, Channel
 
 _HEADING = int(Channel.HEADING)
 _SPAN_S = 20  # heading and course are means over so long
@@ -48,7 +48,9 @@ def heading_doubt(bins: Bins, convention: str) -> str:
     """
     newest = newest_bin(bins, _HEADING)
     tracks = [
-        track for track in range(FIRST_TRACK, SOURCES) if newest_bin(bins, track) > newest - 5
+        track
+        for track in SOURCES
+        if KIND[track] >= FIRST_TRACK and newest_bin(bins, track) > newest - 5
     ]
     if newest < 0 or not tracks:
         return ''

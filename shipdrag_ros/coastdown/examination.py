@@ -215,7 +215,7 @@ def _examine_part(
 
 def _ends(window: Window) -> tuple[float, float, int]:
     """Return the speed in the first and last tenth, and of how many readings."""
-    count = max(len(window.speed_through_water), len(window.speed_over_ground))
+    count = max(map(len, window.each('speed_through_water', 'speed_over_ground')))
     _, speed = readings(window)
     if not len(speed):
         return 0.0, 0.0, max(count, len(window.position))

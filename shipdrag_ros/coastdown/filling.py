@@ -12,9 +12,9 @@ import numpy as np
 from shipdrag_ros.coastdown.bins import (
     COUNT,
     FIRST_TRACK,
+    KINDS,
     PER_SECOND,
     PER_UNIT,
-    SOURCES,
     SPEED,
     TIME,
     TIME_SPEED,
@@ -29,7 +29,7 @@ from shipdrag_ros.coastdown.bins import (
 )
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, SECOND_NS, Channel, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, KIND, SECOND_NS, Channel, Int64
 
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 _HEADING = int(Channel.HEADING)
@@ -46,7 +46,7 @@ def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -
     if bins.samples[channel] == 0:
         bins.filling[channel] = number
         bins.first[channel] = b
-    if channel == _GEODETIC:
+    if KIND[channel] == _GEODETIC:
         apart = b - bins.first[channel]
         if abs(apart) > 180.0:
             b -= 360.0 * np.round(apart / 360.0)
@@ -77,12 +77,12 @@ def close(bins: Bins, channel: int, width: int) -> int:
     bins.samples[channel] = 0
     bins.sums[channel] = 0.0
     bins.closed[channel] = number
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         _add_speed(bins, channel, before, number, time, a)
         return int(number)
     places = bins.places[channel]
     mask = len(places) - 1
-    if channel == _GEODETIC and before != NEVER:
+    if KIND[channel] == _GEODETIC and before != NEVER:
         # on the branch of the bin before
         turned = places[before & mask, B] - places[(before - 1) & mask, B] - b
         b += (turned + _CIRCLE // 2) // _CIRCLE * _CIRCLE
@@ -92,7 +92,7 @@ def close(bins: Bins, channel: int, width: int) -> int:
     total[TIME] += time
     total[A] += a
     total[B] += b
-    if channel < SOURCES:
+    if KIND[channel] < KINDS:
         time, speed = _speed_of_track(bins, channel, number, smoothing(width))
         _add_speed(bins, channel, before, number, time, speed)
     return int(number)

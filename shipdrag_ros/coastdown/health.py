@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.memory import RECENT, InputTally
 from shipdrag_ros.coastdown.validate import NEVER
-from shipdrag_ros.samples import INPUTS, Channel, Reason
+from shipdrag_ros.samples import FURTHER, INPUTS, Channel, Reason
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,10 @@ class MonitorProgress:
 
 def input_health(tally: InputTally) -> dict[str, InputHealth]:
     """
-    Show the health of every input, by its name.
+    Show the health of every input, by its name; of further instruments, of those heard.
     """
-    return {name: _health(tally, name) for name in INPUTS}
+    every = {name: _health(tally, name) for name in INPUTS}
+    return {name: one for name, one in every.items() if one.messages or name not in FURTHER}
 
 
 def _health(tally: InputTally, name: str) -> InputHealth:

@@ -14,7 +14,7 @@ from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Float64
+from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
 _RUDDER_RAD = 0.17
@@ -172,10 +172,7 @@ def gaps(window: Window, parameters: Parameters) -> list[NotCoastdown]:
     """
     Find when nothing shows the motion for longer than `data_stop_s`, or a third of the window.
     """
-    heard = [
-        series.time_ns
-        for series in (window.speed_through_water, window.speed_over_ground, window.position)
-    ]
+    heard = [series.time_ns for series in window.each(*MOTION_INPUTS)]
     stamps = np.unique(np.concatenate(heard))
     if len(stamps) < 2:
         return []

@@ -15,7 +15,9 @@ from enum import IntEnum
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
+    KINDS,
     PITCH_LEAST,
+    RANK,
     SOURCES,
     TURNING_RAD_S,
     Bins,
@@ -41,11 +43,9 @@ from shipdrag_ros.coastdown.validate import (
     remember,
 )
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64, Reason, UInt8
+from shipdrag_ros.samples import KIND, SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
-_SHAFT = int(Channel.SHAFT)
-_SHAFT_2 = int(Channel.SHAFT_2)  # this channel and those after it are shafts and pitches
-_PITCH = int(Channel.PITCH)  # and these are pitches
+_SHAFT, _PITCH = int(Channel.SHAFT), int(Channel.PITCH)
 _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
 _ACCEPTED = int(Reason.ACCEPTED)
 
@@ -79,8 +79,10 @@ def _is_primary(bins: Bins, watch: Watch, tuning: Tuning, source: int, number: i
     """Say whether no better source that is not doubted has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
     doubted, primary = watch.doubted[source] > number, True
-    for other in range(SOURCES):
-        better = other < source if (watch.doubted[other] > number) == doubted else doubted
+    for other in SOURCES:
+        better = (
+            RANK[other] < RANK[source] if (watch.doubted[other] > number) == doubted else doubted
+        )
         primary = primary and not (better and newest_bin(bins, other) >= oldest)
     return bool(primary)
 
@@ -159,7 +161,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     # half a window ago, so that a shaft that runs down slowly is not its own measure
     width = tuning.slopes.width
     steady, count = mean_turning(bins, channel, number - (width + 1) // 2, width)
-    if count < 3 or abs(steady) < (PITCH_LEAST if channel >= _PITCH else TURNING_RAD_S):
+    if count < 3 or abs(steady) < (PITCH_LEAST if KIND[channel] == _PITCH else TURNING_RAD_S):
         return 0
     if mean_turning(bins, channel, number, 1)[0] / steady < _SLOWED:
         return _SHAFT_SLOWED
@@ -226,9 +228,9 @@ def walk(
                 break
             if bins.samples[c] > 0 and number > bins.filling[c]:
                 closed = close(bins, c, tuning.slopes.width)
-                if c < SOURCES:
+                if KIND[c] < KINDS:
                     stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
-                elif c == _SHAFT or c >= _SHAFT_2:
+                elif KIND[c] == _SHAFT or KIND[c] == _PITCH:
                     stop = _look_at_shaft(bins, watch, tuning, c, closed)
                 if stop != 0:
                     break

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES, Bins
+from shipdrag_ros.coastdown.bins import CHANNELS, Bins
 from shipdrag_ros.coastdown.ring import RingBuffer, first_store
 from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
-from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, CheckMemory, Limits
+from shipdrag_ros.coastdown.validate import NEVER, CheckMemory, Limits
 from shipdrag_ros.samples import Float64, Int64, Reason
 
 ALWAYS = 2**62  # a stamp after all stamps
@@ -43,7 +43,7 @@ class Watch(NamedTuple):
         [bins].
     look : int64
         The bin at whose first sample log and track are compared next.
-    doubted : (sources,) int64
+    doubted : (channels,) int64
         Bin up to which each source is not used: another contradicts it.
     """
 
@@ -71,7 +71,7 @@ class Watch(NamedTuple):
             np.full(1, np.nan),
             np.array([NEVER, 0]),
             np.full(1, NEVER),
-            np.full(SOURCES, NEVER),
+            np.full(CHANNELS, NEVER),
         )
 
 

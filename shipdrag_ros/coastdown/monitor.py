@@ -499,7 +499,7 @@ class Monitor:
         """Go on with another speed source where the one watched is silent, if there is one."""
         steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
         failed = int(self._memory.watch.source[0])
-        for source in range(SOURCES):
+        for source in SOURCES.tolist():
             # by the rule that found the other silent: or both would be tried in turn for ever
             silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
             doubted = self._memory.watch.doubted[source] > now_ns // SECOND_NS
@@ -532,7 +532,8 @@ class Monitor:
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
         notes = (*window.notes, *self._vouching.notes(start_ns))
-        return replace(window, notes=notes, log_doubt=self._vouching.log_doubt)
+        log, doubt = self._vouching.log_doubt
+        return replace(window, notes=notes, doubted_log=log, log_doubt=doubt)
 
     # how a coastdown ends
 

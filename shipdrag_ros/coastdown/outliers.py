@@ -21,12 +21,12 @@ import numpy as np
 
 from shipdrag_ros.coastdown.past import (
     AGREED,
+    CHANNELS,
     FIRST_TRACK,
     GEODETIC,
     KEPT,
     M_PER_DEGREE,
     MIDDLE,
-    MOTION,
     REPEATS,
     SD,
     Past,
@@ -40,6 +40,7 @@ from shipdrag_ros.coastdown.past import (
     same_as_last,
 )
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.samples import KIND
 
 _NEVER = -(2**62)
 _ACCELERATION_M_S2 = 0.15  # that needs no proof: three times what a merchant ship coasts with
@@ -57,7 +58,7 @@ def forget_past(past: Past) -> None:
     Return to the state before the first reading.
     """
     past.heard_ns[:] = _NEVER
-    for channel in range(MOTION):
+    for channel in range(CHANNELS):
         learn_anew(past, channel)
 
 
@@ -72,10 +73,10 @@ def fits(
     """
     count = past.accepted[channel]
     last = (count - 1) % KEPT
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
             return True
-    elif channel < GEODETIC:
+    elif KIND[channel] < GEODETIC:
         x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
         if abs(x) + abs(y) <= past.gate[channel]:
             return True
@@ -128,7 +129,7 @@ def _width(past: Past, channel: int, gap_ns: int, variance_a: float, variance_b:
     stated = 0.0
     if variance_a > 0.0 and variance_a < np.inf:
         stated += variance_a
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         way = max(_ACCELERATION_M_S2, _FASTER * _latest_rate(past, channel)) * gap
     else:
         if variance_b > 0.0 and variance_b < np.inf:
@@ -161,14 +162,14 @@ def _agrees_with_accepted(
     last = (count - 1) % KEPT
     last_a, last_b = past.value[channel, last, 0], past.value[channel, last, 1]
     gap = stamp - past.stamp_ns[channel, last]
-    if channel < FIRST_TRACK and a == 0.0:
+    if KIND[channel] < FIRST_TRACK and a == 0.0:
         gap = 0  # no ship stops between two readings: the classic drop-out of a log
     width = _width(past, channel, gap, variance_a, variance_b)
     if apart(channel, a, b, last_a, last_b) <= width:
         return True
     if count < MIDDLE:
         return False
-    if channel >= FIRST_TRACK:
+    if KIND[channel] >= FIRST_TRACK:
         middle = (count - 1 - MIDDLE // 2) % KEPT
         gap = stamp - past.stamp_ns[channel, middle]
         width = _width(past, channel, gap, variance_a, variance_b)
@@ -182,7 +183,7 @@ def _same_as_refused(past: Past, channel: int, a: float, b: float) -> bool:
     last = (past.refused_count[channel] - 1) % AGREED
     return bool(
         a == past.refused[channel, last, 0]
-        and (channel < FIRST_TRACK or b == past.refused[channel, last, 1])
+        and (KIND[channel] < FIRST_TRACK or b == past.refused[channel, last, 1])
     )
 
 
@@ -198,7 +199,7 @@ def _agrees_with_refused(
     gap = stamp - past.refused_ns[channel, 1]
     width = _width(past, channel, gap, variance_a, variance_b)
     last_a, last_b = past.refused[channel, last, 0], past.refused[channel, last, 1]
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         if count == 1:
             width += _BRAKE_M_S2 * gap * 1e-9
         else:  # a car that brakes goes on as it did
@@ -226,7 +227,7 @@ def _is_new_truth(
     if 2 * new >= AGREED - 1:
         return True
     natural = repeats_kept(past, channel, min(past.accepted[channel], KEPT), 0) > REPEATS
-    return natural and (channel >= FIRST_TRACK or a != 0.0)
+    return natural and (KIND[channel] >= FIRST_TRACK or a != 0.0)
 
 
 @compiled(inline=True, uncounted=True)

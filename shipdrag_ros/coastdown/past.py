@@ -17,11 +17,11 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.robust import MAD_TO_SD
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Float64, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, KIND, Channel, Float64, Int64
 
-MOTION = int(Channel.POSITION_GEODETIC) + 1  # the channels before it are judged
-FIRST_TRACK = int(Channel.POSITION)  # this channel and those after it are positions
+FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are positions
 GEODETIC = int(Channel.POSITION_GEODETIC)
+CHANNELS = len(Channel)
 KEPT = 32  # accepted readings that the gate is learnt from
 AGREED = 5  # readings that make a truth: refused ones that agree, and the first ones
 MIDDLE = 5  # readings in the median
@@ -44,7 +44,7 @@ _FIRST_M = 500.0  # that the first fixes may be apart, besides what any ship can
 
 class Past(NamedTuple):
     """
-    What is remembered of the channels before `MOTION`.
+    What is remembered of the channels of the motion.
 
     Attributes
     ----------
@@ -103,23 +103,23 @@ class Past(NamedTuple):
         """
 
         def none() -> Int64:
-            return np.zeros(MOTION, np.int64)
+            return np.zeros(CHANNELS, np.int64)
 
         return cls(
-            np.zeros((MOTION, KEPT, 2)),
-            np.zeros((MOTION, KEPT), np.int64),
+            np.zeros((CHANNELS, KEPT, 2)),
+            np.zeros((CHANNELS, KEPT), np.int64),
             none(),
-            np.full(MOTION, np.inf),
-            np.zeros(MOTION),
+            np.full(CHANNELS, np.inf),
+            np.zeros(CHANNELS),
             none(),
-            np.full(MOTION, _NEVER),
-            none(),
-            none(),
-            np.zeros((MOTION, AGREED, 2)),
+            np.full(CHANNELS, _NEVER),
             none(),
             none(),
-            np.zeros((MOTION, 2), np.int64),
-            np.full(MOTION, _NEVER),
+            np.zeros((CHANNELS, AGREED, 2)),
+            none(),
+            none(),
+            np.zeros((CHANNELS, 2), np.int64),
+            np.full(CHANNELS, _NEVER),
             none(),
             none(),
             np.zeros(KEPT),
@@ -184,17 +184,17 @@ def same_as_last(past: Past, channel: int, a: float, b: float) -> bool:
     last = (past.accepted[channel] - 1) % KEPT
     return bool(
         a == past.value[channel, last, 0]
-        and (channel < FIRST_TRACK or b == past.value[channel, last, 1])
+        and (KIND[channel] < FIRST_TRACK or b == past.value[channel, last, 1])
     )
 
 
 @compiled(uncounted=True)
 def apart(channel: int, a: float, b: float, other_a: float, other_b: float) -> float:
     """Return the distance of two readings [m/s or m]."""
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         return abs(a - other_a)
     x, y = a - other_a, b - other_b
-    if channel == GEODETIC:
+    if KIND[channel] == GEODETIC:
         y -= 360.0 * np.round(y / 360.0)
         x *= M_PER_DEGREE
         y *= M_PER_DEGREE * math.cos(math.radians(other_a))
@@ -207,7 +207,7 @@ def median(past: Past, channel: int, count: int, column: int, near: float) -> fl
     scratch = past.scratch
     for i in range(MIDDLE):
         value = past.value[channel, (count - 1 - i) % KEPT, column]
-        if channel == GEODETIC and column == 1:
+        if KIND[channel] == GEODETIC and column == 1:
             value -= 360.0 * np.round((value - near) / 360.0)
         _insert(scratch, i, value)
     return float(scratch[MIDDLE // 2])
@@ -230,7 +230,8 @@ def repeats_kept(past: Past, channel: int, kept: int, newest: int) -> int:
     for i in range(kept - newest - 1):
         one, other = (number - 1 - i) % KEPT, (number - 2 - i) % KEPT
         repeats += past.value[channel, one, 0] == past.value[channel, other, 0] and (
-            channel < FIRST_TRACK or past.value[channel, one, 1] == past.value[channel, other, 1]
+            KIND[channel] < FIRST_TRACK
+            or past.value[channel, one, 1] == past.value[channel, other, 1]
         )
     return repeats
 
@@ -252,10 +253,10 @@ def learn_gate(past: Past, channel: int) -> None:
     count = past.accepted[channel]
     kept = min(count, KEPT)
     if kept < MIDDLE:
-        if channel >= FIRST_TRACK:
+        if KIND[channel] >= FIRST_TRACK:
             past.gate[channel], past.rate[channel] = _FIRST_M, ABSURD_SPEED_M_S
         return
-    if channel < FIRST_TRACK:
+    if KIND[channel] < FIRST_TRACK:
         _learn_speed(past, channel, count, kept)
     else:
         _learn_track(past, channel, count, kept)

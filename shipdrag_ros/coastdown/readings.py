@@ -63,10 +63,10 @@ def readings(window: Window) -> tuple[Float64, Float64]:
     Through water where there is a log, else over ground; from positions over steps
     that are long enough for them.
     """
-    for series in (window.speed_through_water, window.speed_over_ground):
+    for series in window.each('speed_through_water', 'speed_over_ground'):
         if len(series) >= LEAST_READINGS:
             return clean_readings(seconds(series, window), series.value)
-    track = window.position
+    track = max(window.each('position'), key=len)
     if len(track) < LEAST_READINGS:
         return np.empty(0), np.empty(0)
     time_s = seconds(track, window)

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import COUNT, PER_UNIT, SPEED, Bins
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import UNIT_RATIOS
 from shipdrag_ros.samples import Float64, Int64
 
@@ -116,22 +117,65 @@ def scaled(reading: Float64, truth: Float64) -> Scaled:
         Means over the spans of `EDGES` [m/s], the newest first, n at most all.
     """
     white, added, factors, currents = _settings(len(reading))
-    one, two = white @ truth, white @ reading
     # over ground a current from abeam adds more, the slower she is
     abeam = currents**2 / (2.0 * np.maximum(truth, currents))
-    beside = (white @ abeam[:, :, None])[:, :, 0]
-    inverse = 1.0 / _SCALE[:, None, None]
-    precision = 1.0 / (1.0 + inverse**2 * added)
-    away = one - inverse * two
-    scaled_away = away * precision
-    along, size = (scaled_away * beside).sum(axis=-1), 1.0 + (beside**2 * precision).sum(axis=-1)
-    square = (away * scaled_away - np.log(precision)).sum(axis=-1)
-    logs = square - along**2 / size + np.log(size)
-    each = np.logaddexp.reduce(factors - 0.5 * logs, axis=1)
+    each = np.empty(len(_LN))
+    beside = (white @ abeam[:, :, None]).reshape(added.shape)
+    _evidences(white @ reading, white @ truth, beside, added, factors, each)
     wrong = each + _IS_WRONG
-    log_odds = np.logaddexp.reduce(wrong) - np.logaddexp.reduce(each + _IS_SOUND)
+    log_odds = log_sum(wrong) - log_sum(each + _IS_SOUND)
     scale = float(_SCALE[int(np.argmax(wrong))])
     return Scaled(float(log_odds), scale, int(EDGES[len(reading)]))
+
+
+@compiled(
+    'void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], '
+    'float64[::1])'
+)
+def _evidences(
+    reading: Float64,
+    truth: Float64,
+    beside: Float64,
+    added: Float64,
+    factors: Float64,
+    each: Float64,
+) -> None:
+    """Find the log evidence of each scale, of speeds and a current in whitened directions."""
+    settings, count = reading.shape
+    logs = np.empty(settings)
+    for scale in range(len(_SCALE)):
+        inverse = 1.0 / _SCALE[scale]
+        for setting in range(settings):
+            square, along, size, precisions = 0.0, 0.0, 1.0, 1.0
+            for i in range(count):
+                precision = 1.0 / (1.0 + inverse * inverse * added[setting, i])
+                away = truth[setting, i] - inverse * reading[setting, i]
+                square += away * away * precision
+                along += away * precision * beside[setting, i]
+                size += beside[setting, i] * beside[setting, i] * precision
+                precisions *= precision
+            square += math.log(size / precisions) - along * along / size
+            logs[setting] = factors[setting] - 0.5 * square
+        each[scale] = log_sum(logs)
+
+
+@compiled('float64(float64[::1])')
+def log_sum(logs: Float64) -> float:
+    """
+    Return the logarithm of a sum.
+
+    Parameters
+    ----------
+    logs
+        Logarithms of its terms.
+    """
+    most: float = logs.max()
+    if most == -math.inf:
+        return most
+    total = 0.0
+    for each in logs:
+        total += math.exp(each - most)
+    return most + math.log(total)
 
 
 def means(bins: Bins, source: int, last: int) -> Float64:

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, smoothing, speeds_kept
+from shipdrag_ros.coastdown.bins import CHANNELS, FIRST_TRACK, Bins, line, smoothing, speeds_kept
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import KIND, Float64, Int64
 
 SCALES = 3  # windows of one, two and four times slope_window_s
 _STRIDES_PER_WINDOW = 4
@@ -103,15 +103,15 @@ class Steadiness(NamedTuple):
 
     Attributes
     ----------
-    slope : (sources, SCALES, points + lag + 1)
+    slope : (channels, SCALES, points + lag + 1)
         Slopes at the points [m/s^2]; NaN where there were too few bins.
-    changes : (sources, SCALES, points)
+    changes : (channels, SCALES, points)
         Sizes of the changes between the last of them, ascending; inf for those unknown.
-    due : (sources, SCALES) int64
+    due : (channels, SCALES) int64
         The bin that completes the next point.
-    limit : (sources, SCALES)
+    limit : (channels, SCALES)
         Size of a slope that chance does not explain [m/s^2]; NaN while unknown.
-    slope_sd : (sources, SCALES)
+    slope_sd : (channels, SCALES)
         Standard deviation of a slope [m/s^2].
     scratch : (4 width,)
         Room to sort in: compiled code makes no arrays.
@@ -130,11 +130,11 @@ class Steadiness(NamedTuple):
         Return the state before the first bin.
         """
         return cls(
-            np.full((SOURCES, SCALES, slopes.points + slopes.lag + 1), np.nan),
-            np.full((SOURCES, SCALES, slopes.points), np.inf),
-            np.full((SOURCES, SCALES), NEVER),
-            np.full((SOURCES, SCALES), np.nan),
-            np.full((SOURCES, SCALES), np.nan),
+            np.full((CHANNELS, SCALES, slopes.points + slopes.lag + 1), np.nan),
+            np.full((CHANNELS, SCALES, slopes.points), np.inf),
+            np.full((CHANNELS, SCALES), NEVER),
+            np.full((CHANNELS, SCALES), np.nan),
+            np.full((CHANNELS, SCALES), np.nan),
             np.empty(4 * slopes.width),
         )
 
@@ -232,7 +232,7 @@ def white_sd_of_slopes(bins: Bins, source: int, last: int, width: int, scratch: 
     NaN while fewer than half a window's changes from bin to bin are known.
     """
     # speeds from positions are averages over this many bins, and so are their errors
-    apart = 2 * smoothing(width) if source >= FIRST_TRACK else 1
+    apart = 2 * smoothing(width) if KIND[source] >= FIRST_TRACK else 1
     count = speeds_kept(bins, source, last, 4 * width, scratch) - apart
     if 2 * count < width or count < 4:
         return np.nan

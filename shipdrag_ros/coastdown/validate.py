@@ -39,7 +39,7 @@ from shipdrag_ros.coastdown.outliers import (
     sticks,
     take,
 )
-from shipdrag_ros.coastdown.past import Past
+from shipdrag_ros.coastdown.past import CHANNELS, Past
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
@@ -47,6 +47,7 @@ from shipdrag_ros.samples import (
     ABSURD_SPEED_M_S,
     BACKWARD_JUMP_NS,
     FUTURE_NS,
+    KIND,
     SECOND_NS,
     Block,
     Channel,
@@ -56,7 +57,6 @@ from shipdrag_ros.samples import (
     UInt8,
 )
 
-CHANNELS = len(Channel)
 NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
 AGREED = 3  # stamps in a row that make a clock that was set: two may be a slip
 
@@ -75,15 +75,15 @@ _ABSURD = int(Reason.ABSURD)
 _FROZEN = int(Reason.FROZEN)
 _OUTLIER = int(Reason.OUTLIER)
 
-_SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this channel and those before it
+_SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this kind and those before it
 _POSITION = int(Channel.POSITION)
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 # The motion of a ship at sea never repeats to the last bit; a stopped shaft, a rudder
 # amidships, a steady depth and a course held by a coarse compass do, and rightly.
-_MOTION = int(Channel.POSITION_GEODETIC)  # this channel and those before it
+_MOTION = int(Channel.POSITION_GEODETIC)  # this kind and those before it
 _TWO_COLUMNS = np.array(
     [
-        channel in (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
+        channel.kind in (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
         for channel in Channel
     ]
 )
@@ -197,13 +197,13 @@ def examine(
         return _NAN
     if np.isinf(a) or (two and np.isinf(b)):
         return _INFINITE
-    if channel <= _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
+    if KIND[channel] <= _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
         return _ABSURD
-    if channel > _MOTION:
+    if KIND[channel] > _MOTION:
         return _ACCEPTED
-    if channel == _GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
+    if KIND[channel] == _GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
         return _ABSURD
-    if channel == _POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
+    if KIND[channel] == _POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
         return _ABSURD
     if (
         a == guard.held[channel, 0]
@@ -233,7 +233,7 @@ def remember(
     """
     Take an accepted sample into the memory of the tests.
     """
-    if channel <= _MOTION:
+    if KIND[channel] <= _MOTION:
         take(guard.past, channel, stamp, a, b, variance_a, variance_b)
     guard.back[channel] = 0
     guard.last_ns[channel] = stamp

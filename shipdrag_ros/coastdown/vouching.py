@@ -11,9 +11,9 @@ Gaussians of fixed covariance, so that an evidence is a sum.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -23,16 +23,18 @@ from shipdrag_ros.coastdown.bins import (
     COUNT,
     FIRST_TRACK,
     PER_UNIT,
+    RANK,
     SOURCES,
     SPEED,
     Bins,
     smoothing,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
-from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, means, scaled
+from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, log_sum, means, scaled
 from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import mistaken_units, utc
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Int64
+from shipdrag_ros.samples import KIND, SECOND_NS, Block, Channel, Float64, Int64
 
 LOOK_S = 10  # from one look to the next
 _LASTS_S = 70  # a contradiction that lasts so long: its source is no longer used ...
@@ -59,8 +61,10 @@ _JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
 _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
 _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
+_FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 _STILL = 0.5  # share of minutes of a source that was wrong just before
 
+_KIND, _RANK = KIND.tolist(), RANK.tolist()
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
 _KM = Scaled(_MEANS * math.log(1e3), 1e-3, _MEAN_S * _MEANS)
 _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
@@ -109,34 +113,43 @@ def _one_ship(logs: int, grounds: int, tracks: int, length_m: float) -> SpeedMix
     return _mixture(parts)
 
 
+def _in_order(speeds: Mapping[int, Float64]) -> dict[int, Float64]:
+    return {source: speeds[source] for source in sorted(speeds, key=_RANK.__getitem__)}
+
+
 def _evidence(mixture: SpeedMixture, speed: Float64) -> float:
-    precision, factor = mixture
-    return _log_sum((factor - 0.5 * ((precision @ speed) @ speed)).tolist())
+    return log_sum(_log_densities(*mixture, speed))
 
 
-def _log_sum(logs: list[float]) -> float:
-    most = max(logs)
-    if most == -math.inf:
-        return most
-    return most + math.log(math.fsum(math.exp(each - most) for each in logs))
+@compiled('float64[::1](float64[:, :, ::1], float64[::1], float64[::1])')
+def _log_densities(precision: Float64, factor: Float64, speed: Float64) -> Float64:
+    """Return of each Gaussian of a mixture its share of the density there, as a logarithm."""
+    size, each = len(speed), factor.copy()
+    for part in range(len(factor)):
+        for row in range(size):
+            along = 0.5 * precision[part, row, row] * speed[row]
+            for column in range(row):
+                along += precision[part, row, column] * speed[column]
+            each[part] -= along * speed[row]
+    return each
 
 
 def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     """Return the log evidence that some sources measure one ship."""
-    logs = int(_LOG in speeds)
-    tracks = sum(source >= FIRST_TRACK for source in speeds)
+    logs = sum(_KIND[source] == _LOG for source in speeds)
+    tracks = sum(_KIND[source] >= FIRST_TRACK for source in speeds)
     mixture = _one_ship(logs, len(speeds) - logs - tracks, tracks, craft.length_m)
     ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
-    through = float(speeds[_LOG].mean()) if logs else 0.0
+    of_logs = {source: each for source, each in speeds.items() if _KIND[source] == _LOG}
+    through = float(np.mean(list(of_logs.values()))) if logs else 0.0
     if through >= 0.0:
         return ahead
     # she makes way astern: over ground a speed has no sign
     pace = through / craft.slow_m_s
     rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
-    other = {**speeds, _LOG: -speeds[_LOG]}
-    return min(rare, 0.0) + _log_sum(
-        [ahead, _evidence(mixture, np.concatenate(list(other.values())))]
-    )
+    other = {**speeds, **{source: -each for source, each in of_logs.items()}}
+    astern = _evidence(mixture, np.concatenate(list(other.values())))
+    return min(rare, 0.0) + float(np.logaddexp(ahead, astern))
 
 
 class Soundness(NamedTuple):
@@ -180,31 +193,38 @@ def sound_probabilities(
     scales
         What the record says of each, the first, being another, the second, in a wrong scale.
     """
-    names, found = sorted(speeds), {}
+    names, found = sorted(speeds, key=_RANK.__getitem__), {}
     in_a_scale: dict[int, list[float]] = {name: [] for name in names}
-    for count in range(len(names) + 1):
+
+    @cache
+    def measured(*sound: int) -> float:
+        return _measured({name: speeds[name] for name in sound}, craft)
+
+    nothing = {name: _evidence(_nothing(), speeds[name]) for name in names}
+    least = 0 if len(names) <= _FEW else len(names) - _MOST_WRONG
+    for count in range(least, len(names) + 1):
         for sound in combinations(names, count):
             part = {name: speeds[name] for name in sound}
-            logs, ratio = [_measured(part, craft)] if sound else [], {}
+            logs, ratio = [measured(*sound)] if sound else [], {}
             for name in names:
-                share = _STILL if name in doubted else _WRONG_SHARE[name]
+                share = _STILL if name in doubted else _WRONG_SHARE[_KIND[name]]
                 logs.append(math.log(1.0 - share if name in sound else share))
                 if name not in sound:
-                    nothing = _evidence(_nothing(), speeds[name])
-                    beside = _beside(name, part, speeds[name], scales or {}, craft)
-                    each = [
-                        math.log(1.0 - _IN_A_SCALE[name]) + nothing,
-                        math.log(_IN_A_SCALE[name]) + beside - (logs[0] if sound else 0.0),
-                    ]
-                    ratio[name] = each[1] - _log_sum(each)
-                    logs.append(_log_sum(each))
+                    beside = _beside(name, part, speeds[name], scales or {}, craft, measured)
+                    beside += math.log(_IN_A_SCALE[_KIND[name]]) - (logs[0] if sound else 0.0)
+                    other = math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing[name]
+                    logs.append(float(np.logaddexp(other, beside)))
+                    ratio[name] = beside - logs[-1]
             found[sound] = math.fsum(logs)
             for name, share in ratio.items():
                 in_a_scale[name].append(found[sound] + share)
-    total = _log_sum(list(found.values()))
+    total = float(np.logaddexp.reduce(list(found.values())))
     return Soundness(
         {sound: math.exp(each - total) for sound, each in found.items()},
-        {name: math.exp(_log_sum(logs) - total) for name, logs in in_a_scale.items()},
+        {
+            name: math.exp(float(np.logaddexp.reduce(logs)) - total)
+            for name, logs in in_a_scale.items()
+        },
     )
 
 
@@ -214,19 +234,20 @@ def _beside(
     speed: Float64,
     scales: Mapping[tuple[int, int], Scaled],
     craft: Craft,
+    measured: Callable[..., float],
 ) -> float:
     """Return the log evidence of sound sources and of one that is the ship in a wrong scale."""
-    if name == _METRES and sound:
+    if _KIND[name] == _METRES and sound:
         scaled_up = {**sound, name: speed / _KM.scale}
-        return _KM.log_odds + _measured(dict(sorted(scaled_up.items())), craft)
+        return _KM.log_odds + _measured(_in_order(scaled_up), craft)
     found = -math.inf
-    if name == _LOG and sound:
-        found = math.log(_REVERSED) + _measured({_LOG: -speed, **sound}, craft)
+    if _KIND[name] == _LOG and sound:
+        found = math.log(_REVERSED) + _measured(_in_order({name: -speed, **sound}), craft)
     # a track has no scale, and no current is between it and a speed over ground
-    for other in sorted(sound, reverse=name != _LOG):
+    for other in sorted(sound, key=_RANK.__getitem__, reverse=_KIND[name] != _LOG):
         if (name, other) in scales:
-            both = dict(sorted({**sound, name: speed}.items()))
-            return _log_sum([scales[name, other].log_odds + _measured(both, craft), found])
+            both = measured(*_in_order({**sound, name: speed}))
+            return float(np.logaddexp(scales[name, other].log_odds + both, found))
     return found
 
 
@@ -262,18 +283,19 @@ class Vouching:
 
     Attributes
     ----------
-    until : (sources,) int64
+    until : (channels,) int64
         Second up to which each source is not used; what it read before then never is.
     """
 
     def __init__(self, craft: Craft) -> None:
-        self.until: Int64 = np.full(SOURCES, NEVER)
+        self.until: Int64 = np.full(len(Channel), NEVER)
         self._craft = craft
-        self._since: Int64 = np.full(SOURCES, NEVER)  # of a contradiction that goes on
-        self._nothing: Int64 = np.full(SOURCES, NEVER)  # when each last said nothing of the ship
+        self._since: Int64 = np.full(len(Channel), NEVER)  # of a contradiction that goes on
+        self._nothing: Int64 = np.full(len(Channel), NEVER)  # when each last said nothing of her
         self._now = NEVER
         self._said: dict[str, Contradiction] = {}
-        self._scaled = (NEVER, 0.0)  # when it was last known whether the log is, and how probable
+        # when it was last known of each log whether it is, and how probable
+        self._scaled: dict[int, tuple[int, float]] = {}
 
     @property
     def texts(self) -> dict[str, str]:
@@ -286,11 +308,14 @@ class Vouching:
         return self.left_out or {name: one.text for name, one in self._said.items()}
 
     @property
-    def log_doubt(self) -> float:
-        """Probability that the log is in a wrong scale, though it is used."""
-        when, doubt = self._scaled
-        known = when > self._now - EDGES[-1] and self.until[_LOG] <= self._now
-        return doubt if known else 0.0
+    def log_doubt(self) -> tuple[str, float]:
+        """The log most probably in a wrong scale, though it is used, and that probability."""
+        known = {
+            Channel(log).input: doubt
+            for log, (when, doubt) in self._scaled.items()
+            if when > self._now - EDGES[-1] and self.until[log] <= self._now
+        }
+        return max(known.items(), key=lambda one: one[1], default=('', 0.0))
 
     @property
     def left_out(self) -> dict[str, str]:
@@ -338,13 +363,12 @@ class Vouching:
         if not doubted.any():
             return bins
         closed, filling = bins.closed.copy(), bins.filling.copy()
-        closed[:SOURCES][doubted] = filling[:SOURCES][doubted] = NEVER
+        closed[doubted] = filling[doubted] = NEVER
         return bins._replace(closed=closed, filling=filling)
 
     def kept(self, block: Block) -> Block:
         """Return a block without what sources read up to the second since which they are used."""
-        first_ns = np.full(len(Channel), NEVER)
-        first_ns[:SOURCES] = np.maximum(self.until, NEVER // SECOND_NS) * SECOND_NS
+        first_ns = np.maximum(self.until, NEVER // SECOND_NS) * SECOND_NS
         return block[block.stamp_ns >= first_ns[block.channel]]
 
     def look(self, bins: Bins, number: int, width: int, *, hold: bool) -> list[int]:
@@ -378,8 +402,8 @@ class Vouching:
         last = number - _LATE_S - lag
         speeds = {
             source: mean
-            for source in range(SOURCES)
-            if len(mean := _means(bins, source, last + lag * (source >= FIRST_TRACK)))
+            for source in SOURCES.tolist()
+            if len(mean := _means(bins, source, last + lag * (_KIND[source] >= FIRST_TRACK)))
         }
         table = np.array(list(speeds.values()))
         if len(speeds) < 2 or np.abs(table.mean(axis=1)).max() < self._craft.slow_m_s:
@@ -389,8 +413,8 @@ class Vouching:
         doubted = [source for source in speeds if self.until[source] > number]
         scales = _scales(bins, speeds, last, lag, self._nothing)
         found = sound_probabilities(speeds, self._craft, doubted=doubted, scales=scales)
-        if any(one == _LOG for one, _ in scales):
-            self._scaled = (number, found.scaled[_LOG])
+        logs = {one for one, _ in scales if _KIND[one] == _LOG}
+        self._scaled |= {source: (number, found.scaled[source]) for source in logs}
         wrong = {source: found.wrong(source) for source in speeds}
         contradiction = found.sets[tuple(speeds)] < 1.0 - _WRONG
         left = len(speeds) - len(doubted)
@@ -427,11 +451,12 @@ def _scales(
 ) -> dict[tuple[int, int], Scaled]:
     """Say of each speed whether it is another one in a wrong scale."""
     read = {
-        source: means(bins, source, last + lag * (source >= FIRST_TRACK)) for source in sources
+        source: means(bins, source, last + lag * (_KIND[source] >= FIRST_TRACK))
+        for source in sources
     }
     found = {}
     for one, other in combinations(read, 2):
-        if one >= FIRST_TRACK:
+        if _KIND[one] >= FIRST_TRACK:
             continue
         count = min(len(read[one]), len(read[other]))
         both = np.array([read[one][:count], read[other][:count]])
@@ -443,7 +468,7 @@ def _scales(
         count = count if way.all() else int(np.argmin(way))
         if count:
             found[one, other] = both_ways = scaled(*both[:, :count])
-            if other < FIRST_TRACK:  # which of two is wrong is known beforehand alone
+            if _KIND[other] < FIRST_TRACK:  # which of two is wrong is known beforehand alone
                 found[other, one] = both_ways._replace(scale=1.0 / both_ways.scale)
     return found
 
@@ -451,9 +476,11 @@ def _scales(
 def _means(bins: Bins, source: int, last: int) -> Float64:
     """Return means of the speed [m/s] up to a second; none where one is missing."""
     totals, newest = bins.speeds[source], int(bins.closed[source])
+    if newest < last - LOOK_S:
+        return np.empty(0)
     edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
     each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
-    if newest < last - LOOK_S or not each[:, COUNT].all():
+    if not each[:, COUNT].all():
         return np.empty(0)
     return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
 
@@ -473,7 +500,7 @@ def _doubt(
     instead = ', which is used instead' if used[best] and not used[source] else ''
     units = mistaken_units(mine / other) if other else ''
     near = f' (near {units})' if units else ''
-    alone = all(each >= FIRST_TRACK for each in others)
+    alone = all(_KIND[each] >= FIRST_TRACK for each in others)
     less = '; of a speed over ground less is needed than of positions alone' if alone else ''
     why = (
         f'over a minute up to {utc(number * SECOND_NS)} it read {mine:.2f} ± '

@@ -310,13 +310,16 @@ def observed(
     """
     seen: list[Observation] = []
     refused: dict[str, DiagnosisError | EstimationError] = {}
+    notes: list[str] = []
     for done, run in enumerate(runs):
         progress('learning the noise before the stop, of each run', done, len(runs))
+        window = run.window.one_of_each()
+        notes += [f'{run.name}: {note}' for note in window.notes[len(run.window.notes) :]]
         try:
             by_s = moved_s.get(run.name, 0.0)
             seen.append(
                 Observation.of(
-                    run.window,
+                    window,
                     usual_baseline(run.ship or ship),
                     parameters,
                     name=run.name,
@@ -328,7 +331,7 @@ def observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes += [f'left out: {name}: {why}' for name, why in refused.items()]
     notes += [
         f'{run.name}: the shaft ran down in {run.context.stop.shaft_s:.2g} s, where the ship file '
         f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'

@@ -269,7 +269,10 @@ class SharedBaseline:
             About the fit of all runs at once.
         """
         ship = _opened(ship)
-        seen = [Observation.of(run.window, ship, parameters, name=run.name) for run in runs]
+        seen = [
+            Observation.of(run.window.one_of_each(), ship, parameters, name=run.name)
+            for run in runs
+        ]
         comparing = Comparing(ship_runs(seen, ship), ship, ())
         fitted = next(fit for fit in comparing.compare().fitted if fit.names == NONE)
         if fitted.tables is None:

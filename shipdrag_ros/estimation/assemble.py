@@ -61,7 +61,7 @@ def assembled(estimator: str, valid: ValidRange, end: AtEnd, **others: Any) -> E
     )
 
 
-def log_scale_note(scale: float, sd: float) -> str:
+def log_scale_note(scale: float, sd: float, which: str = 'log') -> str:
     """
     Say by how much a log is off, and that the band holds it.
 
@@ -69,8 +69,10 @@ def log_scale_note(scale: float, sd: float) -> str:
     ----------
     scale, sd
         Mean and standard deviation of reading / speed - 1.
+    which
+        Log it is.
     """
     return (
-        f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard deviations): '
-        'taken out, and in the band'
+        f'the {which} reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
+        'deviations): taken out, and in the band'
     )

@@ -18,7 +18,6 @@ from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
 _LARGEST = 1e9  # m, m/s: far above any ship's, and far below where squares and powers overflow
@@ -34,16 +33,16 @@ def _usable(window: Window) -> Window:
         If no other input of motion is there.
     """
     why = ''
-    for name in MOTION_INPUTS:
+    for name in window.motion:
         parts = (window,) if window.before is None else (window, window.before)
-        size = np.abs(np.concatenate([getattr(part, name).value.ravel() for part in parts]))
+        size = np.abs(np.concatenate([part.series(name).value.ravel() for part in parts]))
         if np.any(size > _LARGEST):
             why = (
                 f'it holds {size.max():.3g}, which no ship has: give metres and metres a second, '
                 'and leave such readings out'
             )
             window = window.without(name, why)
-    if why and not any(len(getattr(window, name)) for name in MOTION_INPUTS):
+    if why and not any(len(window.series(name)) for name in window.motion):
         raise EstimationError(window.notes[-1])
     return window
 

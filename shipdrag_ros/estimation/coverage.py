@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS
+from shipdrag_ros.samples import SECOND_NS
 
 _GAP_S = 10.0  # without a sample, and more than _GAP_STEPS usual steps: a gap
 _GAP_STEPS = 5.0
@@ -54,9 +54,9 @@ def coverage_notes(window: Window) -> tuple[str, ...]:
     before = window if window.before is None else window.before
     length = (window.end_ns - window.start_ns) / SECOND_NS
     missing = {}
-    for name in MOTION_INPUTS:
-        series: Series = getattr(window, name)
-        if len(series) or len(getattr(before, name)):
+    for name in window.motion:
+        series = window.series(name)
+        if len(series) or len(before.series(name)):
             missing[name] = missing_s(series, window.start_ns, window.end_ns)
     notes = []
     for name, seconds in missing.items():

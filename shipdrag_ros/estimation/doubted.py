@@ -16,7 +16,6 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 LEFT_OUT = 0.05  # what a band of two standard deviations leaves out: a doubt below it adds nothing
-_LOG = 'speed_through_water'
 
 
 def averaged(estimator: WindowEstimator) -> WindowEstimator:
@@ -36,16 +35,17 @@ def averaged(estimator: WindowEstimator) -> WindowEstimator:
 
     def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         found, doubt = estimator(window, ship, parameters), window.log_doubt
-        if not doubt > LEFT_OUT or _LOG not in found.samples:
+        log = window.doubted_log
+        if not doubt > LEFT_OUT or log not in found.samples:
             return found
         why = f'with a probability of {doubt:.2f} it is in a wrong scale'
         try:
-            other = estimator(window.without(_LOG, why), ship, parameters)
+            other = estimator(window.without(log, why), ship, parameters)
         except EstimationError as error:
             raise EstimationError(
-                f'{_LOG}: {why}; without it, {error}: calibrate it, or give a speed over ground'
+                f'{log}: {why}; without it, {error}: calibrate it, or give a speed over ground'
             ) from error
-        return _mixed(found, other, doubt, f'{_LOG}: {why}: averaged over with it and without it')
+        return _mixed(found, other, doubt, f'{log}: {why}: averaged over with it and without it')
 
     return estimate
 

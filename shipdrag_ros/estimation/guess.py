@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.steady import block_medians
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
@@ -49,12 +49,8 @@ class InitialGuess:
         EstimationError
             If the ship does not slow down.
         """
-        kind = POSITION
-        for wanted in (LOG, OVER_GROUND):
-            if np.any(coast.kind == wanted):
-                kind = wanted
-                break
-        chosen = coast.kind == kind
+        code = min(np.unique(coast.kind).tolist(), key=lambda code: (code % KIND_COUNT, code))
+        kind, chosen = code % KIND_COUNT, coast.kind == code
         time_s, value = coast.time_s[chosen], coast.value[chosen]
         blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
         count = min(blocks, len(time_s) // 4)

@@ -19,7 +19,7 @@ from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.rows import CODES, LOG, Rows
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
@@ -130,10 +130,12 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
     )
     yield f'averaged over what the hull may differ by: {chances}'
     sd = np.sqrt(np.diag(found.covariance))
-    if 'speed_through_water' in record.stamps:
-        if len(record.stamps) > 1:
-            yield log_scale_note(float(found.mean[k + motion.SCALE]), float(sd[k + motion.SCALE]))
-    else:
+    logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
+    for name, code in logs.items() if len(record.stamps) > 1 else ():
+        at = k + motion.own(code) + motion.SCALE
+        which = 'log' if len(logs) == 1 else f'log {name}'
+        yield log_scale_note(float(found.mean[at]), float(sd[at]), which)
+    if not logs:
         yield (
             f'a current is part of the speed: one of ± {2.0 * sd[k + motion.CURRENT]:.2g} m/s '
             '(two standard deviations) is in the band'
@@ -191,7 +193,7 @@ def _result(
         chosen = coast.kind == CODES[name]
         measured = coast.value[chosen]
         tracks[name] = Track(times, measured, measured - table[0, chosen])
-    over_ground = bool(record.stamps.keys() - {'speed_through_water'})
+    over_ground = any(CODES[name] % KIND_COUNT != LOG for name in record.stamps)
     current = k + motion.CURRENT
     return assembled(
         NAME,

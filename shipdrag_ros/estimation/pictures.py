@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from shipdrag_ros.display import TRACK_LABELS, force_unit, power_unit, speed_unit
+from shipdrag_ros.display import force_unit, power_unit, speed_unit, track_label
 from shipdrag_ros.estimation.force import Force, ForceCurve, clean_hull
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
@@ -79,7 +79,7 @@ def _draw_track(
     top: Axes, bottom: Axes, name: str, track: Track, given: tuple[int, float]
 ) -> None:
     start_ns, mass_kg = given
-    label, unit = TRACK_LABELS.get(name, (name, ''))
+    label, unit = track_label(name)
     scale, unit = speed_unit(mass_kg) if unit == 'm/s' else (1.0, unit)
     time_min = (track.time_ns - start_ns) * 1e-9 / 60.0
     measured, fitted = track.measured / scale, track.fitted / scale

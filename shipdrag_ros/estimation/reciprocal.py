@@ -87,12 +87,7 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
     if len(estimates) < 2:
         raise EstimationError(f'{len(estimates)} coastdown(s) to combine, give two or more')
     along = _along_first(headings_rad)
-    over_ground = np.array(
-        [
-            'speed_through_water' not in item.samples and item.current_m_s is None
-            for item in estimates
-        ]
-    )
+    over_ground = np.array([not item.by_log and item.current_m_s is None for item in estimates])
     current, current_sigma = _current(estimates, along)
     if current is None and over_ground.any():
         current, current_sigma = _agreement(estimates, over_ground, along)

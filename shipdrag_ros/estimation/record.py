@@ -20,7 +20,7 @@ from shipdrag_ros.estimation.steady import (
     weighted_white_sd,
 )
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import CODES, Rows
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 
@@ -70,10 +70,12 @@ class RunRows:
             If no input has enough samples, or none can be used.
         """
         inputs = {
-            name: series for name in CODES if len(series := getattr(window, name)) >= LEAST_STAMPS
+            name: series for name in CODES if len(series := window.series(name)) >= LEAST_STAMPS
         }
         if not inputs:
-            found = ', '.join(f'{name} {len(getattr(window, name))}' for name in CODES)
+            found = ', '.join(
+                f'{name} {len(window.series(name))}' for name in CODES if name in window.motion
+            )
             raise EstimationError(
                 f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
                 'one of them: give a longer window'
@@ -81,9 +83,8 @@ class RunRows:
         _check_finite(inputs)
         zero_ns = run_down.stop_ns
         known = {
-            'speed_through_water': parameters.speed_sigma_m_s,
-            'speed_over_ground': parameters.speed_sigma_m_s,
-            'position': parameters.position_sigma_m,
+            name: parameters.position_sigma_m if _is_place(name) else parameters.speed_sigma_m_s
+            for name in inputs
         }
         since = -np.inf if window.before is None else _steady_since(window, inputs, zero_ns)
         each_input, refused = {}, {}
@@ -144,18 +145,18 @@ def _condensed(
     name: str, window: Window, zero_ns: int, since_s: float, known_sd: float
 ) -> _InputRows:
     """Take one input as it is from the stop on, and as means from `since_s` up to it."""
-    series: Series = getattr(window, name)
+    series = window.series(name)
     time_s, value = _seconds(series.time_ns, zero_ns), series.value
     before_s: Float64 = np.empty(0)
     before, variance = value[:0], series.variance[:0]
     if window.before is not None:
-        earlier: Series = getattr(window.before, name)
+        earlier = window.before.series(name)
         before_s = _seconds(earlier.time_ns, zero_ns)
         keep = before_s >= since_s
         before_s, before, variance = before_s[keep], earlier.value[keep], earlier.variance[keep]
     both_s = np.concatenate([before_s, time_s])
     both = np.concatenate([before, value])
-    if name == 'position':
+    if _is_place(name):
         both = _distance(both_s, both)
     before, value = both[: len(before_s)], both[len(before_s) :]
     weight = stated_weight(both_s, both, np.concatenate([variance, series.variance]))
@@ -166,6 +167,10 @@ def _condensed(
         steady = (means[0], CODES[name], *means[1:])
     coast = (time_s, CODES[name], value, weight[len(before_s) :])
     return _InputRows(coast, steady, white_sd, display_sd(series.value, white_sd))
+
+
+def _is_place(name: str) -> bool:
+    return CODES[name] % KIND_COUNT == POSITION
 
 
 def _check_finite(inputs: dict[str, Series]) -> None:
@@ -198,13 +203,13 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
     assert window.before is not None
     heading = window.before.heading
     heading_s = _seconds(heading.time_ns, zero_ns)
-    for name in ('speed_through_water', 'speed_over_ground'):
-        if name in inputs:
-            series: Series = getattr(window.before, name)
+    for name in sorted(inputs, key=lambda name: CODES[name] % KIND_COUNT):
+        if not _is_place(name):
+            series = window.before.series(name)
             time_s = _seconds(series.time_ns, zero_ns)
             return float(steady_since(time_s, series.value, heading_s, heading.value))
     # positions alone do not show it from sample to sample: by their means
-    series = window.before.position
+    series = window.before.series(next(iter(inputs)))
     if len(series) < LEAST_STAMPS:
         return np.inf
     time_s = _seconds(series.time_ns, zero_ns)

@@ -199,6 +199,11 @@ class Estimate:
         return self.conditions.between(*self.froude_valid)
 
     @property
+    def by_log(self) -> bool:
+        """Whether a speed through water was measured."""
+        return any(name.startswith('speed_through_water') for name in self.samples)
+
+    @property
     def duration_s(self) -> float:
         """Length of the window [s]."""
         return float(np.int64(self.end_ns) - np.int64(self.start_ns)) * 1e-9

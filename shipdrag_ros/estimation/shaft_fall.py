@@ -66,7 +66,7 @@ class Slowing:
         """
         Take it from a speed that was read, in medians; None where there is none.
         """
-        for series in (window.speed_through_water, window.speed_over_ground):
+        for series in window.each('speed_through_water', 'speed_over_ground'):
             if len(series) >= _BLOCKS:
                 time_s = (series.time_ns - window.start_ns) * 1e-9
                 parts = np.array_split(np.arange(len(series)), _BLOCKS)
@@ -231,7 +231,7 @@ def say(
             return f'{name} stood before the stop too: it shows nothing, or its sensor is dead'
         return f'{name} stands whenever it is heard in the window: no thrust is left then'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
-    for speed in (window.speed_through_water, window.speed_over_ground):
+    for speed in window.each('speed_through_water', 'speed_over_ground'):
         later = speed.value[speed.time_ns >= since_ns]
         if len(later) >= _FEW:
             slowed, of_shaft = _ratio(later), _ratio(rate)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shipdrag_ros import display
-from shipdrag_ros.display import Table, force_unit, power_unit, speed_unit
+from shipdrag_ros.display import Table, force_unit, power_unit, speed_unit, track_label
 from shipdrag_ros.estimation import words
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
@@ -16,7 +16,6 @@ from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
-_UNITS = {'speed_through_water': 'm/s', 'speed_over_ground': 'm/s', 'position': 'm'}
 _COUNT = 10
 FORCE = 'Resistance and effective power; ± is two standard deviations'
 SPECIFIC = 'Specific resistance r in SI; sigma is one standard deviation'
@@ -149,7 +148,7 @@ def facts(estimate: Estimate) -> Table:
         (
             'noise found',
             ', '.join(
-                f'{sd:.3g} {_UNITS.get(name, "")} {name}' for name, sd in estimate.noise_sd.items()
+                f'{sd:.3g} {track_label(name)[1]} {name}' for name, sd in estimate.noise_sd.items()
             ),
         ),
         ('valid range', f'Fr {low:.3f} to {high:.3f}'),

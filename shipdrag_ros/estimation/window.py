@@ -9,12 +9,23 @@ and in the order of time, however the record was cut on the way here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, Float64, Int64
+from shipdrag_ros.samples import (
+    FURTHER,
+    GEODETIC,
+    MOTION_INPUTS,
+    PITCHES,
+    SHAFTS,
+    Block,
+    Channel,
+    Float64,
+    Int64,
+)
 
 _PLANE = ('position', 'wind_apparent')  # inputs of two columns
 # WGS84
@@ -70,8 +81,10 @@ class Window:
         Of the water [m].
     notes
         What was left out, a sentence each.
-    log_doubt
-        Probability that the log is in a wrong scale.
+    further
+        Series of further instruments, by the name of the input; of those heard.
+    doubted_log, log_doubt
+        The log most probably in a wrong scale, and that probability.
     before
         The record that ends where this window starts, positions in the same
         plane; None where there is none.
@@ -94,6 +107,8 @@ class Window:
     wind_apparent: Series
     depth: Series
     notes: tuple[str, ...] = ()
+    further: Mapping[str, Series] = field(default_factory=dict)
+    doubted_log: str = 'speed_through_water'
     log_doubt: float = 0.0
     before: Window | None = None
 
@@ -101,6 +116,61 @@ class Window:
     def shaft(self) -> Series:
         """The first shaft that has been heard; empty where none has."""
         return next((shaft for shaft in self.shafts if len(shaft)), self.shafts[0])
+
+    def series(self, name: str) -> Series:
+        """
+        Return an input by its name; empty of a further instrument that was not heard.
+        """
+        if name not in FURTHER:
+            found: Series = getattr(self, name)
+            return found
+        if name in self.further:
+            return self.further[name]
+        none: Series = getattr(self, FURTHER[name])
+        return Series(none.time_ns[:0], none.value[:0], none.variance[:0])
+
+    def each(self, *kinds: str) -> tuple[Series, ...]:
+        """
+        Return the series of kinds of input, the first instrument of each first.
+        """
+        return tuple(
+            self.series(name)
+            for kind in kinds
+            for name in (kind, *(each for each in self.further if FURTHER[each] == kind))
+        )
+
+    def one_of_each(self) -> Window:
+        """
+        Return a window with one instrument of each kind, the first that was heard.
+
+        A note names the others, and says what a speed reads against that of the one used.
+        """
+        if not self.further:
+            return self
+        heard = [name for name in self.motion if len(self.series(name))]
+        chosen = {FURTHER.get(name, name): name for name in reversed(heard)}
+        notes = []
+        for name in heard:
+            used, reads = self.series(chosen[FURTHER.get(name, name)]), self.series(name)
+            if used is reads:
+                continue
+            notes.append(f'{name} is not used beside {chosen[FURTHER.get(name, name)]}')
+            if reads.value.ndim == 1:
+                beside = np.interp(reads.time_ns, used.time_ns, used.value)
+                more = float(np.median(reads.value) / np.median(beside)) - 1.0
+                notes[-1] += f', against which it reads {100.0 * more:+.1f} %'
+
+        def alone(window: Window) -> Window:
+            changes: dict[str, Any] = {kind: window.series(name) for kind, name in chosen.items()}
+            return replace(window, further={}, **changes)
+
+        before = None if self.before is None else alone(self.before)
+        return replace(alone(self), before=before, notes=(*self.notes, *notes))
+
+    @property
+    def motion(self) -> tuple[str, ...]:
+        """Inputs that show how the ship moves: the first of each kind, and others heard."""
+        return (*MOTION_INPUTS, *self.further)
 
     def part(self, start_ns: int, end_ns: int) -> Window:
         """
@@ -124,8 +194,9 @@ class Window:
         changes: dict[str, Any] = {
             name: tuple(map(cut, found)) if isinstance(found, tuple) else cut(found)
             for name, found in vars(self).items()
-            if name not in ('start_ns', 'end_ns', 'notes', 'log_doubt', 'before')
+            if isinstance(found, Series) or name in ('shafts', 'pitches')
         }
+        changes['further'] = {name: cut(found) for name, found in self.further.items()}
         before = self.before if start_ns == self.start_ns else None
         return replace(self, start_ns=start_ns, end_ns=end_ns, before=before, **changes)
 
@@ -133,10 +204,13 @@ class Window:
         """
         Leave out an input, in the record before too; the reason becomes a note.
         """
-        none = getattr(self, name)
-        none = Series(none.time_ns[:0], none.value[:0], none.variance[:0])
+        found = self.series(name)
+        none = Series(found.time_ns[:0], found.value[:0], found.variance[:0])
         before = None if self.before is None else self.before.without(name, why)
-        changes: dict[str, Any] = {name: none, 'before': before}
+        changes: dict[str, Any] = {name: none}
+        if name in self.further:
+            changes = {'further': {**self.further, name: none}}
+        changes['before'] = before
         return replace(self, **changes, notes=(*self.notes, f'without {name}: {why}'))
 
     @classmethod
@@ -197,45 +271,55 @@ class Window:
             time_ns = block.stamp_ns[rows]
             if np.any(time_ns[1:] <= time_ns[:-1]):
                 raise ValueError(f'{channel.name}: the stamps do not ascend strictly')
-            columns = 2 if channel.input in _PLANE else 1
+            columns = 2 if channel.kind.input in _PLANE else 1
             value, variance = block.value[rows, :columns], block.variance[rows, :columns]
             if columns == 1:
                 value, variance = value.reshape(-1), variance.reshape(-1)
             return Series(time_ns, value, variance)
 
-        def part(first_ns: int, last_ns: int, position: Series) -> Window:
+        def part(first_ns: int, last_ns: int) -> Window:
             return cls(
                 first_ns,
                 last_ns,
                 series(Channel.SPEED_THROUGH_WATER),
                 series(Channel.SPEED_OVER_GROUND),
-                position,
+                positions(Channel.POSITION),
                 series(Channel.HEADING),
                 tuple(map(series, SHAFTS)),
                 tuple(map(series, PITCHES)),
                 series(Channel.RUDDER),
                 series(Channel.WIND_APPARENT),
                 series(Channel.DEPTH),
+                further={
+                    channel.input: positions(channel) if channel in GEODETIC else series(channel)
+                    for channel in further
+                },
             )
 
-        metres, degrees = series(Channel.POSITION), series(Channel.POSITION_GEODETIC)
-        notes: tuple[str, ...] = ()
-        if len(metres) and len(degrees):
-            notes = (
-                f'position came as metres ({len(metres)}) and as latitude and longitude '
-                f'({len(degrees)}): the larger part was used, the other left out',
-            )
+        there = [Channel(code) for code in np.unique(block.channel[inside]).tolist()]
+        further = [Channel[each.name.replace('_GEODETIC', '')] for each in there]
+        further = [each for each in dict.fromkeys(further) if each.input in FURTHER]
+        each_position = {
+            metres: (series(metres), series(degrees)) for metres, degrees in GEODETIC.items()
+        }
 
-        def position() -> Series:
+        def positions(channel: Channel) -> Series:
+            metres, degrees = each_position[channel]
             if len(degrees) <= len(metres):
-                return series(Channel.POSITION)
-            return _local_plane(series(Channel.POSITION_GEODETIC), degrees.value[0])
+                return series(channel)
+            return _local_plane(series(GEODETIC[channel]), degrees.value[0])
 
-        window = replace(part(start_ns, end_ns, position()), notes=notes)
+        notes = tuple(
+            f'{channel.input} came as metres ({len(metres)}) and as latitude and longitude '
+            f'({len(degrees)}): the larger part was used, the other left out'
+            for channel, (metres, degrees) in each_position.items()
+            if len(metres) and len(degrees)
+        )
+        window = replace(part(start_ns, end_ns), notes=notes)
         if before_ns is None or before_ns >= start_ns:
             return window
         inside = (block.stamp_ns >= before_ns) & (block.stamp_ns < start_ns)
-        return replace(window, before=part(before_ns, start_ns, position()))
+        return replace(window, before=part(before_ns, start_ns))
 
 
 def _local_plane(geodetic: Series, origin: Float64) -> Series:

@@ -32,8 +32,7 @@ def speed_name(estimate: Estimate) -> str:
     """
     Name the speed that a curve is given against.
     """
-    through_water = 'speed_through_water' in estimate.samples
-    return f'speed {"through water" if through_water else "over ground"}'
+    return f'speed {"through water" if estimate.by_log else "over ground"}'
 
 
 def estimator(name: str) -> str:
@@ -242,7 +241,7 @@ def _astern_notes(estimate: Estimate) -> list[str]:
 
 def _method_notes(estimate: Estimate) -> list[str]:
     found = []
-    if 'speed_through_water' not in estimate.samples and estimate.current_m_s is None:
+    if not estimate.by_log and estimate.current_m_s is None:
         found.append(
             'Only the motion over ground was measured, on one run: a current along the track is '
             'not separated and shifts the speed scale; a run on the opposite heading would '

@@ -229,6 +229,6 @@ def _monotone(values: Float64, weights: Float64 | None = None) -> Float64:
 def _as_estimated(speed: Float64, name: str, whole: Estimate) -> Float64:
     """Take from readings what the estimate says that the instrument adds."""
     read, is_so = float(whole.tracks[name].fitted[-1]), whole.last_speed_m_s
-    if name == 'speed_through_water':
+    if name.startswith('speed_through_water'):
         return speed * (is_so / read) if read > 0.0 < is_so else speed
     return speed - (read - is_so)

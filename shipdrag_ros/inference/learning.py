@@ -183,10 +183,10 @@ def _settings(z: Float64, weight: Float64, prior: SizePrior) -> Settings:
 def _prior(seen: Seen, speed_m_s: float) -> SizePrior:
     """Return what instruments, engines, air and water usually do."""
     rows, noise = seen.rows, seen.noise
-    has = np.array([np.any(rows.kind == kind) for kind in range(KIND_COUNT)])
+    has = np.array([rows.of(kind).any() for kind in range(KIND_COUNT)])
 
     def white(kind: int, otherwise: float) -> float:
-        chosen = noise.variance[rows.kind == kind]
+        chosen = noise.variance[rows.of(kind)]
         return float(np.sqrt(np.median(chosen))) if len(chosen) else otherwise
 
     at = max(seen.steady - 1, 0)

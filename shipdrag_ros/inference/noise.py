@@ -18,12 +18,14 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 
-# speed through still water and distance over ground, then the four sources
+# speed through still water and distance over ground, then the sources; behind them the errors of
+# further instruments, two a number
 _U, _X, _GUST, _WATER, _LOG, _PLACE = range(6)
-_STATES = 6
+_OWN = 2
+_STATES = 6 + _OWN * 2
 _LONGEST_STEP_S = 30.0  # of the prediction through a gap, in which the damping is even
 
 
@@ -38,9 +40,9 @@ class GaussMarkovNoise(NamedTuple):
     water_m_s, water_s
         Motion of the water along the track.
     log_m_s, log_s
-        Error of the log; of the speed over ground where there is no log.
+        Error of each log; of each speed over ground where there is no log.
     place_m, place_s
-        Error of the positions.
+        Error of the positions, of each instrument by itself.
     """
 
     gust_m_s2: float = 0.0
@@ -94,15 +96,31 @@ def _response(a: float, b: float, dt: float) -> tuple[float, float, float]:
 
 
 @compiled
+def _sizes(slow: GaussMarkovNoise, kinds: Int64) -> Float64:
+    """Return the size of each source; 0 of instruments that there are not."""
+    size = np.zeros(_STATES - _GUST)
+    size[:4] = slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m
+    for kind in kinds:
+        number, is_place = kind // KIND_COUNT, kind % KIND_COUNT == POSITION
+        if number > 0:
+            size[2 + _OWN * number + is_place] = size[2 + is_place]
+    return size
+
+
+@compiled
 def _fill_step(
-    slow: GaussMarkovNoise, damping: float, inertia: float, dt: float, step: Float64
+    slow: GaussMarkovNoise,
+    size: Float64,
+    damping: float,
+    inertia: float,
+    dt: float,
+    step: Float64,
 ) -> None:
     """Fill in what a step does to the states."""
-    size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
     time_s = (slow.gust_s, slow.water_s, slow.log_s, slow.place_s)
     for k in range(_STATES - _GUST):
         if size[k] > 0.0:
-            decay = math.exp(-dt / time_s[k])
+            decay = math.exp(-dt / time_s[k if k < 4 else 2 + k % _OWN])
             step[_DECAYS + 2 * k] = decay
             step[_DECAYS + 2 * k + 1] = size[k] ** 2 * (1.0 - decay * decay)
     step[_U_BY_U] = math.exp(-damping * dt)
@@ -175,9 +193,8 @@ def _add_force(cov: Float64, step: Float64, place: Int64) -> None:
 
 
 @compiled
-def _places(slow: GaussMarkovNoise) -> tuple[Int64, int]:
+def _places(size: Float64) -> tuple[Int64, int]:
     """Number the states that are disturbed; the others share one place behind, always 0."""
-    size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
     moved = size[0] > 0.0 or size[1] > 0.0
     place = np.full(_STATES, -1)
     active = 0
@@ -190,10 +207,9 @@ def _places(slow: GaussMarkovNoise) -> tuple[Int64, int]:
 
 
 @compiled
-def _stationary(noise: Noise, place: Int64, active: int) -> Float64:
+def _stationary(noise: Noise, size: Float64, place: Int64, active: int) -> Float64:
     """Return the covariance of the states before the first row."""
     slow, damping, inertia = noise.slow, noise.damping_1_s[0], noise.inertia[0]
-    size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
     cov = np.zeros((active + 1, active + 1))
     for k in range(_STATES - _GUST):
         s = place[_GUST + k]
@@ -237,9 +253,10 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
             log_det += np.log(variance[i])
         return log_det
     moved = slow.gust_m_s2 > 0.0 or slow.water_m_s > 0.0
-    place, active = _places(slow)
-    unlogged = not np.any(rows.kind == LOG)
-    cov, mean = _stationary(noise, place, active), np.zeros((active + 1, columns))
+    size = _sizes(slow, rows.kind)
+    place, active = _places(size)
+    unlogged = not np.any(rows.kind % KIND_COUNT == LOG)
+    cov, mean = _stationary(noise, size, place, active), np.zeros((active + 1, columns))
     innovation = np.empty(columns)
     gain, seen, step = np.zeros(active), np.zeros(active + 1), np.zeros(_STEP)
     last_dt, last_mid, last_inertia = -1.0, -1.0, -1.0
@@ -250,17 +267,18 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
                 parts = int(np.ceil(dt / _LONGEST_STEP_S)) if moved else 1
                 mid = 0.5 * (damping[i] + damping[i - 1])
                 if dt != last_dt or mid != last_mid or inertia[i] != last_inertia:
-                    _fill_step(slow, mid, inertia[i], dt / parts, step)
+                    _fill_step(slow, size, mid, inertia[i], dt / parts, step)
                     last_dt, last_mid, last_inertia = dt, mid, inertia[i]
                 for _ in range(parts):
                     _predict(cov, mean, step, place, moved)
         # what is measured, and the error of its input
-        first, error, other = place[_X], place[_PLACE], active
-        if rows.kind[i] == LOG:
-            first, error = place[_U], place[_LOG]
-        elif rows.kind[i] == OVER_GROUND:
+        kind, own = rows.kind[i] % KIND_COUNT, _OWN * (rows.kind[i] // KIND_COUNT)
+        first, error, other = place[_X], place[_PLACE + own], active
+        if kind == LOG:
+            first, error = place[_U], place[_LOG + own]
+        elif kind == OVER_GROUND:
             first, error = place[_U], place[_WATER]
-            other = place[_LOG] if unlogged else active
+            other = place[_LOG + own] if unlogged else active
         for s in range(active):
             seen[s] = cov[s, first] + cov[s, error] + cov[s, other]
         total = seen[first] + seen[error] + seen[other] + variance[i]

@@ -7,12 +7,13 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import FURTHER, Float64, Int64
 
 
 class Input(IntEnum):
-    """An input of motion; its number is the code of its rows."""
+    """A kind of input of motion; its number is the code of the rows of the first of the kind."""
 
     SPEED_THROUGH_WATER = 0
     SPEED_OVER_GROUND = 1
@@ -29,7 +30,11 @@ LOG = int(Input.SPEED_THROUGH_WATER)
 OVER_GROUND = int(Input.SPEED_OVER_GROUND)
 POSITION = int(Input.POSITION)
 KIND_COUNT = len(Input)
-CODES = {input_.key: int(input_) for input_ in Input}
+CODES = {input_.key: int(input_) for input_ in Input} | {
+    name: int(Input[kind.upper()]) + KIND_COUNT * (int(name[-1]) - 1)
+    for name, kind in FURTHER.items()
+}
+"""Of the rows of each instrument: its kind, and `KIND_COUNT` times how many are before it."""
 
 
 class Rows(NamedTuple):
@@ -41,7 +46,7 @@ class Rows(NamedTuple):
     time_s : (n,)
         After the engine stop, as far as that is known, or of the record.
     kind : (n,)
-        LOG, OVER_GROUND or POSITION.
+        Of `CODES`; LOG, OVER_GROUND or POSITION modulo `KIND_COUNT`.
     value : (n,)
         [m/s], or the distance along the track [m].
     """
@@ -49,6 +54,13 @@ class Rows(NamedTuple):
     time_s: Float64
     kind: Int64
     value: Float64
+
+    def of(self, kind: int) -> NDArray[np.bool_]:
+        """
+        Say which rows are of a kind, of any instrument.
+        """
+        result: NDArray[np.bool_] = self.kind % KIND_COUNT == kind
+        return result
 
 
 def bin_means(time_s: Float64, value: Float64, edges: Float64) -> tuple[Float64, Float64, Int64]:

@@ -64,7 +64,7 @@ def noise_of(settings: Settings, which: int, rows: Rows, white: Noise, steady: i
     n = len(rows.kind)
     variance, damping = np.empty(n), white.damping_1_s.copy()
     for i in range(n):
-        variance[i] = white.variance[i] * settings.white[which, rows.kind[i]] ** 2
+        variance[i] = white.variance[i] * settings.white[which, rows.kind[i] % KIND_COUNT] ** 2
     for i in range(steady):
         damping[i] *= settings.hold[which]
     s = settings.slow[which]

@@ -292,7 +292,7 @@ class Record(Shown):
         block, ship = self.samples(), self.ship
         unit, unit_name = speed_unit(0.0 if ship is None else ship.mass_kg)
         with drawing(ax) as axis:
-            for channel in _SPEEDS:
+            for channel in (each for each in Channel if each.kind in _SPEEDS):
                 part = block[block.channel == channel]
                 if len(part):
                     minutes = (part.stamp_ns - block.stamp_ns[0]) / (60.0 * SECOND_NS)

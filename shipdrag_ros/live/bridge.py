@@ -66,7 +66,7 @@ from shipdrag_ros.messages.heard import (
     Samples,
     ShipFile,
 )
-from shipdrag_ros.samples import MOTION_INPUTS, SHAFTS, Channel
+from shipdrag_ros.samples import ALL_MOTION, SHAFTS, Channel
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -263,7 +263,7 @@ class Bridge:
             if (value := self.trace.newest(column)) is not None
         ]
         if self._coast_ns is not None and self._speed is not None:
-            ages = [self._age_s(name, now_s) for name in MOTION_INPUTS]
+            ages = [self._age_s(name, now_s) for name in ALL_MOTION]
             age_s = min((age for age in ages if age is not None), default=None)
             return SpeedNow(self._speed.value, 'through water, estimated', age_s)
         return min(measured, key=lambda each: max(each.age_s or 0.0, _OLD_S), default=None)
@@ -433,7 +433,7 @@ class Bridge:
         return '; '.join(
             f'{status.input.replace("_", " ")}: {status.message}'
             for status in inputs
-            if status.input in MOTION_INPUTS and status.level != OK and status.number('messages')
+            if status.input in ALL_MOTION and status.level != OK and status.number('messages')
         )
 
     def _ended(self) -> Ended | None:

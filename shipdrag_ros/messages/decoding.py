@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
 from itertools import accumulate
@@ -24,7 +24,7 @@ from shipdrag_ros.messages import types
 from shipdrag_ros.messages.gather import GatherResult, gather, steps
 from shipdrag_ros.messages.joints import Joints, MessageRows, read_joints
 from shipdrag_ros.messages.topics import Source
-from shipdrag_ros.samples import Block, Channel, Float64, Int64, UInt8
+from shipdrag_ros.samples import FURTHER, Block, Channel, Float64, Int64, UInt8
 
 # a quaternion whose squared norm is further from 1 is no rotation
 QUATERNION_TOLERANCE = 0.1
@@ -347,7 +347,12 @@ def _computed(
 
 @cache
 def _readings() -> Mapping[Source, _Reading]:
-    return dict(_each_reading())
+    found = dict(_each_reading())
+    for channel in Channel:  # further instruments are read as the first one
+        for source, reading in tuple(found.items()):
+            if reading.channel is channel.kind and channel.input in FURTHER:
+                found[Source(channel.input, source.type)] = replace(reading, channel=channel)
+    return found
 
 
 def _each_reading() -> Iterator[tuple[Source, _Reading]]:

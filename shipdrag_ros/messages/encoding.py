@@ -22,7 +22,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.messages import types
-from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Channel, Float64, Int64, UInt8
+from shipdrag_ros.samples import (
+    FURTHER,
+    PITCHES,
+    SECOND_NS,
+    SHAFTS,
+    Block,
+    Channel,
+    Float64,
+    Int64,
+    UInt8,
+)
 
 FieldNumbers = Callable[[Float64, Float64], Float64]
 """Of (n, 2) values and variances, the (n,) numbers of a field."""
@@ -302,3 +312,4 @@ _ENCODERS: dict[Channel, _Encoder] = {
         {'max_range': inf},  # and 0: ULTRASOUND
     ),
 }
+_ENCODERS |= {each: _ENCODERS[each.kind] for each in Channel if each.input in FURTHER}

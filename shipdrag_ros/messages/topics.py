@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import types
+from shipdrag_ros.samples import FURTHER
 
-TOPICS: Mapping[str, tuple[str, ...]] = {
+_FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': (
         types.TWIST_WITH_COVARIANCE,
         types.TWIST,
@@ -40,6 +41,10 @@ TOPICS: Mapping[str, tuple[str, ...]] = {
     'rudder': (types.JOINT_STATE,),
     'wind_apparent': (types.TWIST,),
     'depth': (types.RANGE,),
+}
+TOPICS: Mapping[str, tuple[str, ...]] = {
+    **_FIRST,
+    **{name: _FIRST[kind] for name, kind in FURTHER.items()},
 }
 """Each input and the types it is accepted in, the preferred first."""
 

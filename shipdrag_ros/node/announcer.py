@@ -27,7 +27,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
 from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.health import InputState
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 
 SILENCE_SAID_AFTER_S = 10.0
 COMPILING_SAID_AFTER_S = 3.0  # to load what was kept is faster
@@ -202,7 +202,7 @@ class Announcer:
             Topics that may be meant.
         """
         now_s = time.monotonic()
-        if any(state.fresh for state in states if state.name in MOTION_INPUTS):
+        if any(state.fresh for state in states if state.name in ALL_MOTION):
             if self._silence_said:
                 self._logger.info('an input of the motion is heard')
             self._silent_since_s, self._silence_said = None, False

@@ -24,7 +24,7 @@ from shipdrag_ros.messages.heard import ERROR, OF_CONDITIONS, OK, WARN, Status
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.judging import Finding, InputFacts, Recently, behind_others, judge
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION
 
 _SHOWN = 6  # candidates of an input
 
@@ -102,7 +102,7 @@ class InputStates:
         """
         facts = tuple(facts)
         now_s = time.monotonic() if now_s is None else now_s
-        motion = {each.name for each in facts if each.fresh and each.name in MOTION_INPUTS}
+        motion = {each.name for each in facts if each.fresh and each.name in ALL_MOTION}
         offsets_s = {each.name: each.offset_s for each in facts if each.fresh}
         behind = behind_others(offsets_s, simulated=simulated)
         states = []
@@ -111,7 +111,7 @@ class InputStates:
             recently.add(now_s, each.total)
             judged = replace(
                 each,
-                needed=each.name in MOTION_INPUTS and not motion - {each.name},
+                needed=each.name in ALL_MOTION and not motion - {each.name},
                 recent=recently.counts,
                 seconds=recently.seconds,
                 offset_s=None if simulated else each.offset_s,
@@ -199,7 +199,7 @@ def _state(standing: Standing, inputs: Sequence[InputState]) -> tuple[int, str]:
             f'compiling, {standing.compiling_s:.0f} s: no estimates yet, one to three minutes on '
             f'a first start; {standing.waiting} messages are recorded and wait'
         )
-    motion = [each for each in inputs if each.name in MOTION_INPUTS]
+    motion = [each for each in inputs if each.name in ALL_MOTION]
     fresh = [each for each in motion if each.fresh]
     if motion and not fresh:
         names = ', '.join(each.name for each in motion)

@@ -39,6 +39,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.judging import Counts, InputFacts
+from shipdrag_ros.samples import FURTHER
 
 Publishers = Callable[[], frozenset[str]]
 
@@ -333,6 +334,11 @@ class InputTopic:
 
     def _published(self) -> list[str]:
         return [name for name in self.accepted if name in self.publishers]
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether to speak of it: of a further instrument, where somebody publishes it."""
+        return self.name not in FURTHER or bool(self.publishers) or self.type is not None
 
     @property
     def other_types(self) -> tuple[str, ...]:

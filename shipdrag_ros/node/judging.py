@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION
 
 RECENT_S = 30.0
 SILENT_S = 10.0  # an input heard before and silent for longer is stale
@@ -251,14 +251,14 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
     share = recent.used / readings
     if share >= USED_MIN:
         if (
-            facts.name in MOTION_INPUTS
+            facts.name in ALL_MOTION
             and facts.seconds > 0.5 * RECENT_S
             and recent.used < RATE_MIN_HZ * facts.seconds
         ):
             rate = recent.used / facts.seconds
             yield Finding(WARN, f'{rate:.2g} Hz is too slow, at least 0.2 Hz is needed')
         return
-    motion = facts.name in MOTION_INPUTS
+    motion = facts.name in ALL_MOTION
     grave = share < MOTION_USED_MIN if motion else not recent.used
     reasons = sorted(recent.rejected.items(), key=lambda item: -item[1])
     why = ', '.join(f'{times} {reason.replace("_", " ")}' for reason, times in reasons)
@@ -350,7 +350,7 @@ def behind_others(
     known = {
         name: offset
         for name, offset in offsets_s.items()
-        if name in MOTION_INPUTS and offset is not None and math.isfinite(offset)
+        if name in ALL_MOTION and offset is not None and math.isfinite(offset)
     }
     if len(known) < 2:
         return {}

@@ -32,12 +32,12 @@ from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION
 
 _MOTION = ', '.join(
     kind
     for kind, readers in READERS.items()
-    if any(channel.input in MOTION_INPUTS for channel, _ in readers)
+    if any(channel.input in ALL_MOTION for channel, _ in readers)
 )
 COMPARED_S = 10.0
 BETTER = 2  # times the readings in that time, from which the other source takes over

@@ -51,7 +51,7 @@ from shipdrag_ros.node.service_guard import add_services, guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import carrying
 
@@ -345,7 +345,7 @@ class CoastdownNode(LifecycleNode):
         doubts = self._doubts()
         facts = [
             topic.facts(health.get(topic.name), doubts.get(topic.name, ''))
-            for topic in self._input_topics
+            for topic in self._shown_topics
         ]
         states = self._input_states.tick(facts, simulated=self._simulated)
         self._rebind(states, now_ns)
@@ -400,11 +400,15 @@ class CoastdownNode(LifecycleNode):
         """Give up a type that is no use where another is published; said and recorded."""
         if self._session is None or self._compiling_s is not None:
             return  # nothing was judged yet
-        for topic, state in zip(self._input_topics, states, strict=True):
+        for topic, state in zip(self._shown_topics, states, strict=True):
             text = state.finding.text
             if (not state.fresh or state.finding.level >= ERROR) and topic.rebind(text):
                 said = f'{topic.name}: now {topic.type}; before: {text}'
                 self._session.note_source(said, now_ns)
+
+    @property
+    def _shown_topics(self) -> list[InputTopic]:
+        return [topic for topic in self._input_topics if topic.is_shown]
 
     def _publish_first(self) -> None:
         self.destroy_timer(self._first)
@@ -423,7 +427,7 @@ class CoastdownNode(LifecycleNode):
     def _standing(self, states: Sequence[InputState], now_ns: int) -> Standing:
         session, settings = self._session, self._settings
         hint = ''
-        if not any(each.fresh for each in states if each.name in MOTION_INPUTS):
+        if not any(each.fresh for each in states if each.name in ALL_MOTION):
             name = self.get_fully_qualified_name()
             others = [
                 (topic, types)

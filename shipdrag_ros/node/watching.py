@@ -24,7 +24,7 @@ from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.judging import convention_doubt
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import BACKWARD_JUMP_NS, MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION, BACKWARD_JUMP_NS, MOTION_INPUTS
 
 AWAY_S = 5.0  # between two ticks: the node stood still, and what waits is not silence
 _SIDE = ('sooner', 'later')
@@ -200,16 +200,14 @@ class Watching:
                 f'its clock {set_by(step_s)}, or its readings come as much {_SIDE[step_s < 0.0]}'
             )
             self._stepped[topic.name] = (time.monotonic(), text)
-            session.clock_was_set(
-                f'{topic.name}: {text}', now_ns, ends=topic.name in MOTION_INPUTS
-            )
+            session.clock_was_set(f'{topic.name}: {text}', now_ns, ends=topic.name in ALL_MOTION)
 
     def _watch_silence(
         self, session: Session, health: Mapping[str, InputHealth], now_ns: int
     ) -> None:
         steady_s, now = time.monotonic(), (time.monotonic(), now_ns)
-        ages = [topic.age_s for topic in self._topics if topic.name in MOTION_INPUTS]
-        used = sum(health[name].used for name in MOTION_INPUTS if name in health)
+        ages = [topic.age_s for topic in self._topics if topic.name in ALL_MOTION]
+        used = sum(health[name].used for name in ALL_MOTION if name in health)
         away = self._tick_s is None or steady_s > self._tick_s + AWAY_S
         last_s = 0.0 if self._tick_s is None else steady_s - self._tick_s
         self._tick_s = steady_s

@@ -237,7 +237,7 @@ def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
         problem.speed_m_s,
     ).typical
     length_s = float(problem.rows.time_s[-1]) / seen.shape[1]
-    rough = _ROUGH * problem.speed_m_s * np.where(problem.rows.kind == POSITION, length_s, 1.0)
+    rough = _ROUGH * problem.speed_m_s * np.where(problem.rows.of(POSITION), length_s, 1.0)
     white = white._replace(variance=white.variance + rough**2)
     linear = _each_family(problem, now, (table, white), typical)
     which = int(np.argmax(linear.log_evidence))

@@ -18,13 +18,21 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
 # unknowns behind the coefficients theta; the first four change the motion
 SPEED, THRUST, TAU, INERTIA, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GROUND_LAG = range(11)
 EXTRAS = 11
+OWN = EXTRAS - PLACE  # of each further instrument behind them, from its `PLACE` on
 _MOVING = 4
+
+
+def own(code: int) -> int:
+    """
+    Return by how much the unknowns of an instrument stand behind those of the first of its kind.
+    """
+    return OWN * (int(code) // KIND_COUNT)
 
 
 class Forces(NamedTuple):
@@ -214,6 +222,7 @@ def predict(
     ----------
     forces
     unknowns : (k + 11,)
+        Behind them `OWN` for each further number of instruments: place, scale and so on.
     grid_s : (g,)
         Of the integration, from 0 on.
     rows
@@ -221,7 +230,7 @@ def predict(
 
     Returns
     -------
-    table : (1 + k + 11, n)
+    table : (1 + p, n)
         Measured less predicted, then the derivatives of the prediction.
     speed : (n,)
         Through water.
@@ -229,17 +238,17 @@ def predict(
     k = forces.columns.shape[1]
     p, n = k + _MOVING, len(rows.time_s)
     state, rate = integrate(forces, unknowns, grid_s)
-    table, speed = np.zeros((1 + k + EXTRAS, n)), np.empty(n)
+    table, speed = np.zeros((1 + len(unknowns), n)), np.empty(n)
     u_0, stop, current = unknowns[k + SPEED], unknowns[k + STOP], unknowns[k + CURRENT]
-    scale = 1.0 + unknowns[k + SCALE]
     here = np.empty(p + 1)
     cell = 0
     for i in range(n):
-        kind, t = rows.kind[i], rows.time_s[i] - stop
+        kind, t = rows.kind[i] % KIND_COUNT, rows.time_s[i] - stop
+        own = k + OWN * (rows.kind[i] // KIND_COUNT)
         place = kind == POSITION
         by_time, by_lag = 1.0, 0.0
         if not place:
-            lag = unknowns[k + LAG] if kind == LOG else unknowns[k + GROUND_LAG]
+            lag = unknowns[own + LAG] if kind == LOG else unknowns[own + GROUND_LAG]
             t, by_time, by_lag = _late(t, lag)
         acceleration = 0.0
         here[:] = 0.0
@@ -272,27 +281,27 @@ def predict(
             )
             acceleration = (1.0 - s) * rate[cell, 0] + s * rate[cell + 1, 0]
         speed[i] = now
-        factor = scale if kind == LOG else 1.0
+        factor = 1.0 + unknowns[own + SCALE] if kind == LOG else 1.0
         for j in range(p):
             table[1 + j, i] = factor * here[1 + j]
         at = 1 + k
         if place:
-            predicted = unknowns[k + PLACE] + u_0 * stop + here[0] + current * rows.time_s[i]
+            predicted = unknowns[own + PLACE] + u_0 * stop + here[0] + current * rows.time_s[i]
             table[at + SPEED, i] += stop
             table[at + STOP, i] = u_0 - now
-            table[at + PLACE, i] = 1.0
+            table[1 + own + PLACE, i] = 1.0
             table[at + CURRENT, i] = rows.time_s[i]
         else:
             table[at + STOP, i] = -factor * acceleration * by_time
             predicted = factor * now
             if kind == LOG:
-                predicted += unknowns[k + OFFSET]
-                table[at + SCALE, i], table[at + OFFSET, i] = now, 1.0
-                table[at + LAG, i] = -factor * acceleration * by_lag
+                predicted += unknowns[own + OFFSET]
+                table[1 + own + SCALE, i], table[1 + own + OFFSET, i] = now, 1.0
+                table[1 + own + LAG, i] = -factor * acceleration * by_lag
             else:
                 predicted += current
                 table[at + CURRENT, i] = 1.0
-                table[at + GROUND_LAG, i] = -acceleration * by_lag
+                table[1 + own + GROUND_LAG, i] = -acceleration * by_lag
         table[0, i] = rows.value[i] - predicted
     return table, speed
 

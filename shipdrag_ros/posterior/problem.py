@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
-from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
@@ -176,16 +176,17 @@ class RunModel:
         forces = law.forces(ship, tau_s, adds)
         end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
         ones = np.ones(len(variance))
-        position = rows.value[rows.kind == POSITION]
-        start = np.zeros(forces.columns.shape[1] + EXTRAS)
         k = forces.columns.shape[1]
+        kinds = frozenset(np.unique(rows.kind).tolist())
+        start = np.zeros(k + EXTRAS + max(map(motion.own, kinds)))
         start[k + motion.SPEED] = speed_m_s
         start[k + motion.THRUST] = priors.THRUST.mean
-        if len(position):
-            at = np.searchsorted(rows.time_s[rows.kind == POSITION], 0.0)
-            start[k + motion.PLACE] = position[min(int(at), len(position) - 1)]
-        kinds = frozenset(np.unique(rows.kind).tolist())
-        families = tuple(_all_families(ship, law, adds, stop, start, kinds))
+        for code in kinds:
+            if code % KIND_COUNT == POSITION:
+                place = rows.value[rows.kind == code]
+                at = np.searchsorted(rows.time_s[rows.kind == code], 0.0)
+                start[k + motion.own(code) + motion.PLACE] = place[min(int(at), len(place) - 1)]
+        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds))
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -235,8 +236,7 @@ def _extras(
     ship: Ship, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> tuple[Float64, Float64]:
     """Return mean and sd of the unknowns that are no coefficients; alike in all families."""
-    mean, sd = start[-EXTRAS:].copy(), np.full(EXTRAS, EXACT)
-    ground = kinds - {LOG}
+    mean, sd = start.copy(), np.full(len(start), EXACT)
     sd[motion.SPEED] = _VAGUE_SPEED * mean[motion.SPEED]
     base = ship.baseline
     if base is None or base.relative_sd_of == 'resistance':
@@ -248,18 +248,29 @@ def _extras(
         if stop.run_down_s > 0.0:
             shape = priors.RUN_DOWN_SHAPE.sd
             sd[motion.TAU] = math.hypot(shape, stop.run_down_sd_s / stop.run_down_s)
-    if POSITION in kinds:
-        sd[motion.PLACE] = _VAGUE_S * mean[motion.SPEED]
-    if LOG in kinds:
-        sd[motion.SCALE] = priors.LOG_SCALE.sd
-        sd[motion.OFFSET] = priors.LOG_OFFSET.sd
-    if ground:
+    if any(code % KIND_COUNT != LOG for code in kinds):
         sheltered = min(1.0, mean[motion.SPEED] / priors.SHELTERED_M_S)
         sd[motion.CURRENT] = priors.CURRENT.sd * sheltered**2
-    if ground - {POSITION}:
-        lag = priors.GROUND_LAG
-        mean[motion.GROUND_LAG], sd[motion.GROUND_LAG] = lag.mean, lag.sd
+    for code in kinds:
+        own = motion.own(code)
+        if code % KIND_COUNT == POSITION:
+            sd[own + motion.PLACE] = _VAGUE_S * mean[motion.SPEED]
+        elif code % KIND_COUNT == LOG:
+            sd[own + motion.SCALE] = priors.LOG_SCALE.sd
+            sd[own + motion.OFFSET] = priors.LOG_OFFSET.sd
+            mean[own + motion.LAG], sd[own + motion.LAG] = _any_lag()
+        else:
+            lag = priors.GROUND_LAG
+            mean[own + motion.GROUND_LAG], sd[own + motion.GROUND_LAG] = lag.mean, lag.sd
     return mean, sd
+
+
+def _any_lag() -> tuple[float, float]:
+    """Return mean and sd of the filter of a log that may have none."""
+    none, some, chance = priors.LOG_UNFILTERED, priors.LOG_LAG, priors.UNFILTERED_CHANCE
+    mean = chance * none.mean + (1.0 - chance) * some.mean
+    within = chance * none.sd**2 + (1.0 - chance) * some.sd**2
+    return mean, math.sqrt(within + chance * (1.0 - chance) * (some.mean - none.mean) ** 2)
 
 
 def _all_families(
@@ -286,7 +297,7 @@ def _all_families(
             [[each[1] for each in scales], sizes, humps, dry, *of_weather, extra_sd]
         )
         if lag is not None:
-            at = motion.LAG - EXTRAS
+            at = len(mean) - len(start) + motion.LAG
             mean[at], sd[at] = lag.mean, lag.sd
         chance *= part * math.prod(each.chance for each in state)
         yield Family(name, chance, mean, 1.0 / sd**2, level)

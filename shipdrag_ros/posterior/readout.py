@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior
 from shipdrag_ros.posterior.weather import Reference
@@ -82,7 +83,11 @@ def _causes(found: RunPosterior) -> dict[str, list[int]]:
     problem, k = found.problem, found.problem.coefficients
     causes = {
         'n_r': [k + motion.INERTIA],
-        'log': [k + motion.SCALE, k + motion.OFFSET, k + motion.LAG],
+        'log': [
+            k + motion.own(code) + each
+            for code in np.unique(problem.rows.kind[problem.rows.of(LOG)])
+            for each in (motion.SCALE, motion.OFFSET, motion.LAG)
+        ],
     }
     first = problem.of_hull
     for name, each in zip(vars(Reference()), problem.weather):

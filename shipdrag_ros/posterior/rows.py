@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.rows import KIND_COUNT, POSITION, Rows
+from shipdrag_ros.inference.rows import POSITION, Rows
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 
@@ -87,7 +87,7 @@ def _crude(rows: Rows, speed_m_s: float, halved_s: float) -> Float64:
         return np.zeros(len(rows.time_s))
     since = 1.0 + np.maximum(rows.time_s - rows.time_s[0], 0.0) / halved_s
     way = speed_m_s * halved_s * np.log(since)
-    result: Float64 = np.where(rows.kind == POSITION, way, speed_m_s / since)
+    result: Float64 = np.where(rows.of(POSITION), way, speed_m_s / since)
     return result
 
 
@@ -121,10 +121,8 @@ def condense(
     edges = edges_of(float(rows.time_s[-1]), float(rows.time_s[0]), halved_s, quick=quick)
     bent = rows.value - _crude(rows, speed_m_s, halved_s)
     times, kinds, values, variances = [], [], [], []
-    for kind in range(KIND_COUNT):
+    for kind in np.unique(rows.kind):
         chosen = rows.kind == kind
-        if not chosen.any():
-            continue
         time_s, value, sd = rows.time_s[chosen], rows.value[chosen], np.sqrt(variance[chosen])
         weight = right(time_s, bent[chosen], sd, priors.WRONG.mean) / sd**2
         cell = np.searchsorted(edges, time_s, side='right')

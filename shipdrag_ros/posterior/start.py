@@ -48,7 +48,7 @@ def along_readings(problem: RunModel, seen: Float64) -> tuple[Float64, Float64]:
     force = np.vstack([known - known[0] * thrust, columns - at_first * thrust]) / inertia
     lost = _integral(force, time_s)
     way = _integral(lost, time_s)
-    place, after = rows.kind == POSITION, np.maximum(rows.time_s, 0.0)
+    place, after = rows.of(POSITION), np.maximum(rows.time_s, 0.0)
     of_force = np.array(
         [
             np.where(place, np.interp(after, time_s, x), np.interp(after, time_s, v))
@@ -59,9 +59,12 @@ def along_readings(problem: RunModel, seen: Float64) -> tuple[Float64, Float64]:
     table[1 : 1 + k] = -of_force[1:]
     of_speed = np.where(place, rows.time_s, 1.0)
     table[1 + k + motion.SPEED] = of_speed
-    table[1 + k + motion.PLACE] = place
-    table[1 + k + motion.CURRENT] = np.where(place, rows.time_s, rows.kind != LOG)
-    first = start[k + motion.SPEED] * of_speed + start[k + motion.PLACE] * place
+    table[1 + k + motion.CURRENT] = np.where(place, rows.time_s, ~rows.of(LOG))
+    first = start[k + motion.SPEED] * of_speed
+    for code in np.unique(rows.kind[place]):
+        at, own = k + motion.own(code) + motion.PLACE, rows.kind == code
+        table[1 + at] = own
+        first += start[at] * own
     table[0] = rows.value - first + of_force[0] + start[:k] @ of_force[1:]
     return table, np.interp(after, time_s, speed)
 

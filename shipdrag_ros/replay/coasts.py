@@ -23,7 +23,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.given_window import parts_of_one_clock
 from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed
-from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Block, Reason, concatenate
+from shipdrag_ros.samples import ALL_MOTION, SECOND_NS, Block, Reason, concatenate
 from shipdrag_ros.ship import Ship
 
 DISMISSED = (
@@ -42,9 +42,7 @@ def clocks_apart(result: ReplayResult) -> tuple[str, ...]:
     Most of their messages are rejected as late, or as from the future.
     """
     return tuple(
-        name
-        for name in MOTION_INPUTS
-        if name in result.inputs and _most_are_off(result.inputs[name])
+        name for name in ALL_MOTION if name in result.inputs and _most_are_off(result.inputs[name])
     )
 
 

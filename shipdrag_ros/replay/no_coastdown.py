@@ -12,7 +12,7 @@ import numpy as np
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.replay.playback import ReplayResult
 from shipdrag_ros.replay.sailing import accepted_samples
-from shipdrag_ros.samples import MOTION_INPUTS, Block, Channel, Float64
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, Block, Channel, Float64
 
 _BIN_S = 10.0
 _GLIDE_S = 600.0  # within which a ship that glides has slowed
@@ -69,9 +69,7 @@ def _why(result: ReplayResult) -> str:
     block, _ = accepted_samples(result.run)
     if not len(block):
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
-    name, fall = _largest_fall(
-        block, [each for each in MOTION_INPUTS if each not in result.left_out]
-    )
+    name, fall = _largest_fall(block, [each for each in ALL_MOTION if each not in result.left_out])
     if not name:
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
     if fall is None:
@@ -142,11 +140,11 @@ def _largest_fall(block: Block, names: Iterable[str]) -> tuple[str, _SpeedLoss |
     except ValueError:  # a clock was set within the record
         return 'a clock that was set', None
     for name in names:
-        series = getattr(window, name)
+        series = window.series(name)
         if not len(series):
             continue
         time_s = (series.time_ns - window.start_ns) * 1e-9
-        return name, _fall(*_binned(time_s, np.asarray(series.value, np.float64)))
+        return name, _fall(*_binned(np.asarray(time_s, np.float64), series.value))
     return '', None
 
 

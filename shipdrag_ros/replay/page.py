@@ -177,7 +177,7 @@ def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
     ):
         yield picture(
             drawn,
-            f'{display.TRACK_LABELS.get(name, (name, ""))[0]} as measured and as fitted, and what '
+            f'{display.track_label(name)[0]} as measured and as fitted, and what '
             'is left. Good: the dots below scatter about zero. Left-overs that wave slowly are '
             'not in the band.',
         )

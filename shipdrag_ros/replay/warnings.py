@@ -14,7 +14,7 @@ from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, Reset
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.replay import InputCounts, ReplayResult, words
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
@@ -80,7 +80,7 @@ def _inputs(inputs: Mapping[str, InputCounts]) -> Iterator[str]:
             f'{name}: {readings - counts.used} of {readings} {what} not used; '
             f'{number} {reason}: {_CAUSE[reason]}'
         )
-    if not any(inputs[name].used for name in MOTION_INPUTS if name in inputs):
+    if not any(inputs[name].used for name in ALL_MOTION if name in inputs):
         yield (
             f'no message of {", ".join(MOTION_INPUTS)} was used, one of which is needed; '
             'where it has another name give --remap FROM:=TO'

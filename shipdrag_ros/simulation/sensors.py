@@ -9,7 +9,7 @@ wrong throughout, by its scale for instance, is an effect of the simulation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+from shipdrag_ros.samples import FURTHER, Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
@@ -85,7 +85,7 @@ def lagged(time_s: Float64, value: Float64, lag_s: float) -> Float64:
 START_NS = 1_780_300_800_000_000_000  # 2026-06-01 08:00 UTC
 
 # white noise of well-kept sensors, in the unit of the channel
-STANDARD_SD: Mapping[Channel, float] = {
+STANDARD_SD: dict[Channel, float] = {
     Channel.SPEED_THROUGH_WATER: 0.05,
     Channel.POSITION: 10.0,
     Channel.HEADING: float(np.radians(0.5)),
@@ -94,6 +94,11 @@ STANDARD_SD: Mapping[Channel, float] = {
     Channel.RUDDER: float(np.radians(0.5)),
     Channel.WIND_APPARENT: 0.5,
     Channel.DEPTH: 0.2,
+}
+STANDARD_SD |= {
+    each: STANDARD_SD[each.kind]
+    for each in Channel
+    if each.input in FURTHER and each.kind in STANDARD_SD
 }
 STANDARD_INPUTS = ('speed_through_water', 'position', 'heading', 'shaft')
 
@@ -233,7 +238,7 @@ def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int)
     time = np.arange(int(end_s * sensor.rate_hz) + 1) / sensor.rate_hz
     time = time[time <= end_s]
     n = len(time)
-    columns = 2 if sensor.channel in _TWO_COLUMNS else 1
+    columns = 2 if sensor.channel.kind in _TWO_COLUMNS else 1
     value = _perfect_values(truth, time, sensor.channel)
     value += sensor.sd * rng.standard_normal((n, columns))
     if sensor.coloured:
@@ -265,9 +270,11 @@ def _perfect_values(whole: Truth, time: Float64, channel: Channel) -> Float64:
     """
     Return readings without noise, a new array of one or two columns.
 
-    What is systematically wrong with a sensor is an effect, and acts here.
+    What is systematically wrong with a sensor is an effect, and acts here on the first of a kind.
     """
     truth, action = whole.at(time), whole.action
+    if channel.input in FURTHER:
+        channel, action = channel.kind, Action()
     match channel:
         case Channel.SPEED_THROUGH_WATER:
             speed = whole.speed_through_water_m_s
@@ -303,7 +310,7 @@ def _as_sent(value: Float64, channel: Channel) -> Float64:
     """Bring noisy readings to the range in which they are sent."""
     if channel is Channel.HEADING:
         return np.arctan2(np.sin(value), np.cos(value))
-    if channel is Channel.SPEED_OVER_GROUND:
+    if channel.kind is Channel.SPEED_OVER_GROUND:
         return np.abs(value)
     return value
 

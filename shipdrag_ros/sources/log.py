@@ -18,7 +18,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
-from shipdrag_ros.samples import SECOND_NS, Block, Channel
+from shipdrag_ros.samples import FURTHER, SECOND_NS, Block, Channel
 
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
@@ -83,7 +83,7 @@ class Understood:
     def __str__(self) -> str:
         unit = f' [{self.unit}]' if self.unit else ''
         values = ', '.join(f'{value:.6g}' for value in self.first)
-        si = 'deg' if self.geodetic else _SI[self.input]
+        si = 'deg' if self.geodetic else _SI[FURTHER.get(self.input, self.input)]
         return f'{self.input} <- {self.source}{unit}, first {values} {si}'
 
 
@@ -145,7 +145,7 @@ class Log:
         ):
             channel = Channel(number)
             if channel not in self.first:
-                values = block.value[place, : 2 if channel in _TWO_VALUES else 1]
+                values = block.value[place, : 2 if channel.kind in _TWO_VALUES else 1]
                 self.first[channel] = tuple(values.tolist())
             self.counts[key_of(channel)] += int(count)
         if len(block):

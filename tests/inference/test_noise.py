@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
-from shipdrag_ros.inference.rows import LOG, POSITION, Rows, bin_means
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows, bin_means
 
 TIMES_S = np.array([90.0, 600.0, 50.0, 40.0])
 
@@ -43,6 +43,19 @@ def test_the_colour_of_a_sensor_is_whitened_exactly(kind: int, which: int) -> No
     covariance = gauss_markov(time, 0.7, TIMES_S[which]) + 0.3 * np.eye(60)
     np.testing.assert_allclose(found @ covariance @ found.T, np.eye(60), rtol=0, atol=1e-10)
     assert np.all(np.triu(found, 1) == 0.0)
+
+
+@pytest.mark.parametrize(('kind', 'which'), [(LOG, 2), (POSITION, 3)])
+def test_further_instruments_err_by_themselves(kind: int, which: int) -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(0.5, 40.0, 60))
+    number = np.resize([0, 1, 2, 1], 60)
+    rows = Rows(time, kind + KIND_COUNT * number, np.zeros(60))
+    size = np.zeros(4)
+    size[which] = 0.7
+    found = whitener(rows, np.full(60, 0.3), slow_noise(size, TIMES_S))
+    covariance = gauss_markov(time, 0.7, TIMES_S[which]) * (number == number[:, None])
+    covariance += 0.3 * np.eye(60)
+    np.testing.assert_allclose(found @ covariance @ found.T, np.eye(60), rtol=0, atol=1e-10)
 
 
 def test_water_that_moves_shifts_positions_by_its_integral() -> None:

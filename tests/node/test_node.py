@@ -98,6 +98,22 @@ def test_inputs_are_recorded_by_their_own_name(
     assert topics_in(the_bag(tmp_path))['/ship/depth'] == 1
 
 
+def test_a_further_log_is_spoken_of_where_somebody_publishes_it(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    node = start_node()
+    diagnostics.wait_for('input depth', 'no')
+    assert diagnostics.of('input speed_through_water_2') is None
+    publisher = peer.advertise('/speed_through_water_2', SPEED_TYPE)
+    peer.wait_for_listener(publisher)
+    for message in encode(speeds()):
+        publisher.publish(message.payload)
+    diagnostics.wait_for('input speed_through_water_2', '5', value='used')
+    assert diagnostics.of('input speed_through_water_3') is None
+    node.stop()
+    assert topics_in(the_bag(tmp_path))['/speed_through_water_2'] == 5
+
+
 def test_hears_a_publisher_of_any_quality_of_service(
     start_node: Any, peer: Any, diagnostics: Any
 ) -> None:

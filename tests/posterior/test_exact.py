@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from shipdrag_ros.inference.gaussian import products_of
 from shipdrag_ros.inference.linear import Families, of_family, whitened_products
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.inference.settings import Settings
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
@@ -19,12 +21,14 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 
-def problem_of(ship: Ship, *, seed: int = 0) -> RunModel:
-    """Set up 120 rows of the model's own motion, three inputs with white noise."""
+def problem_of(
+    ship: Ship, *, seed: int = 0, codes: Sequence[int] = (LOG, OVER_GROUND, POSITION)
+) -> RunModel:
+    """Set up 120 rows of the model's own motion, of instruments with white noise."""
     rng = np.random.default_rng(seed)
     time_s = np.sort(np.concatenate([rng.uniform(-300.0, 0.0, 40), rng.uniform(0.0, 900.0, 80)]))
-    kind = np.resize([LOG, OVER_GROUND, POSITION], 120)
-    variance = np.where(kind == POSITION, 25.0, 0.02**2)
+    kind = np.resize(codes, 120)
+    variance = np.where(kind % KIND_COUNT == POSITION, 25.0, 0.02**2)
     rows = Rows(time_s, kind, np.zeros(120))
     empty = RunModel.of(
         rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, low_m_s=4.0
@@ -36,10 +40,12 @@ def problem_of(ship: Ship, *, seed: int = 0) -> RunModel:
     )
 
 
-def test_derivatives_are_those_of_the_prediction(ship: Ship) -> None:
-    problem = problem_of(ship)
+@pytest.mark.parametrize('codes', [(LOG, OVER_GROUND, POSITION), tuple(CODES.values())])
+def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, ...]) -> None:
+    problem = problem_of(ship, codes=codes)
     k = problem.coefficients
     now = problem.start.copy()
+    now[k + motion.EXTRAS :] += 0.5
     now[:k] += 0.01
     now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
     now[k + motion.SCALE], now[k + motion.CURRENT] = 0.01, 0.2
@@ -55,6 +61,22 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship) -> None:
         size = max(float(np.abs(by).max()), 1e-3)
         # where a reading is taken at a node of a table, the slope jumps a little
         np.testing.assert_allclose(table[1 + place], by, rtol=0.0, atol=0.01 * size)
+
+
+def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_current(
+    ship: Ship,
+) -> None:
+    problem = problem_of(ship, codes=tuple(CODES.values()))
+    k, rows = problem.coefficients, problem.rows
+    table, _ = predict(problem.forces, problem.start, problem.grid_s, rows)
+    for name, code in CODES.items():
+        mine, at = rows.kind == code, 1 + k + motion.own(code)
+        own = {LOG: motion.SCALE, OVER_GROUND: motion.GROUND_LAG, POSITION: motion.PLACE}
+        line = table[at + own[code % KIND_COUNT]]
+        assert np.any(line[mine] != 0.0), name
+        assert not np.any(line[~mine]), name
+    current = table[1 + k + motion.CURRENT] != 0.0
+    assert np.array_equal(current, ~rows.of(LOG))
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:

@@ -25,7 +25,7 @@ from shipdrag_ros.errors import BagError, ShipFileError
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, replay
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import Ship
 
 WriteRun = Callable[..., Path]
@@ -59,6 +59,32 @@ def test_replay_gives_the_live_figures_bit_for_bit(
     assert [type(event) for event in result.events] == [Onset, EndedCoastdown]
     assert result.inputs['shaft'].messages == result.inputs['shaft'].used == 1100
     assert list(result.inputs) == ['speed_through_water', 'position', 'heading', 'shaft']
+
+
+def test_further_instruments_are_recorded_in_their_order_and_replayed_bit_for_bit(
+    voyage: Callable[..., Block], live: Any, ship: Ship, tmp_path: Path
+) -> None:
+    block = voyage()
+    both = []
+    for channel in (Channel.SPEED_THROUGH_WATER, Channel.POSITION):
+        part = block[block.channel == channel]
+        code = np.full(len(part), Channel[f'{channel.name}_2'], np.uint8)
+        noise = np.random.default_rng(3).normal(0.0, 0.02, part.value.shape)
+        both.append(replace(part, channel=code, value=part.value + noise))
+    block = in_arrival_order([block, *both])
+    live = live(ship)
+    live.start(tmp_path / 'live.mcap')
+    for message in encode(block):
+        live.receive(message)
+    live.stop(int(block.receive_ns[-1]))
+    result = replayed(tmp_path / 'live.mcap')
+    assert result.recorded is not None
+    assert result.recorded.identical == result.recorded.compared > 50
+    assert result.inputs['speed_through_water_2'] == InputCounts(1100, 1100, {})
+    assert result.inputs['position_2'].used == 1100
+    (run,) = open_runs([tmp_path / 'live.mcap'])
+    heard = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    assert heard.channel.tolist() == block.channel.tolist()
 
 
 def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(

@@ -77,6 +77,28 @@ def test_a_plain_table(import_text: Import) -> None:
     assert (result.delimiter, result.header) == (',', True)
 
 
+def test_further_instruments_come_in_as_the_first(import_text: Import) -> None:
+    maps = (
+        'speed_through_water=a',
+        'speed_through_water_2=b:kn',
+        'speed_over_ground_3=e,n',
+        'position_2=la,lo:deg',
+        'position_3=e,n:km',
+    )
+    text = 't,a,b,e,n,la,lo\n0,5.5,10,3,4,-12.5,131\n1,5.25,9,3,4,-12.25,131\n'
+    result, block = import_text(text, *maps, time='t')
+    assert list(result.written) == [each.partition('=')[0] for each in maps]
+    assert set(result.written.values()) == {2}
+    assert block.value[block.channel == Channel.SPEED_THROUGH_WATER_2, 0] == pytest.approx(
+        [10 * 1852 / 3600, 9 * 1852 / 3600]
+    )
+    assert block.value[block.channel == Channel.SPEED_OVER_GROUND_3, 0].tolist() == [5.0, 5.0]
+    (first, _) = block.value[block.channel == Channel.POSITION_GEODETIC_2].tolist()
+    assert first == [-12.5, 131.0]
+    (first, _) = block.value[block.channel == Channel.POSITION_3].tolist()
+    assert first == [3000.0, 4000.0]
+
+
 @pytest.mark.parametrize('delimiter', [',', ';', '\t'])
 @pytest.mark.parametrize('start', ['', '\ufeff', '\n\n', ' , \n'.replace(',', '')])
 @pytest.mark.parametrize('end', ['\n', '\r\n', '\r'])

@@ -9,7 +9,9 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
+    FIRST_TRACK,
     PER_UNIT,
+    SOURCES,
     SPEED,
     Bins,
     displacement,
@@ -17,13 +19,15 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
 )
 from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
+from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Channel, Float64
+from shipdrag_ros.samples import KIND, Channel, Float64
 
 _LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
 _TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
 _HEADING = int(Channel.HEADING)
 _SHAFT, _SHAFT_2, _PITCH = int(Channel.SHAFT), int(Channel.SHAFT_2), int(Channel.PITCH)
+_BESIDE = 120  # seconds over which two instruments are compared
 _COURSE = 6  # bins of a way that shows a course
 
 
@@ -51,6 +55,31 @@ def _range(bins: Bins, source: int, last: int, width: int) -> float:
             speed = (totals[second & mask, SPEED] - totals[(second - 1) & mask, SPEED]) / PER_UNIT
             low, high = min(low, speed), max(high, speed)
     return high - low if high >= low else np.nan
+
+
+@compiled(inline=True, uncounted=True)
+def _speaking(bins: Bins, kind: int, last: int, width: int) -> int:
+    """Return the first instrument of a kind that says something in a bin, or the first."""
+    for source in SOURCES:
+        if KIND[source] == kind and (
+            not np.isnan(_mean_speed(bins, source, last, width))
+            if kind < FIRST_TRACK
+            else mean_place(bins, source, last, width)[3] > 0
+        ):
+            return int(source)
+    return kind
+
+
+@compiled(inline=True, uncounted=True)
+def _level(bins: Bins, source: int, first: int) -> float:
+    """Return what the first of a kind read over what another did, when both were last heard."""
+    until = bins.closed[first]
+    if source == first or until == NEVER:
+        return 1.0
+    other = _mean_speed(bins, source, until, _BESIDE)
+    # a step from one scale to the other would be a loss of speed
+    level = _mean_speed(bins, first, until, _BESIDE) / other if other != 0.0 else np.nan
+    return level if level > 0.0 else 1.0
 
 
 @compiled(inline=True, uncounted=True)
@@ -83,11 +112,13 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
     """
     for k in range(len(said)):
         said[k] = np.nan
-    said[LOG] = _mean_speed(bins, _LOG, last, width)
-    said[GROUND] = _mean_speed(bins, _GROUND, last, width)
-    said[RANGES] = _range(bins, _LOG, last, width)
-    said[RANGES + 1] = _range(bins, _GROUND, last, width)
-    for track in _TRACKS:
+    log, ground = _speaking(bins, _LOG, last, width), _speaking(bins, _GROUND, last, width)
+    said[LOG] = _mean_speed(bins, log, last, width) * _level(bins, log, _LOG)
+    said[GROUND] = _mean_speed(bins, ground, last, width) * _level(bins, ground, _GROUND)
+    said[RANGES] = _range(bins, log, last, width)
+    said[RANGES + 1] = _range(bins, ground, last, width)
+    for kind in _TRACKS:
+        track = _speaking(bins, kind, last, width)
         if mean_place(bins, track, last, width)[3] == 0:
             continue
         time, east, north = displacement(bins, track, last, width)

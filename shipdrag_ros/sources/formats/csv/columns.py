@@ -12,7 +12,7 @@ from enum import Enum
 from math import pi
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
+from shipdrag_ros.samples import FURTHER, GEODETIC, PITCHES, SHAFTS, Channel
 
 _KNOT, _KMH, _MPH = 1852.0 / 3600.0, 1.0 / 3.6, 0.44704
 _SPEED = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
@@ -24,7 +24,7 @@ _TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi, 'rps': 2.0 * pi
 _PITCH = {'ratio': 1.0, '%': 0.01, **_ANGLE}
 COMPASS = 'compass'
 _LATITUDE = {'deg': 1.0}  # as they are sent
-_UNITS: Mapping[Channel, Mapping[str, float]] = {
+_UNITS: dict[Channel, Mapping[str, float]] = {
     Channel.SPEED_THROUGH_WATER: _SPEED,
     Channel.SPEED_OVER_GROUND: _SPEED,
     Channel.POSITION: _LENGTH,
@@ -36,6 +36,7 @@ _UNITS: Mapping[Channel, Mapping[str, float]] = {
     Channel.WIND_APPARENT: {**_SPEED, **_ANGLE},
     Channel.DEPTH: _LENGTH,
 }
+_UNITS |= {each: _UNITS[each.kind] for each in Channel if each.input in FURTHER}
 _COUNTS = {
     'position': (2,),
     'wind_apparent': (2,),
@@ -140,6 +141,7 @@ def parse_input(text: str) -> InputColumns:
     given once holds for all, `position=x,y:km` as much as `position=x:km,y`; several are
     taken as written, `position=x:km,y:m`. A position in `deg` is
     latitude and longitude. Without a unit the values are SI, a pitch is a ratio.
+    `speed_through_water_2` and the like are further instruments of a kind.
 
     Raises
     ------
@@ -152,7 +154,7 @@ def parse_input(text: str) -> InputColumns:
     if not channels:
         known = ', '.join(dict.fromkeys(map(_name, _UNITS)))
         raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
-    counts = _COUNTS.get(name, (1,))
+    counts = _COUNTS.get(FURTHER.get(name, name), (1,))
     columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
     if len(columns) not in counts or not all(column for column, _ in columns):
         expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
@@ -182,8 +184,8 @@ def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) 
     text = f'{name}={",".join(columns)}'
     given = [unit for unit in stated if unit is not None]
     channel = next(channel for channel in _UNITS if _name(channel) == name)
-    if 'deg' in given and channel is Channel.POSITION:
-        channel = Channel.POSITION_GEODETIC
+    if 'deg' in given:
+        channel = GEODETIC.get(channel, channel)
     known = _UNITS[channel]
     if any(unit not in known for unit in given):
         raise ImportDataError(
@@ -202,7 +204,7 @@ def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) 
             )
     elif COMPASS in units:
         form = Form.COMPASS
-    elif channel is Channel.SPEED_OVER_GROUND and len(columns) == 2:
+    elif channel.kind is Channel.SPEED_OVER_GROUND and len(columns) == 2:
         form = Form.HYPOT
     return InputColumns(
         channel,

@@ -123,7 +123,8 @@ FORMAT = Format(
             'Units: speeds m/s kn km/h ft/s mph, lengths m km ft nmi, angles rad deg, of a '
             'heading also compass (deg clockwise from north), shaft rad/s rpm rev/s, pitch ratio '
             '%% rad deg (default: the first of each); wind_apparent=AWS:kn,AWA:deg is speed and '
-            'angle. shaft and pitch take up to four, one a shaft: shaft=port,starboard:rpm',
+            'angle. shaft and pitch take up to four, one a shaft: shaft=port,starboard:rpm. '
+            'A further log, speed or position: speed_through_water_2=COLUMN:kn, and so on to _3',
             many=True,
         ),
         Option(

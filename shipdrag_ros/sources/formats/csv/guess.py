@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import MOTION_INPUTS, Float64
+from shipdrag_ros.samples import ALL_MOTION, FURTHER, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
@@ -310,6 +310,7 @@ PLAIN_COLUMNS = {
     'depth': 'depth',
     'x,y': 'position',
     'latitude,longitude': 'position',
+    **{name: name for name, kind in FURTHER.items() if kind != 'position'},
 }
 """Columns named as the inputs are, in SI units, and their input."""
 
@@ -376,7 +377,7 @@ def guess(
         made.plain()
     else:
         made.by_names(time)
-    if not any(each.channel.input in MOTION_INPUTS for each in made.found.inputs):
+    if not any(each.channel.input in ALL_MOTION for each in made.found.inputs):
         raise ImportDataError(made.nothing())
     return made.found
 

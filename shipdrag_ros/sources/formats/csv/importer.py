@@ -231,7 +231,7 @@ class _RowSamples:
                 self._reject(columns.channel.input, rows.lines[place], bad[place])
             known[list(bad), k] = False
             value[:, k, 0], value[:, k, 1] = combined(columns.form, values)
-            if columns.channel in _SPEEDS:
+            if columns.channel.kind in _SPEEDS:
                 fast = np.abs(value[known[:, k], k, 0]) > ABSURD_SPEED_M_S
                 self._too_fast[columns.channel] += int(np.sum(fast))
             self._written[columns.channel.input] += n - len(bad)
@@ -311,7 +311,7 @@ class _RowSamples:
                 ', '.join(repr(name) for name in columns.names),
                 ', '.join(dict.fromkeys(columns.units)),
                 log.first[columns.channel],
-                geodetic=columns.channel is Channel.POSITION_GEODETIC,
+                geodetic=columns.channel.kind is Channel.POSITION_GEODETIC,
             )
             for columns, _, _ in self._inputs
             if columns.channel in log.first
@@ -357,7 +357,7 @@ def _readers(
     found = []
     for columns, here in zip(inputs, places, strict=True):
         readers = [CellReader(comma=comma)] * len(here)
-        if columns.channel is Channel.POSITION_GEODETIC:
+        if columns.channel.kind is Channel.POSITION_GEODETIC:
             cells = [sample.texts(place) for place in here]
             minutes = are_in_minutes(*cells)
             readers = [

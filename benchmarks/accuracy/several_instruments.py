@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+r(v) by several instruments of a kind: one log, two, and one of them 5 % off.
+
+    python -m benchmarks.accuracy.several_instruments --runs 20 --seed 0
+
+Simulated coastdowns with half an hour before the stop. Each log has a scale, drawn anew for each
+run from the prior of docs/model.md, and wanders by itself; the one that is off reads 5 % too much
+instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import priors
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation.scenario import GaussMarkov
+
+LEAD_S, COAST_S, SPEED_M_S = 1800.0, 1500.0, 8.2
+LOG_SD, WANDER, POSITION_SD = 0.05, GaussMarkov(0.02, 60.0), 5.0
+OFF = 0.05
+LOGS = (
+    Channel.SPEED_THROUGH_WATER,
+    Channel.SPEED_THROUGH_WATER_2,
+    Channel.SPEED_THROUGH_WATER_3,
+)
+
+
+class Case(NamedTuple):
+    """What is on board: logs, of which the first may be off, and receivers of positions."""
+
+    name: str
+    logs: int
+    positions: int = 0
+    off: bool = False
+
+
+CASES = (
+    Case('one log', 1),
+    Case('two logs', 2),
+    Case('one log, 5 % off', 1, off=True),
+    Case('one of two logs 5 % off', 2, off=True),
+    Case('one of three logs 5 % off', 3, off=True),
+    Case('one log, positions', 1, 1),
+    Case('two logs, positions twice', 2, 2),
+    Case('one of two logs 5 % off, positions', 2, 1, off=True),
+)
+
+
+def readings(case: Case, ship: Ship, seed: int) -> Block:
+    """Simulate a run as its instruments read it; the noise of one does not depend on others."""
+    scenario = Scenario(speed_m_s=SPEED_M_S, lead_in_s=LEAD_S, duration_s=COAST_S, seed=seed)
+    sensors = [Sensor(channel=log, sd=LOG_SD, coloured=WANDER) for log in LOGS[: case.logs]]
+    places = (Channel.POSITION, Channel.POSITION_2)
+    sensors += [Sensor(channel=each, sd=POSITION_SD) for each in places[: case.positions]]
+    block = sense(simulate(ship, scenario), sensors, seed=seed)
+    value = block.value.copy()
+    scales = priors.LOG_SCALE.sd * np.random.default_rng(seed).standard_normal(len(LOGS))
+    if case.off:
+        scales[0] = OFF
+    for log, scale in zip(LOGS, scales):
+        value[block.channel == log] *= 1.0 + scale
+    return replace(block, value=value)
+
+
+def score(case: Case, ship: Ship, known: Ship, seed: int) -> tuple[float, float, float]:
+    """
+    Return mean square error, mean variance (of the largest r) and cover of a run.
+
+    Parameters
+    ----------
+    case, ship
+    known
+        The ship as the estimator is told of her.
+    seed
+    """
+    stop_ns = START_NS + round(LEAD_S * 1e9)
+    window = Window.from_block(
+        readings(case, ship, seed), stop_ns, stop_ns + round(COAST_S * 1e9), before_ns=START_NS
+    )
+    found = estimate_final(window, known, Parameters()).valid_calm
+    speed = np.minimum(found.speed_m_s, ship.baseline_range_m_s[1])
+    true = ship.resistance_n(speed) / ship.mass_kg
+    largest = float(ship.resistance_n(SPEED_M_S)) / ship.mass_kg
+    error = (found.resistance_m_s2 - true) / largest
+    sigma = found.sigma_m_s2 / largest
+    cover = np.mean(np.abs(error) <= 2.0 * sigma)
+    return float(np.mean(error**2)), float(np.mean(sigma**2)), float(cover)
+
+
+def main() -> None:
+    """
+    Simulate, estimate, print.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--runs', type=int, default=20)
+    parser.add_argument('--seed', type=int, default=0, help='of the first run')
+    parser.add_argument('--no-baseline', action='store_true', help='the ship file has none')
+    options = parser.parse_args()
+    ship = replace(Ship.example(), effects=())
+    known = replace(ship, baseline=None) if options.no_baseline else ship
+    table = Table('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]')
+    for case in CASES:
+        seeds = range(options.seed, options.seed + options.runs)
+        each = np.array(
+            [
+                score(case, ship, known, seed)
+                for seed in track(seeds, description=case.name, console=Console(stderr=True))
+            ]
+        )
+        error, sigma = 100.0 * np.sqrt(each[:, :2].mean(axis=0))
+        table.add_row(case.name, f'{error:.2f}', f'{sigma:.2f}', f'{100 * each[:, 2].mean():.0f}')
+    print(f'N = {options.runs} runs a row, seeds from {options.seed}; of the largest r')
+    Console(width=80).print(table)
+
+
+if __name__ == '__main__':
+    main()
