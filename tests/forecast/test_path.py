@@ -64,7 +64,7 @@ def test_of_two_antennas_the_first_that_still_speaks_shows_the_course() -> None:
     block = sense(truth, standard_sensors(), seed=2)
     end_ns = STOP_NS + 400 * SECOND_NS
     window = Window.from_block(block, STOP_NS, end_ns, before_ns=START_NS)
-    other = replace(window.position, value=window.position.value + [1e5, 0.0])
+    other = replace(window.position, value=window.position.value + np.array([1e5, 0.0]))
     silent = window.part(STOP_NS, STOP_NS + 100 * SECOND_NS).position
     forecast = foretell(estimate(window, ship, Parameters()), ship)
     both = replace(window, further={'position_2': other})

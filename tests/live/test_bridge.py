@@ -280,7 +280,7 @@ def test_the_map_shows_one_antenna_the_first_that_still_speaks(of_first_s: int) 
     along = np.column_stack([np.arange(200.0), np.zeros(200)])
     part = slice(0, of_first_s)
     ahead.add(Block.of(Channel.POSITION, stamps[part], along[part]))
-    ahead.add(Block.of(Channel.POSITION_2, stamps, along + [0.0, 500.0]))
+    ahead.add(Block.of(Channel.POSITION_2, stamps, along + np.array([0.0, 500.0])))
     aside = 0.0 if of_first_s == 200 else 500.0
     path = ComingPath(
         int(stamps[-1]), np.array([0.0, 9.0]), np.array([[199, aside], [208, aside]])
