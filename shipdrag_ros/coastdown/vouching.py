@@ -62,6 +62,7 @@ _WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix har
 _IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
 _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
 _FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
+_TOGETHER = 0.5  # share of those of a kind that have one driver, setting or aerial
 _STILL = 0.5  # share of minutes of a source that was wrong just before
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
@@ -202,22 +203,27 @@ def sound_probabilities(
 
     nothing = {name: _evidence(_nothing(), speeds[name]) for name in names}
     least = 0 if len(names) <= _FEW else len(names) - _MOST_WRONG
-    for count in range(least, len(names) + 1):
-        for sound in combinations(names, count):
-            part = {name: speeds[name] for name in sound}
-            logs, ratio = [measured(*sound)] if sound else [], {}
-            for name in names:
-                share = _STILL if name in doubted else _WRONG_SHARE[_KIND[name]]
-                logs.append(math.log(1.0 - share if name in sound else share))
-                if name not in sound:
-                    beside = _beside(name, part, speeds[name], scales or {}, craft, measured)
-                    beside += math.log(_IN_A_SCALE[_KIND[name]]) - (logs[0] if sound else 0.0)
-                    other = math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing[name]
-                    logs.append(float(np.logaddexp(other, beside)))
-                    ratio[name] = beside - logs[-1]
-            found[sound] = math.fsum(logs)
-            for name, share in ratio.items():
-                in_a_scale[name].append(found[sound] + share)
+    sets = {
+        sound for count in range(least, len(names) + 1) for sound in combinations(names, count)
+    }
+    kinds = [
+        [one for one in names if _KIND[one] == kind] for kind in {_KIND[one] for one in names}
+    ]
+    sets |= {tuple(name for name in names if name not in of_kind) for of_kind in kinds}
+    for sound in sorted(sets):
+        part = {name: speeds[name] for name in sound}
+        logs, ratio = [measured(*sound)] if sound else [], {}
+        logs += [_share_of(of_kind, sound, doubted) for of_kind in kinds]
+        for name in names:
+            if name not in sound:
+                beside = _beside(name, part, speeds[name], scales or {}, craft, measured)
+                beside += math.log(_IN_A_SCALE[_KIND[name]]) - (logs[0] if sound else 0.0)
+                other = math.log(1.0 - _IN_A_SCALE[_KIND[name]]) + nothing[name]
+                logs.append(float(np.logaddexp(other, beside)))
+                ratio[name] = beside - logs[-1]
+        found[sound] = math.fsum(logs)
+        for name, share in ratio.items():
+            in_a_scale[name].append(found[sound] + share)
     total = float(np.logaddexp.reduce(list(found.values())))
     return Soundness(
         {sound: math.exp(each - total) for sound, each in found.items()},
@@ -226,6 +232,17 @@ def sound_probabilities(
             for name, logs in in_a_scale.items()
         },
     )
+
+
+def _share_of(names: list[int], sound: Collection[int], doubted: Collection[int]) -> float:
+    """Return the log share of minutes in which these of a kind are wrong, alone or together."""
+    shares = [_STILL if name in doubted else _WRONG_SHARE[_KIND[name]] for name in names]
+    alone = math.prod(
+        1.0 - share if name in sound else share for name, share in zip(names, shares, strict=True)
+    )
+    right = sum(name in sound for name in names)
+    together = {0: max(shares), len(names): 1.0 - max(shares)}.get(right, 0.0)
+    return math.log((1.0 - _TOGETHER) * alone + _TOGETHER * together)
 
 
 def _beside(

@@ -25,7 +25,7 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel, Float64, Int64
+from shipdrag_ros.samples import GEODETIC, Block, Channel, Float64, Int64
 
 LEAST_LEGS = 8
 _LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer ones
@@ -98,6 +98,8 @@ class Legs:
         Whether all ways over ground are from latitude and longitude.
     left_out
         Stretches that are not legs, by reason.
+    notes
+        What was not used of the records, a sentence each.
     """
 
     record: Int64
@@ -109,6 +111,7 @@ class Legs:
     length_s: float
     geodetic: bool
     left_out: Mapping[Left, int]
+    notes: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -163,6 +166,7 @@ class Legs:
             max(one.length_s for one in cut),
             all(one.geodetic for one in cut),
             {why: count for why, count in left.items() if count},
+            tuple(note for one in cut for note in one.notes),
         )
 
     def __getitem__(self, part: Int64) -> Legs:
@@ -331,7 +335,7 @@ class _LegCutter:
             raise DiagnosisError(f'{record.name!r} has no accepted sample: give another record')
         start_ns, end_ns = int(block.stamp_ns.min()), int(block.stamp_ns.max())
         try:
-            window = Window.from_block(block, start_ns, end_ns)
+            window = Window.from_block(block, start_ns, end_ns).one_of_each()
         except ValueError as error:
             raise DiagnosisError(
                 f'{record.name!r}: a clock was set within the record ({error}): cut it there'
@@ -345,9 +349,10 @@ class _LegCutter:
                 'give a coastdown (engine stopped after steady sailing), say with --window where '
                 'it is, or give a record of sailing with both a log and positions'
             )
-        sent = block.channel
-        degrees = np.count_nonzero(sent == Channel.POSITION_GEODETIC)
-        self.geodetic = by_place and degrees > np.count_nonzero(sent == Channel.POSITION)
+        sent = np.bincount(block.channel, minlength=len(Channel))
+        first = next((each for each in GEODETIC if sent[[each, GEODETIC[each]]].any()), None)
+        self.geodetic = by_place and first is not None and sent[GEODETIC[first]] > sent[first]
+        self.notes = tuple(f'{record.name}: {note}' for note in window.notes)
         self.by_place = by_place
         self.log = Timed.of(window.speed_through_water, start_ns)
         self.ground = Timed.of(ground, start_ns)

@@ -102,6 +102,7 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
         baseline='none',
         best=judged.best,
         notes=(
+            *legs.notes,
             *_about(model, int(outlier.sum())),
             *(_why(model, found, best) if judged.missing else ()),
         ),

@@ -55,8 +55,9 @@ def _verdict(found: DiagnosisResult) -> str:
                 f'(probability {probability(found.nothing)}).'
             )
         case Verdict.NONE:
+            nothing = 'nothing else' if found.baseline == 'fitted_here' else 'nothing'
             return (
-                'Model and data agree: nothing is missing that these runs could show '
+                f'Model and data agree: {nothing} is missing that these runs could show '
                 f'(probability {probability(found.nothing)}).{would_be_named(found)}'
             )
         case Verdict.NAMED if found.runs_differ:

@@ -203,15 +203,16 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
     assert window.before is not None
     heading = window.before.heading
     heading_s = _seconds(heading.time_ns, zero_ns)
-    for name in sorted(inputs, key=lambda name: CODES[name] % KIND_COUNT):
-        if not _is_place(name):
-            series = window.before.series(name)
-            time_s = _seconds(series.time_ns, zero_ns)
-            return float(steady_since(time_s, series.value, heading_s, heading.value))
-    # positions alone do not show it from sample to sample: by their means
-    series = window.before.series(next(iter(inputs)))
-    if len(series) < LEAST_STAMPS:
+    in_order = sorted(inputs, key=lambda name: CODES[name] % KIND_COUNT)
+    every = {name: window.before.series(name) for name in in_order}
+    heard = {name: series for name, series in every.items() if len(series) >= LEAST_STAMPS}
+    if not heard:
         return np.inf
+    name, series = next(iter(heard.items()))
+    if not _is_place(name):
+        time_s = _seconds(series.time_ns, zero_ns)
+        return float(steady_since(time_s, series.value, heading_s, heading.value))
+    # positions alone do not show it from sample to sample: by their means
     time_s = _seconds(series.time_ns, zero_ns)
     edges = np.arange(time_s[-1], time_s[0] - 60.0, -60.0)[::-1]
     blocks = np.searchsorted(time_s, edges)

@@ -141,24 +141,33 @@ class Window:
 
     def one_of_each(self) -> Window:
         """
-        Return a window with one instrument of each kind, the first that was heard.
+        Return a window with one instrument of each kind: the first that was heard for long.
 
         A note names the others, and says what a speed reads against that of the one used.
         """
         if not self.further:
             return self
-        heard = [name for name in self.motion if len(self.series(name))]
-        chosen = {FURTHER.get(name, name): name for name in reversed(heard)}
+        heard = {name: self.series(name) for name in self.motion if len(self.series(name))}
+        chosen: dict[str, str] = {}
+        span_ns = {name: np.ptp(series.time_ns) for name, series in heard.items()}
+        for kind in MOTION_INPUTS:
+            of_kind = [name for name in heard if FURTHER.get(name, name) == kind]
+            longest = max((span_ns[name] for name in of_kind), default=0)
+            long = [name for name in of_kind if 2 * span_ns[name] >= longest]
+            if long:
+                chosen[kind] = long[0]
         notes = []
-        for name in heard:
-            used, reads = self.series(chosen[FURTHER.get(name, name)]), self.series(name)
+        for name, reads in heard.items():
+            used = heard[chosen[FURTHER.get(name, name)]]
             if used is reads:
                 continue
             notes.append(f'{name} is not used beside {chosen[FURTHER.get(name, name)]}')
-            if reads.value.ndim == 1:
-                beside = np.interp(reads.time_ns, used.time_ns, used.value)
-                more = float(np.median(reads.value) / np.median(beside)) - 1.0
-                notes[-1] += f', against which it reads {100.0 * more:+.1f} %'
+            both = (reads.time_ns >= used.time_ns[0]) & (reads.time_ns <= used.time_ns[-1])
+            if reads.value.ndim == 1 and both.any():
+                beside = np.median(np.interp(reads.time_ns[both], used.time_ns, used.value))
+                if beside > 0.0:
+                    more = float(np.median(reads.value[both]) / beside) - 1.0
+                    notes[-1] += f', against which it reads {100.0 * more:+.1f} %'
 
         def alone(window: Window) -> Window:
             changes: dict[str, Any] = {kind: window.series(name) for kind, name in chosen.items()}
@@ -296,9 +305,13 @@ class Window:
                 },
             )
 
-        there = [Channel(code) for code in np.unique(block.channel[inside]).tolist()]
+        since_ns = start_ns if before_ns is None else min(before_ns, start_ns)
+        heard = (block.stamp_ns >= since_ns) & (block.stamp_ns <= end_ns)
+        there = [Channel(code) for code in np.unique(block.channel[heard]).tolist()]
         further = [Channel[each.name.replace('_GEODETIC', '')] for each in there]
-        further = [each for each in dict.fromkeys(further) if each.input in FURTHER]
+        further = sorted(
+            {each for each in further if each.input in FURTHER}, key=lambda c: (c.kind, c.input)
+        )
         each_position = {
             metres: (series(metres), series(degrees)) for metres, degrees in GEODETIC.items()
         }

@@ -184,9 +184,8 @@ def _range_notes(estimate: Estimate) -> list[str]:
 
 def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
     """Return the largest speed that was read, but for single bad readings."""
-    for name in ('speed_through_water', 'speed_over_ground'):
-        track = estimate.tracks.get(name)
-        if track is not None and len(track.measured) >= _AROUND:
+    for name, track in estimate.tracks_of('speed_through_water', 'speed_over_ground').items():
+        if len(track.measured) >= _AROUND:
             around = np.lib.stride_tricks.sliding_window_view(track.measured, _AROUND)
             read = float(np.median(around, axis=1).max())
             text = speed_text(read, highest_m_s=fastest_m_s)
@@ -212,8 +211,8 @@ def _residual_notes(estimate: Estimate) -> list[str]:
                 f'is {correlation:.2f}. The sensor, the sea or the fit errs slowly, and the band '
                 'is too narrow for that.'
             )
-    speed = estimate.tracks.get('speed_through_water')
-    if speed is not None and 'position' in estimate.tracks and estimate.current_m_s is None:
+    speed = next(iter(estimate.tracks_of('speed_through_water').values()), None)
+    if speed is not None and estimate.by_position and estimate.current_m_s is None:
         residual = speed.measured - speed.fitted
         mean, spread = float(np.mean(residual)), float(np.std(residual))
         if abs(mean) > max(0.2 * spread, 4.0 * spread / math.sqrt(len(residual))):
@@ -226,11 +225,11 @@ def _residual_notes(estimate: Estimate) -> list[str]:
 
 def _astern_notes(estimate: Estimate) -> list[str]:
     """Say of a ship that drag alone would have left at rest."""
-    speed = estimate.tracks.get('speed_through_water')
+    name, speed = next(iter(estimate.tracks_of('speed_through_water').items()), ('', None))
     if speed is None:
         return []
     lowest = float(np.min(speed.fitted))
-    if lowest >= -2.0 * estimate.noise_sd['speed_through_water']:
+    if lowest >= -2.0 * estimate.noise_sd[name]:
         return []
     return [
         f'The speed goes through zero, to {lowest:.2g} m/s: no drag does that. A constant force '
@@ -247,7 +246,7 @@ def _method_notes(estimate: Estimate) -> list[str]:
             'not separated and shifts the speed scale; a run on the opposite heading would '
             'show it.'
         )
-    elif 'position' in estimate.samples and estimate.current_m_s is None:
+    elif estimate.by_position and estimate.current_m_s is None:
         found.append(
             'The joint fit takes log and position to show the same speed: a current, or a log '
             'that reads wrong by a factor, bends r(v).'

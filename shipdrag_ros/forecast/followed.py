@@ -14,6 +14,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast.result import Band, Forecast, Milestone
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.rows import right
@@ -157,12 +158,12 @@ class Followed:
         EstimationError
             If there are too few readings.
         """
-        name = next((each for each in whole.tracks if each.startswith('speed')), None)
-        way = None
-        if len(window.position) > _BEHIND and 'position' in whole.samples:
-            way = _way(window, whole)
+        name = next(iter(whole.tracks_of('speed_through_water', 'speed_over_ground')), None)
+        place, way = next(iter(whole.tracks_of('position')), ''), None
+        if place and len(window.series(place)) > _BEHIND:
+            way = _way(window, window.series(place), whole)
         if name is not None:
-            series = getattr(window, name)
+            series = window.series(name)
             if len(series) <= _BEHIND:
                 raise EstimationError(f'{name}: {len(series)} readings do not show what followed')
             time_s = _since(window, series.time_ns)
@@ -171,7 +172,7 @@ class Followed:
             speed = _monotone(-series.value, sure)
             speed = _as_estimated(-speed, name, whole)
         else:
-            track = whole.tracks['position']
+            track = whole.tracks[place]
             time_s = _since(window, track.time_ns)
             speed = -_monotone(-np.gradient(track.fitted, time_s))
         if way is None:
@@ -209,11 +210,11 @@ def _since(window: Window, stamps: object) -> Float64:
     return np.asarray((np.asarray(stamps) - window.start_ns) / SECOND_NS)
 
 
-def _way(window: Window, whole: Estimate) -> tuple[Float64, Float64]:
+def _way(window: Window, places: Series, whole: Estimate) -> tuple[Float64, Float64]:
     """Return times and ways of places: she advances, but where a current sets her back."""
-    stamps = window.position.time_ns
+    stamps = places.time_ns
     half = 0.5 * float(stamps[-1] - stamps[0])
-    way = along_track((stamps - stamps[0]) / half - 1.0, window.position.value)
+    way = along_track((stamps - stamps[0]) / half - 1.0, places.value)
     time_s, current = _since(window, stamps), whole.current_m_s or 0.0
     back_m = current * time_s if current < -whole.last_speed_m_s else np.zeros(len(way))
     return time_s, _monotone(way - back_m) + back_m

@@ -69,14 +69,13 @@ class Beginning:
         Return the end of a window; over ground where positions were used.
         """
         speeds = [sd for name, sd in estimate.noise_sd.items() if name.startswith('speed')]
-        over_ground = 'position' in estimate.samples
         return cls(
             made_ns=estimate.end_ns,
             stop_m_s=float(estimate.curve.speed_m_s[-1]),
             speed_m_s=estimate.last_speed_m_s,
             speed_sd_m_s=estimate.last_speed_sigma_m_s,
             white_m_s=min((sd for sd in speeds if math.isfinite(sd)), default=0.0),
-            current_m_s=(estimate.current_m_s or 0.0) if over_ground else None,
+            current_m_s=(estimate.current_m_s or 0.0) if estimate.by_position else None,
             current_sd_m_s=estimate.current_sigma_m_s or 0.0,
         )
 

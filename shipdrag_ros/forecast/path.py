@@ -8,11 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast.result import Forecast
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64
 
 _RECENT = 0.25  # of the window, whose positions show the course
 _FEWEST = 5  # positions in it
+
+
+def places(window: Window) -> Series | None:
+    """
+    Return the positions of the first instrument that still shows the course; None where none does.
+    """
+    recent = window.part(_recent_ns(window), window.end_ns).each('position')
+    each = zip(window.each('position'), recent, strict=True)
+    return next((whole for whole, part in each if len(part) >= _FEWEST), None)
+
+
+def _recent_ns(window: Window) -> int:
+    return window.end_ns - round(_RECENT * (window.end_ns - window.start_ns))
 
 
 @dataclass(frozen=True)
@@ -38,12 +52,12 @@ class PathAhead:
         """
         Return the positions to come; None where the window shows no course.
         """
-        series = window.position
-        since_s = (series.time_ns - forecast.made_ns) / SECOND_NS
-        recent = since_s >= _RECENT * since_s[0] if len(series) else np.zeros(0, np.bool_)
-        if not forecast.over_ground or np.count_nonzero(recent) < _FEWEST:
+        series = places(window)
+        if not forecast.over_ground or series is None:
             return None
-        rows = np.column_stack([np.ones(np.count_nonzero(recent)), since_s[recent]])
+        recent = series.time_ns >= _recent_ns(window)
+        since_s = (series.time_ns[recent] - forecast.made_ns) / SECOND_NS
+        rows = np.column_stack([np.ones(len(since_s)), since_s])
         (here, speed), *_ = np.linalg.lstsq(rows, series.value[recent], rcond=None)
         length = float(np.hypot(*speed))
         if length == 0.0:

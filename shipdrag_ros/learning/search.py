@@ -475,7 +475,7 @@ def _digest(run: CoastRun) -> str:
     """Return what a run is known by: its readings."""
     found = hashlib.sha256()
     window = run.window
-    for series in (window.speed_through_water, window.position, window.speed_over_ground):
+    for series in map(window.series, window.motion):
         found.update(np.ascontiguousarray(series.time_ns).tobytes())
         found.update(np.ascontiguousarray(series.value).tobytes())
     return found.hexdigest()[:16]

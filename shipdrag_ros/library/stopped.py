@@ -13,6 +13,7 @@ from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.display import Table, ship_speed, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.result import Forecast, Milestone
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
@@ -125,8 +126,7 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
         if each.stands and each.estimate is not None
     ]
     _, coastdown, run = max(usable, key=lambda each: each[0], default=(0, None, last))
-    window, measured = _recent(last)
-    series = getattr(window, f'speed_{measured.replace(" ", "_")}')
+    window, series, measured = _recent(last)
     speed, sd = float(series.value.mean()), float(series.value.std() / np.sqrt(len(series)))
     hull = HullNow.of_file(last.ship) if coastdown is None else _hull(coastdown)
     gliding = coastdown is not None and run is last and _goes_on(coastdown, speed)
@@ -171,16 +171,17 @@ def _hull(coastdown: EndedCoastdown) -> HullNow:
     )
 
 
-def _recent(run: RunResult) -> tuple[Window, str]:
-    """Return the end of a run, and which speed it shows."""
+def _recent(run: RunResult) -> tuple[Window, Series, str]:
+    """Return the end of a run, the speed that it shows, and which it is."""
     assert run.replayed is not None
     block, _ = accepted_samples(run.replayed.run)
     if len(block):
         end_ns = int(block.stamp_ns.max())
         window = Window.from_block(block, end_ns - round(_RECENT_S * SECOND_NS), end_ns)
         for kind in ('through water', 'over ground'):
-            if len(getattr(window, f'speed_{kind.replace(" ", "_")}')) >= _FEWEST:
-                return window, kind
+            for series in window.each(f'speed_{kind.replace(" ", "_")}'):
+                if len(series) >= _FEWEST:
+                    return window, series, kind
     raise EstimationError(
         f'{run.bag!r}: no speed was read in its last {_RECENT_S:.0f} s, so the present speed is '
         'not known; give a bag that ends with readings of speed_through_water or '

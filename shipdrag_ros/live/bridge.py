@@ -66,7 +66,7 @@ from shipdrag_ros.messages.heard import (
     Samples,
     ShipFile,
 )
-from shipdrag_ros.samples import ALL_MOTION, SHAFTS, Channel
+from shipdrag_ros.samples import ALL_MOTION, FURTHER, MOTION_INPUTS, SHAFTS, Channel
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -258,23 +258,24 @@ class Bridge:
             On the clock of `hear`.
         """
         measured = [
-            SpeedNow(value, kind, self._age_s(name, now_s))
+            SpeedNow(value, kind, self._age_s(now_s, name))
             for column, (name, kind) in enumerate(_SPEEDS)
             if (value := self.trace.newest(column)) is not None
         ]
         if self._coast_ns is not None and self._speed is not None:
-            ages = [self._age_s(name, now_s) for name in ALL_MOTION]
-            age_s = min((age for age in ages if age is not None), default=None)
+            age_s = self._age_s(now_s, *MOTION_INPUTS)
             return SpeedNow(self._speed.value, 'through water, estimated', age_s)
         return min(measured, key=lambda each: max(each.age_s or 0.0, _OLD_S), default=None)
 
-    def _age_s(self, name: str, now_s: float) -> float | None:
-        """Return how long ago the node received an input; None where that is not known."""
-        status = None if self._health is None else self._health.of(f'input {name}')
-        age_s = None if status is None else status.number('age')
-        if age_s is None or self._heard_s is None:
+    def _age_s(self, now_s: float, *kinds: str) -> float | None:
+        """Return how long ago the node received any of some kinds; None if that is not known."""
+        if self._health is None or self._heard_s is None:
             return None
-        return age_s + now_s - self._heard_s
+        names = [name for name in ALL_MOTION if FURTHER.get(name, name) in kinds]
+        each = [self._health.of(f'input {name}') for name in names]
+        ages = [one.number('age') for one in each if one is not None]
+        age_s = min((age for age in ages if age is not None), default=None)
+        return None if age_s is None else age_s + now_s - self._heard_s
 
     @property
     def ship(self) -> Ship | None:

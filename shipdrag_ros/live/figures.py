@@ -19,15 +19,16 @@ from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
+from shipdrag_ros.forecast.path import places
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64
+from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
 from shipdrag_ros.ship import Ship
 
 _PLACES = 7200  # kept, one a second at most
 _STEP_S = 10  # of the ship's time, between two answers to "if she were stopped now"
-_POSITIONS = (Channel.POSITION, Channel.POSITION_GEODETIC)
+_POSITIONS = [*GEODETIC, *GEODETIC.values()]
 _NOTHING_LEFT = 'she may no longer glide, or nothing is left to foretell'
 _ENDED = {
     EndedBy.SPEED: 'she is as slow as a coastdown goes',
@@ -60,18 +61,22 @@ class Ahead:
         self.track: PagePart | None = None
         self._coming: list[ComingGlide] = []
         self._paths: list[ComingPath] = []
-        self._places: deque[tuple[int, int, int, float, float]] = deque(maxlen=_PLACES)
+        self._places: dict[int, deque[tuple[int, int, int, float, float]]] = {
+            channel: deque(maxlen=_PLACES) for channel in _POSITIONS
+        }
         self._answered: tuple[object, ...] = ()
         self._answer: PagePart | None = None
 
     def add(self, block: Block) -> None:
         """
-        Take positions among readings, the first of each second.
+        Take positions among readings, the first of each second of an instrument.
         """
         for row in np.flatnonzero(np.isin(block.channel, _POSITIONS)).tolist():
             stamp_ns, (x, y) = int(block.stamp_ns[row]), block.value[row].tolist()
-            if not self._places or stamp_ns // SECOND_NS > self._places[-1][1] // SECOND_NS:
-                self._places.append((int(block.channel[row]), stamp_ns, stamp_ns, x, y))
+            channel = int(block.channel[row])
+            kept = self._places[channel]
+            if not kept or stamp_ns // SECOND_NS > kept[-1][1] // SECOND_NS:
+                kept.append((channel, stamp_ns, stamp_ns, x, y))
 
     def begin(self) -> None:
         """
@@ -120,11 +125,13 @@ class Ahead:
             glide = next((each for each in self._coming if each.stamp_ns == path.stamp_ns), None)
             time_s = (self.forecast or {}).get('time_s', (None,))[0]
         shown = _half_way(self._paths, coast_ns) if path is None else path
-        kept = [each for each in self._places if each[1] >= coast_ns]
+        kept = [place for each in self._places.values() for place in each if place[1] >= coast_ns]
         if kept:
-            block = Block.of_samples(kept)
-            heard = Window.from_block(block, kept[0][1], kept[-1][1]).position
-            self.track = track_part(heard.value, shown, glide, time_s)
+            end_ns = max(place[1] for place in kept)
+            # two antennas or frames do not mix: that which the path goes on from
+            heard = places(Window.from_block(Block.of_samples(kept), coast_ns, end_ns))
+            if heard is not None:
+                self.track = track_part(heard.value, shown, glide, time_s)
 
     def end(self, ended_by: str) -> None:
         """

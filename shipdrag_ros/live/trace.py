@@ -14,7 +14,7 @@ from itertools import islice
 
 import numpy as np
 
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import KIND, Block, Channel
 
 FINE_S = 1800  # of 1 s each
 COARSE_S = 10
@@ -23,29 +23,31 @@ LATE_S, JUMP_S = 60, 3600  # a stamp further off than these is strange
 _STRANGE = 20  # readings in a row after which the time of all is another
 COLUMNS = ('log', 'ground', 'estimate', 'shaft')
 """Speed through water, over ground, as estimated [m/s]; the fastest shaft [rad/s]."""
-_COLUMN_OF = {
-    Channel.SPEED_THROUGH_WATER: 0,
-    Channel.SPEED_OVER_GROUND: 1,
-    Channel.SHAFT: 3,
-    Channel.SHAFT_2: 3,
-    Channel.SHAFT_3: 3,
-    Channel.SHAFT_4: 3,
+_ESTIMATE, _SHAFT = 2, 3
+_COLUMN_OF = {  # of a kind
+    int(Channel.SPEED_THROUGH_WATER): 0,
+    int(Channel.SPEED_OVER_GROUND): 1,
+    int(Channel.SHAFT): _SHAFT,
 }
-_ESTIMATE = 2
 
 TraceRow = tuple[int, float | None, float | None, float | None, float | None]
 
 
 @dataclass
 class _Bin:
-    """Sums and counts over a second."""
+    """Sums and counts over a second, of the first of the instruments that spoke in it."""
 
     sums: list[float] = field(default_factory=lambda: [0.0] * len(COLUMNS))
     counts: list[int] = field(default_factory=lambda: [0] * len(COLUMNS))
+    first: dict[int, int] = field(default_factory=dict)
 
-    def add(self, column: int, total: float, count: int) -> None:
-        self.sums[column] += total
-        self.counts[column] += count
+    def add(self, column: int, total: float, count: int, instrument: int = 0) -> None:
+        first = self.first.setdefault(column, instrument)
+        if instrument < first:
+            self.first[column], self.sums[column], self.counts[column] = instrument, 0.0, 0
+        if instrument <= first:
+            self.sums[column] += total
+            self.counts[column] += count
 
     def row(self, second: int) -> TraceRow:
         means = [
@@ -80,20 +82,26 @@ class Trace:
         """
         Take readings; what comes for a second that is closed already is left out.
         """
-        sums: list[tuple[int, int, float, int]] = []
-        for code, column in _COLUMN_OF.items():
-            rows = np.flatnonzero(block.channel == code)
-            if not len(rows):
+        sums: list[tuple[int, int, float, int, int]] = []
+        for code in np.unique(block.channel).tolist():
+            column = _COLUMN_OF.get(int(KIND[code]))
+            if column is None:
                 continue
+            rows = np.flatnonzero(block.channel == code)
             value = block.value[rows, 0]
-            if code is Channel.SPEED_OVER_GROUND:
+            if KIND[code] == Channel.SPEED_OVER_GROUND:
                 value = np.hypot(value, block.value[rows, 1])
             known = np.isfinite(value) & (np.abs(value) < 1e4)
             second = block.stamp_ns[rows[known]] // 1_000_000_000
             seconds, place, counts = np.unique(second, return_inverse=True, return_counts=True)
             totals = np.bincount(place, weights=value[known], minlength=len(seconds))
-            columns = [column] * len(seconds)
-            sums += zip(seconds.tolist(), columns, totals.tolist(), counts.tolist())
+            instrument = 0 if column == _SHAFT else code
+            sums += [
+                (second, column, total, count, instrument)
+                for second, total, count in zip(
+                    seconds.tolist(), totals.tolist(), counts.tolist(), strict=True
+                )
+            ]
         for each in sorted(sums):  # by time, all inputs abreast
             self._bin(*each)
 
@@ -143,7 +151,9 @@ class Trace:
         """
         return [*self._coarse, *self._thinning, *self._fine]
 
-    def _bin(self, second: int, column: int, total: float, count: int) -> None:
+    def _bin(
+        self, second: int, column: int, total: float, count: int, instrument: int = 0
+    ) -> None:
         off_s = second - self.newest_s
         if self.newest_s and not -LATE_S < off_s < JUMP_S:
             self._strange += 1
@@ -155,7 +165,7 @@ class Trace:
         self._strange = 0
         self.newest_s = max(self.newest_s, second)
         if not self._fine or second > self._fine[-1][0]:
-            self._open.setdefault(second, _Bin()).add(column, total, count)
+            self._open.setdefault(second, _Bin()).add(column, total, count, instrument)
 
     def _start_over(self) -> None:
         """The time of all went back: a clock was set, or a record is played again."""

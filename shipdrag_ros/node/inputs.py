@@ -337,8 +337,13 @@ class InputTopic:
 
     @property
     def is_shown(self) -> bool:
-        """Whether to speak of it: of a further instrument, where somebody publishes it."""
-        return self.name not in FURTHER or bool(self.publishers) or self.type is not None
+        """Whether to speak of it: of a further instrument, where it is published or remapped."""
+        return (
+            self.name not in FURTHER
+            or bool(self.publishers)
+            or self.type is not None
+            or self.topic != self._node.resolve_topic_name(self.name, only_expand=True)
+        )
 
     @property
     def other_types(self) -> tuple[str, ...]:

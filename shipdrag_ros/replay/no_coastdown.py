@@ -100,7 +100,8 @@ def _stood_still(result: ReplayResult) -> str:
     """Say that a speed sent one value for long, as no ship at sea does; '' where none did."""
     said = []
     blocks = [item for item in result.run.inputs() if isinstance(item, Block)]
-    for channel in (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND):
+    speeds = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
+    for channel in (each for each in Channel if each.kind in speeds):
         read = [block[block.channel == channel] for block in blocks]
         stamp_ns = np.concatenate([block.stamp_ns for block in read]) if read else np.empty(0)
         if not len(stamp_ns):

@@ -9,7 +9,7 @@ from shipdrag_ros.bags.run import Run
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import recorded_parameters
-from shipdrag_ros.samples import Block, Channel, Reason, concatenate
+from shipdrag_ros.samples import KIND, Block, Channel, Reason, concatenate
 
 
 def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameters]:
@@ -40,6 +40,6 @@ def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameter
     reason = validate(block, parameters)
     accepted = reason == Reason.ACCEPTED
     if zeros:
-        of_log = block.channel == Channel.SPEED_THROUGH_WATER
+        of_log = KIND[block.channel] == Channel.SPEED_THROUGH_WATER
         accepted |= (reason == Reason.FROZEN) & of_log & (block.value[:, 0] == 0.0)
     return block[np.flatnonzero(accepted)], parameters

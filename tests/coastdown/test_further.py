@@ -120,3 +120,17 @@ def test_of_three_logs_the_one_that_disagrees_is_doubted() -> None:
     found = sound_probabilities({int(log): each for log, each in speeds.items()}, Craft(60, 1.2))
     assert found.wrong(SECOND) > 0.99
     assert found.wrong(FIRST) < 0.05
+
+
+def test_two_logs_of_one_driver_in_a_wrong_unit_do_not_outvote_the_positions(ship: Ship) -> None:
+    logs = [Sensor(channel=log, sd=0.03) for log in (FIRST, SECOND)]
+    ground = [
+        Sensor(channel=Channel.SPEED_OVER_GROUND, sd=0.03),
+        Sensor(channel=Channel.POSITION, sd=3.0),
+    ]
+    block = sailed(ship, *logs, *ground)
+    by_log = np.isin(block.channel, (FIRST, SECOND))[:, None]
+    block = replace(block, value=np.where(by_log, 1.944, 1.0) * block.value)
+    left_out = watched(ship, block)[0].left_out()
+    assert {'speed_through_water', 'speed_through_water_2'} <= set(left_out)
+    assert 'position' not in left_out

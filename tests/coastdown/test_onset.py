@@ -144,7 +144,7 @@ def test_a_shaft_that_holds_its_speed_asks_for_more(watch, record, sensors) -> N
     assert dismissed(events)
 
 
-@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('seed', range(2))
 @pytest.mark.parametrize('shaft', [0.9, 1.0])
 def test_a_shaft_that_turns_on_has_no_veto(
     watch, record, sensors, shaft: float, seed: int
@@ -264,13 +264,13 @@ def test_a_shaft_sensor_that_reads_nothing_does_not_veto(watch, record, sensors)
     assert len(onsets(watch(block))) == 1
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 def test_a_slow_down_is_no_coastdown(watch, record, seed: int) -> None:
     block = record(orders=(EngineOrder(0.0, shaft=0.7, thrust=0.49),), seed=seed)
     assert onsets(watch(block)) == []
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 @pytest.mark.parametrize('second', ['compass', 'radar'])
 def test_a_turn_is_no_coastdown(watch, record, sensors, second: str, seed: int) -> None:
     block = record(

@@ -242,6 +242,43 @@ def test_records_are_taken_together() -> None:
     assert sd[1] < sd[0]
 
 
+def test_the_second_of_a_kind_alone_is_diagnosed_as_the_first_would_be() -> None:
+    block = CASES['log_scale'][0].block(1)
+    code = block.channel.copy()
+    for first in (Channel.SPEED_THROUGH_WATER, Channel.POSITION_GEODETIC):
+        code[block.channel == first] = Channel[f'{first.name}_2']
+    second = replace(block, channel=code)
+    one, other = (
+        diagnose_sailing([SailingRecord('s', each)], PARAMETERS) for each in (block, second)
+    )
+    assert one.verdict is Verdict.NAMED
+    assert other.candidates == one.candidates
+    assert other.where == one.where
+    assert other.where is not None
+    assert other.where.channel == 'log'
+
+
+def test_a_second_log_and_other_positions_are_left_out_and_named() -> None:
+    block = CASES['log_scale'][0].block(1)
+    more = []
+    for first in (Channel.SPEED_THROUGH_WATER, Channel.POSITION_GEODETIC):
+        part = block[block.channel == first]
+        # metres are only those of a radar
+        second = Channel[f'{first.name.removesuffix("_GEODETIC")}_2']
+        code = np.full(len(part), second, np.uint8)
+        more.append(replace(part, channel=code, value=1.1 * part.value))
+    one = diagnose_sailing([SailingRecord('s', block)], PARAMETERS)
+    found = diagnose_sailing([SailingRecord('s', in_arrival_order([*more, block]))], PARAMETERS)
+    assert found.candidates == one.candidates
+    assert found.where == one.where
+    notes = ' '.join(found.notes)
+    assert 's: position_2 is not used beside position' in notes
+    assert (
+        's: speed_through_water_2 is not used beside speed_through_water, against which it reads '
+        '+10.0 %'
+    ) in notes
+
+
 def test_the_convention_of_the_heading_turns_a_current() -> None:
     sources = (Channel.SPEED_OVER_GROUND, Channel.HEADING)
     sailing = Sailing(current_m_s=(0.383, 0.321), sources=sources)

@@ -114,3 +114,37 @@ def test_a_doubted_second_log_is_averaged_over_with_and_without_it() -> None:
     alone = replace(alone, doubted_log='speed_through_water_2', log_doubt=0.4)
     with pytest.raises(EstimationError, match='speed_through_water_2: '):
         averaged(estimate_final)(alone, SHIP, PARAMETERS)
+
+
+def test_one_that_dies_at_the_stop_keeps_no_good_one_out() -> None:
+    block = sailed(LOG, LOG_2)
+    stop_ns = START_NS + round(LEAD_S * 1e9)
+    window = window_of(block[(block.channel == LOG_2) | (block.stamp_ns <= stop_ns)])
+    assert len(window.speed_through_water) == 1
+    alone = window.one_of_each()
+    assert len(alone.speed_through_water) == 901
+    (note,) = alone.notes
+    assert note.startswith('speed_through_water is not used beside speed_through_water_2')
+    assert 'inf' not in note
+
+
+def test_one_that_was_heard_before_the_stop_alone_is_still_told_of() -> None:
+    block = sailed(LOG, LOG_2)
+    early = block.stamp_ns < START_NS + round((LEAD_S - 100.0) * 1e9)
+    window = window_of(block[(block.channel == LOG) | early])
+    assert len(window.series('speed_through_water_2')) == 0
+    assert window.before is not None
+    assert len(window.before.series('speed_through_water_2')) == 800
+
+
+def test_the_record_before_is_that_of_the_one_that_was_heard_there() -> None:
+    block = sailed(LOG, LOG_2)
+    late = block.stamp_ns >= START_NS + round(LEAD_S * 1e9)
+    # the record of the second log before the stop teaches the noise of both
+    assert mean_sigma(block[(block.channel == LOG_2) | late]) < 1.025 * mean_sigma(block)
+
+
+def test_the_estimators_of_the_first_paper_say_which_log_they_use() -> None:
+    window = window_of(sailed(LOG_2, Channel.SPEED_THROUGH_WATER_3))
+    found = estimate_final(window, SHIP, replace(PARAMETERS, estimator='s1_speed'))
+    assert any('speed_through_water_3 is not used beside' in note for note in found.notes)

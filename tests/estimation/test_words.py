@@ -164,3 +164,20 @@ def test_a_curve_over_ground_is_named_so(estimate: Estimate) -> None:
 def test_an_estimator_is_named_and_explained() -> None:
     assert words.estimator('s1_speed') == 's1_speed: orthogonal polynomial, speed alone'
     assert words.estimator('warped').endswith(words.estimator('one').partition(': ')[2])
+
+
+def test_notes_know_the_second_of_a_kind(estimate: Estimate) -> None:
+    name = 'speed_through_water'
+    track = estimate.tracks[name]
+    astern = replace(track, fitted=track.fitted - track.fitted.max())
+    known = replace(estimate, tracks={name: astern, 'position': estimate.tracks['position']})
+    second = replace(
+        known,
+        tracks={f'{each}_2': track for each, track in known.tracks.items()},
+        samples={f'{each}_2': count for each, count in known.samples.items()},
+        noise_sd={f'{each}_2': sd for each, sd in known.noise_sd.items()},
+    )
+    said = [' '.join(words.notes(each)).replace('_2', '') for each in (known, second)]
+    for part in ('the fit ends at', 'medians of', 'through zero', 'm/s more on', 'reads wrong by'):
+        assert part in said[0]
+    assert said[1] == said[0]

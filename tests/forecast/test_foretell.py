@@ -18,7 +18,7 @@ from shipdrag_ros.forecast.foretell import foretell
 from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Truth, sense, simulate, standard_sensors
 
@@ -256,3 +256,22 @@ def test_words(early: Estimate, ship: Ship) -> None:
     assert text.endswith(' nm; was 7:31')
     assert words.clock(first.time_s.median) in text
     assert words.way(100.0, ship.mass_kg) == '100 m'
+
+
+@pytest.mark.parametrize('kind', ['speed_through_water', 'position'])
+def test_the_second_of_a_kind_alone_is_foretold_and_followed(
+    window: Window, ship: Ship, kind: str
+) -> None:
+    one, why = replace(window, before=None), 'it is not there'
+    for other in sorted({*MOTION_INPUTS} - {kind}):
+        one = one.without(other, why)
+    second = replace(one.without(kind, why), further={f'{kind}_2': one.series(kind)})
+    found = []
+    for each in (one, second):
+        forecast = foretell(after(each, 600.0, ship, 'one'), ship)
+        assert forecast.over_ground is (kind == 'position')
+        whole = estimate(each, ship, Parameters(estimator='one'))
+        found.append(Followed.of(each, whole).beside(forecast, STOP_NS))
+    for first, other in zip(found[0].milestones, found[1].milestones, strict=True):
+        assert first.was_s == pytest.approx(other.was_s, abs=5.0)
+    assert found[0].pairs

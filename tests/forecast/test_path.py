@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from shipdrag_ros.estimation import Window, estimate
@@ -54,3 +56,23 @@ def test_without_positions_there_is_none() -> None:
     forecast = foretell(estimate(window, ship, Parameters()), ship)
     assert not forecast.over_ground
     assert PathAhead.of(window, forecast) is None
+
+
+def test_of_two_antennas_the_first_that_still_speaks_shows_the_course() -> None:
+    ship = Ship.example()
+    truth = simulate(ship, Scenario(speed_m_s=8.0, lead_in_s=300.0, duration_s=500.0))
+    block = sense(truth, standard_sensors(), seed=2)
+    end_ns = STOP_NS + 400 * SECOND_NS
+    window = Window.from_block(block, STOP_NS, end_ns, before_ns=START_NS)
+    other = replace(window.position, value=window.position.value + np.array([1e5, 0.0]))
+    silent = window.part(STOP_NS, STOP_NS + 100 * SECOND_NS).position
+    forecast = foretell(estimate(window, ship, Parameters()), ship)
+    both = replace(window, further={'position_2': other})
+    path, first, second = (
+        PathAhead.of(each, forecast) for each in (window, both, replace(both, position=silent))
+    )
+    assert path is not None
+    assert first is not None
+    assert second is not None
+    assert np.array_equal(first.position_m, path.position_m)
+    assert np.allclose(second.position_m - path.position_m, [1e5, 0.0], atol=1e-3)

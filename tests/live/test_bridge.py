@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.applications import Starlette
 
@@ -20,8 +21,9 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.bridge import Bridge
+from shipdrag_ros.live.bridge import Bridge, SpeedNow
 from shipdrag_ros.live.earlier import recorded_runs
+from shipdrag_ros.live.figures import Ahead
 from shipdrag_ros.live.headline import (
     Check,
     Held,
@@ -33,11 +35,22 @@ from shipdrag_ros.live.headline import (
     shaft_check,
     wind_check,
 )
+from shipdrag_ros.live.outputs import ComingPath
 from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
 from shipdrag_ros.messages import EventKind, EventNote, event_message
-from shipdrag_ros.messages.heard import ERROR, Health, NodeMessage, Status, health_of
+from shipdrag_ros.messages.heard import (
+    ERROR,
+    OK,
+    STALE,
+    Health,
+    NodeMessage,
+    Samples,
+    Status,
+    health_of,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
@@ -242,6 +255,41 @@ def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> N
 def test_why_it_is_not_said_what_a_stop_would_do() -> None:
     assert Bridge().parts(0.0)['if_stopped'] == {'why': 'the ship is not known yet'}
     assert Bridge(Ship.load(SHIP)).parts(0.0)['if_stopped'] == {'why': 'no speed is read'}
+
+
+@pytest.mark.parametrize('first_m_s', [None, 3.0])
+def test_where_the_first_log_is_silent_the_second_shows_the_speed(first_m_s: float | None) -> None:
+    bridge = Bridge(Ship.load(SHIP))
+    stamps = 10**18 + np.arange(200) * 10**9
+    if first_m_s is not None:
+        log = Block.of(Channel.SPEED_THROUGH_WATER, stamps[:90], np.full(90, first_m_s))
+        bridge.hear(Samples(log), 0.0)
+    second = Block.of(Channel.SPEED_THROUGH_WATER_2, stamps, np.full(200, 7.0))
+    bridge.hear(Samples(second), 0.0)
+    of_first = Status('n', 'input speed_through_water', STALE, 'silent', {'age [s]': '110'})
+    of_second = Status('n', 'input speed_through_water_2', OK, '', {'age [s]': '0.5'})
+    bridge.hear(Health((of_first, of_second)), 10.0)
+    assert bridge.speed(11.0) == SpeedNow(7.0, 'through water', 1.5)
+    assert 'time_s' in bridge.parts(11.0)['if_stopped']
+
+
+@pytest.mark.parametrize('of_first_s', [0, 40, 200])
+def test_the_map_shows_one_antenna_the_first_that_still_speaks(of_first_s: int) -> None:
+    ahead = Ahead()
+    stamps = 10**18 + np.arange(200) * 10**9
+    along = np.column_stack([np.arange(200.0), np.zeros(200)])
+    part = slice(0, of_first_s)
+    ahead.add(Block.of(Channel.POSITION, stamps[part], along[part]))
+    ahead.add(Block.of(Channel.POSITION_2, stamps, along + np.array([0.0, 500.0])))
+    aside = 0.0 if of_first_s == 200 else 500.0
+    path = ComingPath(
+        int(stamps[-1]), np.array([0.0, 9.0]), np.array([[199, aside], [208, aside]])
+    )
+    ahead.take_path(path, int(stamps[0]))
+    assert ahead.track is not None
+    was = np.array(ahead.track['was'])
+    assert was[0] == pytest.approx([-199.0, 0.0])
+    assert np.ptp(was[:, 1]) < 1.0
 
 
 def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:

@@ -28,6 +28,20 @@ def test_a_row_is_the_mean_of_its_second_and_is_given_once() -> None:
     assert trace.closed(all_of_it=True) == [(START_S + 2, 4.0, None, None, None)]
 
 
+def test_the_first_instrument_that_speaks_in_a_second_is_drawn() -> None:
+    trace = Trace()
+    seconds = START_S + np.arange(3)
+    trace.add(readings(Channel.SPEED_THROUGH_WATER_2, seconds, 7.0))
+    trace.add(readings(Channel.SPEED_THROUGH_WATER, seconds[1:2], 5.0))
+    trace.add(readings(Channel.SPEED_THROUGH_WATER_3, seconds[:2], 9.0))
+    trace.add(Block.of(Channel.SPEED_OVER_GROUND_3, [START_S * 10**9], [[3.0, 4.0]]))
+    assert [row[1:3] for row in trace.closed(all_of_it=True)] == [
+        (7.0, 5.0),
+        (5.0, None),
+        (7.0, None),
+    ]
+
+
 def test_days_are_thinned_and_forgotten() -> None:
     trace = Trace()
     for day in range(3):

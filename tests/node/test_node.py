@@ -114,6 +114,15 @@ def test_a_further_log_is_spoken_of_where_somebody_publishes_it(
     assert topics_in(the_bag(tmp_path))['/speed_through_water_2'] == 5
 
 
+def test_a_further_log_that_is_remapped_to_where_nobody_publishes_is_spoken_of(
+    start_node: Any, diagnostics: Any
+) -> None:
+    start_node('-r', 'speed_through_water_2:=/log2/sped', '-r', '__ns:=/ship')
+    status = diagnostics.wait_for('input speed_through_water_2', 'no')
+    assert '/log2/sped' in {item.value for item in status.values}
+    assert diagnostics.of('input speed_through_water_3') is None
+
+
 def test_hears_a_publisher_of_any_quality_of_service(
     start_node: Any, peer: Any, diagnostics: Any
 ) -> None:

@@ -18,17 +18,24 @@ BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass
 STAMPS = 10**18 + np.arange(1800) * 10**9
 
 
-@pytest.mark.parametrize('from_s', [0, 600])
+@pytest.mark.parametrize(
+    ('from_s', 'channel'),
+    [
+        (0, Channel.SPEED_THROUGH_WATER),
+        (600, Channel.SPEED_THROUGH_WATER),
+        (600, Channel.SPEED_OVER_GROUND_3),
+    ],
+)
 def test_a_log_that_stands_still_is_told(
-    write_run: Callable[..., Path], tmp_path: Path, from_s: int
+    write_run: Callable[..., Path], tmp_path: Path, from_s: int, channel: Channel
 ) -> None:
     speed = 4.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed[from_s:] = 4.017
-    path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
+    path = write_run(tmp_path / 'a.mcap', Block.of(channel, STAMPS, speed))
     (run,) = open_runs([path])
     why = why_no_coastdown(replay(run, ship=BOAT))
     minutes = (1799 - from_s) / 60.0
-    assert f'speed_through_water stood still at 4.02 m/s for {minutes:.0f} min' in why
+    assert f'{channel.input} stood still at 4.02 m/s for {minutes:.0f} min' in why
 
 
 @pytest.mark.parametrize('steady', [0.0, 4.0])

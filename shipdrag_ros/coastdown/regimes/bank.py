@@ -113,7 +113,7 @@ class Bank(NamedTuple):
             np.array([0.0, 0.0, np.nan]),
             np.full(SAID, np.nan),
             np.zeros(OUTS),
-            np.zeros((STATES + 1, STATES)),
+            np.zeros((2, STATES)),
         )
 
 
@@ -290,7 +290,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
         bear(all_, setting, both, not np.isnan(said[RATE]))
     advance = 0.0 if np.isnan(way) else way
     for i in range(all_.used[0]):
-        slowing = predict(all_, i, setting, used, advance, bank.work)
+        slowing = predict(all_, i, setting, used, advance)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
     thin(all_, setting)

@@ -88,6 +88,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     S1 (1)-(13). Samples of one input are weighted equally. `w` is of the
     repeatable sigma, which is S1's.
     """
+    window = window.one_of_each()
     inputs = _inputs(window, parameters)
     solution = _solve(inputs)
     _check_deceleration(inputs, solution)
