@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GLIDED,
     GONE,
     GROUND,
     GUST,
@@ -61,6 +62,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RATE,
     REGIME,
     REVS,
+    RUDDER,
     SINCE,
     STANDS,
     STATES,
@@ -254,6 +256,8 @@ def predict(
         if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
+        if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
+            gusts = f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -386,7 +390,9 @@ def _driving(
 
 
 @compiled(uncounted=True)
-def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float) -> float:
+def _running_down(
+    f: Float64, nu: float, u_part: float, left: float, part: float, scaled: bool
+) -> float:
     """
     Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
 
@@ -394,7 +400,7 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
     """
     falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
     if np.isnan(f[FREE]):
-        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
+        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) if scaled else 1.0
         f[FREE] = nu / falls
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
@@ -404,14 +410,20 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
 
 
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
+def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> float:
     """
     Return the density of the revs of a screw that does not drive.
+
+    Where they are not `scaled` by steady sailing, they are so by the most turns a metre there
+    were, and may be as many.
     """
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
-            return _as_usual(f, nu, u_part, 0.05, 0.3)
+            return _as_usual(f, nu, u_part, 0.05, 0.3 if scaled else 0.05)
+        if not scaled:
+            f[REVS] = nu / u_part
+            return 1.0 / u_part if nu < u_part + n.SHAFT_SD[0] else 0.0
         f[REVS] = min(nu / u_part, n.WINDMILL[2])
         wide = math.hypot(n.SHAFT_SD[0], n.WINDMILL[1] * u_part)
         at = n.WINDMILL[0] * u_part
@@ -421,29 +433,34 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         f[REVS] = nu
         # or anything below its last: it runs down
-        return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
+        below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+        if not scaled and last < n.CREEPS:  # or creeps on
+            return (stands + below + _off(nu, last)) / 3.0
+        return 0.5 * stands + 0.5 * below
     if kind == HELD:  # a sensor that is stuck stays where it was
         f[REVS] = nu
-    moves = 0.1 if kind == HELD else 0.01
+    moves = 0.1 if kind == HELD and scaled else 0.01
     return (1.0 - moves) * _off(nu, revs) + moves
 
 
 @compiled(uncounted=True)
 def _shaft(
-    bank: Histories,
-    i: int,
-    said: Float64,
-    log_first: float,
-    now_s: float,
-    step_s: float,
-    several: bool,
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float, now_s: float
 ) -> float:
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
+    several, scaled = setting.shafts > 1, setting.engine == 0.0
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
-        return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
+        astern = regime == BRAKE or (regime == AMID and not scaled)
+        return math.log(1.0 if astern else n.SHAFT_LIES)
+    if regime == AMID and not scaled:  # at any revs, mostly at those of before
+        before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
+        f[REVS] = nu
+        if np.isnan(before) or (stands and before >= n.CREEPS):
+            return math.log(n.BAD if stands else 1.0)
+        return math.log(0.99 * _off(nu, before) + 0.01)
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0
     elif regime in (DRIVEN, LEVEL, TURN):
@@ -455,13 +472,13 @@ def _shaft(
         if regime == GLIDE and kind >= HELD and np.isnan(f[REVS]) and not np.isnan(f[FREE]):
             f[REVS] = f[FREE] * math.exp(min(f[BEFORE] - log_first, 1.0))  # as before the stop
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
-        if regime == GLIDE and kind < HELD and age_s < step_s:
+        if regime == GLIDE and kind < HELD and age_s < setting.step_s:
             # it stopped within the bin, of which the revs are a mean
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0 and kind < HELD:
-            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8)
+            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
         else:
-            density = _dragged(f, kind, nu, u_part)
+            density = _dragged(f, kind, nu, u_part, scaled)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
             density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
@@ -531,11 +548,11 @@ def _by_shafts(
     """Return the log density of the revs, and date the stop and the end of thrust by them."""
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
-    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
+    shown, scaled = _shaft(bank, i, setting, said, log_first, now_s), setting.engine == 0.0
     # a slow error of revs does not turn their sign
-    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
+    gained = shown if said[LOW] < _REVERSED or not scaled else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
-    if young and bank.whole[i, KIND] < HELD:
+    if young and scaled and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
         unchanged = math.log(_off(said[LOW], 1.0) + n.SHAFT_LIES)
         gained += (1.0 - n.SHAFT_TEMPER) * min(shown - unchanged, 0.0)
@@ -556,7 +573,7 @@ def weigh(
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[STATES]
     gained = f[EXCESS] = 0.0
-    bad = float(n.BAD_DENSITY)
+    bad, claimed = float(n.BAD_DENSITY), setting.engine > 0.0
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
@@ -570,7 +587,9 @@ def weigh(
             h[j] = 0.0
         h[LN_U] = u
         expected = u + f[MEAN_U]
-        sd = noise[N_LOG]
+        sd, value = noise[N_LOG], said[which]
+        if claimed and regime == AMID:  # an engine may drive her astern
+            value = abs(value)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
             h[WANDER], h[LAG] = 1.0, longer
@@ -580,7 +599,10 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, setting.hull)
+        if claimed:  # a ship at rest is never quite so
+            rest = math.exp(setting.hull.first - 1.0)
+            sd = math.hypot(sd, rest * (rest / u) ** 4)
+        shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
         gained += shown
         f[EXCESS] += excess
     if not np.isnan(said[ADVANCE]):
@@ -593,16 +615,19 @@ def weigh(
         # errors of fixes turn a course by more, the shorter the way
         sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
-        turning = regime in (TURN, GLIDE_TURN, AMID)
+        turning = regime in (TURN, GLIDE_TURN) or (regime == AMID and not claimed)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
+    if not np.isnan(said[RUDDER]):
+        sd = n.RUDDER[1 if regime in (TURN, GLIDE_TURN) else 0]
+        gained += n.SHAFT_TEMPER * math.log(_normal(said[RUDDER], sd) + n.SHAFT_LIES)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
     # a covariance that rounding broke weighs nothing
     f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
-    if regime in (DRIVEN, TURN, AMID):
+    if regime in (DRIVEN, TURN) or (regime == AMID and bank.whole[i, GLIDED] == 0):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])
