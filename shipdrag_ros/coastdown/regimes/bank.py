@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import amid, bear, driven, glides, levels, switch, thin
+from shipdrag_ros.coastdown.regimes.births import amid, bear, brakes, driven, glides, levels, switch, thin
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import predict, pushes, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
@@ -128,7 +128,9 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
         speed = log if by_log else track
         if claimed:  # she may be at rest, or go astern
             by_log = not np.isnan(log) and liar != THE_LOG
-            speed = max(math.exp(hull.first - 1.0), abs(log if by_log else track))
+            speed = log if by_log else track
+            if not np.isnan(speed):
+                speed = max(math.exp(hull.first - 1.0), abs(speed))
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
@@ -169,8 +171,9 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             if claimed:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:
-                    odds = n.TOLD[0] / (1.0 - n.TOLD[0])
-                    glides(all_, j, setting, -setting.step_s, len(n.ENGINE) * odds)
+                    odds = len(n.ENGINE) * n.TOLD[0] / (1.0 - n.TOLD[0])
+                    glides(all_, j, setting, -setting.step_s, (1.0 - n.BRAKED) * odds)
+                    brakes(all_, j, setting, -setting.step_s, n.BRAKED * odds)
 
 
 @compiled(uncounted=True)

@@ -26,10 +26,10 @@ from shipdrag_ros.coastdown.regimes.state import (
     SHAFTS,
 )
 from shipdrag_ros.coastdown.tracking import rep103_yaw
-from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Float64
+from shipdrag_ros.samples import FURTHER, MOTION_INPUTS, SECOND_NS, Float64
 
 _BINS, _MOST = 60, 150  # of a window
 _BEFORE = 60  # at most
@@ -89,9 +89,10 @@ class _Bins(NamedTuple):
         """
         Return times [bins] and values of an input.
         """
-        found: list[Series] = [getattr(part, name) for part in self.parts]
-        if number is not None:
-            found = [each[number] for each in found]  # type: ignore[index]
+        if number is None:
+            found = [part.series(name) for part in self.parts]
+        else:
+            found = [getattr(part, name)[number] for part in self.parts]
         time_ns = np.concatenate([each.time_ns for each in found])
         value = np.concatenate([each.value for each in found])
         place = (time_ns - self.zero_ns) / (SECOND_NS * self.step_s)
@@ -112,6 +113,24 @@ class _Bins(NamedTuple):
         return out
 
 
+    def speeds(self, kind: str) -> Float64:
+        """
+        Average a speed: of the first instrument, where it is silent of others in its scale.
+        """
+        out = np.full(self.bins, np.nan)
+        for name in _names(self.parts[-1], kind):
+            other = self.means(*self.of(name))
+            both = np.isfinite(out) & np.isfinite(other) & (other != 0.0)
+            scale = float(np.median(out[both] / other[both])) if both.any() else 1.0
+            out = np.where(np.isnan(out), scale * other, out)
+        return out
+
+
+def _names(window: Window, kind: str) -> list[str]:
+    """Return the inputs of a kind."""
+    return [name for name in window.motion if FURTHER.get(name, name) == kind]
+
+
 def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binned | None:
     """
     Bin a window and the record before it.
@@ -130,10 +149,8 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
         None where nothing shows a speed.
     """
     length_s = (window.end_ns - window.start_ns) / SECOND_NS
-    heard = (window.speed_through_water, window.speed_over_ground, window.position)
-    apart = [
-        float(np.median(np.diff(each.time_ns))) / SECOND_NS for each in heard if len(each) > 2
-    ]
+    heard = [series.time_ns for series in window.each(*MOTION_INPUTS) if len(series) > 2]
+    apart = [float(np.median(np.diff(time_ns))) / SECOND_NS for time_ns in heard]
     if not apart:
         return None
     step_s = max(min(longest_s, length_s / _BINS), min(apart), length_s / _MOST)
@@ -153,8 +170,8 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     with np.errstate(invalid='ignore'):
         opposed = (np.cos(course - yaw) < _OPPOSED) & (step_s > 1.5 * min(apart))
         sign = np.where(opposed, -1.0, 1.0)
-    said[:, LOG] = bins.means(*bins.of('speed_through_water'))
-    said[:, GROUND] = sign * bins.means(*bins.of('speed_over_ground'))
+    said[:, LOG] = bins.speeds('speed_through_water')
+    said[:, GROUND] = sign * bins.speeds('speed_over_ground')
     said[:, ADVANCE] *= sign
     by_compass = bool(np.isfinite(heading).any())
     at = bins.of('heading')[0] if by_compass else np.empty(0)
@@ -200,7 +217,9 @@ def _turned(angle: Float64) -> Float64:
 
 def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
     """Put the way of each bin along the course into `said`; return the course."""
-    place, value = bins.of('position')
+    heard = bins.parts[-1]
+    track = max(_names(heard, 'position'), key=lambda name: len(heard.series(name)))
+    place, value = bins.of(track)
     if not len(place):
         return np.full(bins.bins, np.nan)
     east, north = (bins.means(place, value[:, axis]) for axis in (0, 1))

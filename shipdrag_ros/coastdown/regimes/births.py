@@ -202,20 +202,30 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
 
 
+@compiled(inline=True, uncounted=True)
+def _engages(bank: Histories, j: int) -> None:
+    """End what the screw dragged."""
+    kind = bank.whole[j, GLIDE_KIND]
+    bank.mean[j, LN_A] -= n.DRAGGED[kind]
+    bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[kind] * n.DRAGGED[kind]
+
+
 @compiled(uncounted=True)
 def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """
     Let the engine go to another level, or engage.
     """
+    regime = bank.whole[i, REGIME]
     if setting.engine > 0.0:  # at any level
         for kind in range(len(n.ENGINE)):
-            if bank.whole[i, REGIME] != AMID or bank.whole[i, KIND] != kind:
+            if regime != AMID or bank.whole[i, KIND] != kind:
                 j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
                 if j >= 0:
+                    if regime != AMID:
+                        _engages(bank, j)
                     amid(bank, j, setting, kind)
         return
     f = bank.number[i]
-    regime = bank.whole[i, REGIME]
     engaged = regime in (DRIVEN, LEVEL)
     base = balance(bank.mean[i], f, regime, now_s)[0] if engaged else f[BEFORE]
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
@@ -234,10 +244,8 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
-            if not engaged:  # what the screw dragged is over
-                drag = n.DRAGGED[bank.whole[i, KIND]]
-                bank.mean[j, LN_A] -= drag
-                bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[bank.whole[i, KIND]] * drag
+            if not engaged:
+                _engages(bank, j)
 
 
 @compiled(uncounted=True)
@@ -247,14 +255,16 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     """
     x, f = bank.mean[j], bank.number[j]
     if setting.engine > 0.0:
-        f[FIRST_A] = n.ENGINE[kind] * setting.engine
+        f[FIRST_A] = n.ENGINE_GUST[kind] * setting.engine
         free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
         free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
+        sd = n.ENGINE[kind] * setting.engine
     else:
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
         f[FIRST_A] = math.exp(law)
+        sd = n.AMID[1] * f[FIRST_A]
     bank.whole[j, KIND], f[REVS] = kind, np.nan
-    free(bank, j, OPEN, 0.0, (n.AMID[1] * f[FIRST_A]) ** 2)
+    free(bank, j, OPEN, 0.0, sd * sd)
 
 
 @compiled(uncounted=True)
@@ -278,11 +288,13 @@ def _turns(
 
 
 @compiled(uncounted=True)
-def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
-    """Let something but the water slow her."""
-    brakes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
-    for k in range(brakes):
-        j = _born(bank, i, now_s, chance / brakes, BRAKE, 1.0)
+def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """
+    Let something but the water slow her.
+    """
+    sizes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
+    for k in range(sizes):
+        j = _born(bank, i, now_s, chance / sizes, BRAKE, 1.0)
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
                 _glide(bank, j, setting)
@@ -403,7 +415,7 @@ def _children(
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
             stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
         glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-        _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
+        brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
         levels(bank, i, setting, now_s, level * hours)
         if not claimed:
             _turns(bank, i, setting, now_s, turn * hours, TURN)
@@ -414,7 +426,7 @@ def _children(
         if steered:
             _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
             left += n.GLIDE_TURN
-        _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
+        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
     elif regime == BRAKE:
         glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
         levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)

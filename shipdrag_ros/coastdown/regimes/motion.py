@@ -460,7 +460,8 @@ def _shaft(
         f[REVS] = nu
         if np.isnan(before) or (stands and before >= n.CREEPS):
             return math.log(n.BAD if stands else 1.0)
-        return math.log(0.99 * _off(nu, before) + 0.01)
+        moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
+        return math.log((1.0 - moves) * _off(nu, before) + moves)
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0
     elif regime in (DRIVEN, LEVEL, TURN):
@@ -588,7 +589,9 @@ def weigh(
         h[LN_U] = u
         expected = u + f[MEAN_U]
         sd, value = noise[N_LOG], said[which]
-        if claimed and regime == AMID:  # an engine may drive her astern
+        rest = math.exp(setting.hull.first - 1.0)
+        # an engine may drive her astern, and a ship at rest is never quite so
+        if claimed and (regime == AMID or abs(value) < rest):
             value = abs(value)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
@@ -599,8 +602,7 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        if claimed:  # a ship at rest is never quite so
-            rest = math.exp(setting.hull.first - 1.0)
+        if claimed:
             sd = math.hypot(sd, rest * (rest / u) ** 4)
         shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
         gained += shown
