@@ -165,6 +165,9 @@ class _Judge:
                 window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
             )
         first, last = reading.dates(kept, *which)
+        for gap in gaps:
+            first = max(first, gap[1]) if gap[1] == kept[0] else first
+            last = min(last, gap[0]) if gap[0] == kept[1] else last
         kept = kept[0], self._to_rest(kept[1])
         start_ns = window.start_ns if kept[0] <= self._binned.before else self._ns(first)
         end_ns = window.end_ns if kept[1] >= len(self._binned.said) else self._ns(last)
@@ -209,8 +212,8 @@ class _Judge:
 
     def _to_rest(self, end: int) -> int:
         """Return the last bin, where she is all but at rest from there on: that tells nothing."""
-        rest = np.abs(self._binned.speed[end - 1 :]) < self._slow
-        return len(self._binned.said) if np.all(rest) else end
+        rests = np.abs(self._binned.speed[end - 1 :]) < self._reading.rest
+        return len(self._binned.said) if np.all(rests) else end
 
     def _swing(self, span: _SPAN) -> float:
         """Return the angle over which the heading swings in some bins [rad]."""
@@ -219,11 +222,11 @@ class _Judge:
         return float(np.ptp(np.cumsum(turned))) if not np.isfinite(rudder).any() else np.inf
 
     def _worth(self, span: _SPAN) -> float:
-        """Return the time that is kept, times the part of the speed that is lost in it."""
+        """Return the time that is kept, times the speed that is lost in it."""
         first = float(np.nanmean(self._binned.speed[span[0] : span[0] + 3]))
         if not first > self._slow:
             return -1.0
-        return (span[1] - span[0]) * self._reading.lost(span) / first
+        return (span[1] - span[0]) * self._reading.lost(span)
 
     def _gaps(self, data_stop_s: float) -> list[_SPAN]:
         """Return the bins of stretches in which nothing shows the motion for long."""
@@ -266,7 +269,7 @@ class _Judge:
     ) -> tuple[Dismissal, str]:
         """Name the reason of a cut."""
         speed = self._binned.speed[first:last]
-        if 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
+        if regime != BRAKES and 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
             return Dismissal.SLOW, f'she is all but at rest, at {np.nanmax(speed):.2g} m/s'
         if np.nansum(speed) < 0.0:
             fastest = -float(np.nanmin(speed))

@@ -50,11 +50,14 @@ class WindowRegimes:
         What it was told.
     probability : (4, bins)
         That an engine acts, that she glides, that something stops her, that she glides in a turn.
+    rest
+        Speed of a ship at rest, which is never quite so [m/s].
     """
 
     binned: Binned
     spans: Spans
     probability: Float64
+    rest: float
 
     def stretches(self, *which: int) -> list[tuple[int, int]]:
         """
@@ -82,7 +85,9 @@ class WindowRegimes:
         step_s = self.binned.step_s
         found = self.spans.part(np.isin(self.spans.what, codes))
         held = []
-        for at in (span[0] + 0.5, span[1] - 0.5):
+        likely = span[0] + np.flatnonzero(self.probability[list(which), slice(*span)].sum(0) > 0.5)
+        ends = (likely[0], likely[-1]) if len(likely) else (span[0], span[1] - 1)
+        for at in (ends[0] + 0.5, ends[1] + 0.5):
             held.append(found.part((found.begin_s < at * step_s) & (at * step_s < found.end_s)))
         first, last = held
         begin = median(first.date_s, first.weight) / step_s if len(first.weight) else span[0]
@@ -108,10 +113,12 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     setting = BankSetting.of(hull, binned.step_s, shafts=int(heard.sum()))._replace(
         told_s=binned.before * binned.step_s, engine=max(resistance, binned.swing)
     )
-    # a log errs by a part of the speed at which she sails
-    wanders = n.WANDER * binned.top / math.exp(hull.sails)
+    # a log errs by less where she is slower than she sails
+    wanders = n.WANDER * min(binned.top / math.exp(hull.sails), 1.0)
     runs = []
-    for gust, wander, wander_s in product(n.GUST, wanders, n.WANDER_S[1:]):
+    short, long = n.WANDER_S
+    settings = [*product(n.GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
+    for gust, wander, wander_s in settings:
         noise = binned.noise.copy()
         noise[N_GUST] = gust
         noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
@@ -128,7 +135,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
         probability_of(joined.part(np.isin(joined.what, codes)), len(binned.said), binned.step_s)
         for codes in REGIMES
     ]
-    return WindowRegimes(binned, joined, np.array(probability))
+    return WindowRegimes(binned, joined, np.array(probability), math.exp(hull.first - 1.0))
 
 
 def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, Spans]:

@@ -458,8 +458,11 @@ def _shaft(
     if regime == AMID and not scaled:  # at any revs, mostly at those of before
         before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
         f[REVS] = nu
-        if np.isnan(before) or (stands and before >= n.CREEPS):
+        if np.isnan(before):
             return math.log(n.BAD if stands else 1.0)
+        if stands and before >= n.CREEPS:
+            stops = n.MANOEUVRE * n.OF_MANOEUVRES[0] * n.BIN_S / 3600.0  # as often as she glides
+            return math.log(n.BAD * stops)
         moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
         return math.log((1.0 - moves) * _off(nu, before) + moves)
     if regime == AMID:
@@ -612,18 +615,20 @@ def weigh(
     else:  # the next fix begins the way anew
         way = 0.5 * setting.step_s * (math.exp(x[LN_U]) + x[CURRENT])
         _forget(x, p, WAY, way, noise[N_FIX] ** 2)
+    turning = regime in (TURN, GLIDE_TURN) or (
+        regime == AMID and (not claimed or bank.whole[i, KIND] == len(n.ENGINE) - 1)
+    )
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way
         sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
-        turning = regime in (TURN, GLIDE_TURN) or (regime == AMID and not claimed)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
     if not np.isnan(said[RUDDER]):
-        sd = n.RUDDER[1 if regime in (TURN, GLIDE_TURN) else 0]
+        sd = n.RUDDER[1 if turning else 0]
         gained += n.SHAFT_TEMPER * math.log(_normal(said[RUDDER], sd) + n.SHAFT_LIES)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
