@@ -84,15 +84,16 @@ class WindowRegimes:
         codes = [code for each in which for code in REGIMES[each]]
         step_s = self.binned.step_s
         found = self.spans.part(np.isin(self.spans.what, codes))
-        held = []
-        likely = span[0] + np.flatnonzero(self.probability[list(which), slice(*span)].sum(0) > 0.5)
-        ends = (likely[0], likely[-1]) if len(likely) else (span[0], span[1] - 1)
-        for at in (ends[0] + 0.5, ends[1] + 0.5):
-            held.append(found.part((found.begin_s < at * step_s) & (at * step_s < found.end_s)))
-        first, last = held
-        begin = median(first.date_s, first.weight) / step_s if len(first.weight) else span[0]
-        end = median(last.end_s, last.weight) / step_s if len(last.weight) else span[1]
-        return max(float(begin), span[0] - 0.5), min(float(end), span[1] + 0.5)
+        likely = self.probability[list(which), slice(*span)].sum(axis=0)
+        likely = span[0] + np.flatnonzero(likely >= min(0.5, likely.max()))
+        places = []
+        for at, dated in ((likely[0], 'date_s'), (likely[-1], 'end_s')):
+            at_s = (at + 0.5) * step_s
+            held = found.part((found.begin_s < at_s) & (at_s < found.end_s))
+            share = held.weight / held.weight.sum()
+            places.append(median(getattr(held, dated), share) / step_s)
+        begin, end = places
+        return max(begin, span[0] - 0.5), min(end, span[1] + 0.5)
 
 
 def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | None:
