@@ -145,7 +145,7 @@ class _Judge:
     def __init__(
         self, window: Window, reading: WindowRegimes, slow: float, turn_rad: float
     ) -> None:
-        self._slow, self._turn_rad, self._turns = slow, turn_rad, False
+        self._slow, self._turn_rad = slow, turn_rad
         self._window = window
         self._reading = reading
         self._binned = reading.binned
@@ -179,7 +179,8 @@ class _Judge:
         ]
         cuts = _fitted(cuts, start_ns, end_ns)
         notes: tuple[str, ...] = ()
-        if self._turns and TURNS in which and any(reading.stretches(TURNS)):
+        seen = any(reading.stretches(TURNS)) if TURNS in which else bool(len(window.heading))
+        if seen and self._swing(kept) > self._turn_rad:
             part = float(reading.probability[TURNS, kept[0] : kept[1]].mean())
             notes = (
                 f'she turns in {part:.0%} of it: the drag of drifting and turning is part of r',
@@ -205,8 +206,7 @@ class _Judge:
         if both is None:
             return None, ()
         alone, lost_alone = most(GLIDES)
-        self._turns = self._swing(both) > self._turn_rad
-        if self._turns and lost_alone >= _MOST * lost:
+        if self._swing(both) > self._turn_rad and lost_alone >= _MOST * lost:
             return alone, (GLIDES,)
         return both, (GLIDES, TURNS)
 

@@ -62,7 +62,7 @@ def is_whole(found: GivenPart) -> bool:
 # what a shaft says
 
 
-@pytest.mark.parametrize('fraction', [0.35, 0.8])
+@pytest.mark.parametrize('fraction', [0.35, 0.6, 0.8])
 def test_a_shaft_that_the_water_turns_is_no_thrust(fraction: float) -> None:
     speed = glide(TIME_S)
     assert is_whole(judged(block(LOG, noisy(speed)), block(SHAFT, fraction * 3.0 * speed)))
@@ -74,6 +74,16 @@ def test_the_glide_begins_where_the_shaft_stops() -> None:
     assert reasons(found) == {Dismissal.THRUST}
     assert kept_s(found) == (pytest.approx(80.0, abs=BIN_S), LENGTH_S)
     assert 'the shaft turns' in found.cuts[0].text
+
+
+def test_the_last_of_several_shafts_to_stop_counts() -> None:
+    shafts = [
+        block(channel, np.where(end_s > TIME_S, 12.0, 0.0))
+        for channel, end_s in ((SHAFT, 10.0), (Channel.SHAFT_2, 80.0))
+    ]
+    found = judged(block(LOG, noisy(glide(TIME_S, start_s=80.0))), *shafts)
+    assert kept_s(found) == (pytest.approx(80.0, abs=BIN_S), LENGTH_S)
+    assert reasons(found) == {Dismissal.THRUST}
 
 
 def test_a_propeller_at_zero_pitch_is_no_thrust() -> None:
@@ -100,6 +110,13 @@ def test_of_several_parts_the_better_one_is_kept_and_the_other_told() -> None:
     (other,) = (cut for cut in found.cuts if cut.reason is Dismissal.OTHER)
     assert 'a better part is kept' in other.text
     assert Dismissal.THRUST in reasons(found)
+
+
+def test_a_further_log_is_heard_where_the_first_is_silent() -> None:
+    speed, first = glide(TIME_S), TIME_S < 100.0
+    other = block(Channel.SPEED_THROUGH_WATER_2, 1.1 * noisy(speed, 1))
+    assert is_whole(judged(block(LOG, noisy(speed)[first], TIME_S[first]), other))
+    assert is_whole(judged(other))
 
 
 # what heading, track, rudder and log say
@@ -160,10 +177,12 @@ def test_going_astern_is_refused_by_the_log_and_by_the_course() -> None:
 
 def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
     log = noisy(glide(TIME_S))
-    long = (TIME_S < 60.0) | (TIME_S > 150.0)
-    found = judged(block(LOG, log[long], TIME_S[long]))
-    assert Dismissal.GAP in reasons(found)
-    assert kept_s(found)[0] == pytest.approx(151.0, abs=BIN_S)
+    # before it she loses more speed in less time, or less
+    for first, last, kept in ((20.0, 110.0, (111.0, LENGTH_S)), (60.0, 150.0, (0.0, 60.0))):
+        long = (first > TIME_S) | (last < TIME_S)
+        found = judged(block(LOG, log[long], TIME_S[long]))
+        assert Dismissal.GAP in reasons(found)
+        assert kept_s(found) == pytest.approx(kept, abs=BIN_S)
     short = (TIME_S < 60.0) | (TIME_S > 90.0)
     assert is_whole(judged(block(LOG, log[short], TIME_S[short])))
 
@@ -171,9 +190,9 @@ def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
 # what the speed alone says
 
 
-@pytest.mark.parametrize('scale', [0.1, 1.0])
+@pytest.mark.parametrize('scale', [0.025, 0.1, 1.0, 8.0])
 class TestSpeedAlone:
-    """At any scale of time: a model, a boat."""
+    """At any scale of time: a car of 7 s, a model, a boat, a ship of 40 min."""
 
     def found(self, speed: np.ndarray, scale: float, noise: float = 0.02) -> GivenPart:
         time_s = np.linspace(0.0, LENGTH_S, 1 + round(min(LENGTH_S * scale * 100.0, 3000.0)))
@@ -197,13 +216,22 @@ class TestSpeedAlone:
         speed = glide(TIME_S)
         speed[200:] = np.maximum(speed[200] - 0.04 * np.arange(100.0), 0.0)
         found = self.found(speed, scale)
+        # and then she is at rest
         assert found.cuts[0].reason is Dismissal.BRAKE
+        assert reasons(found) <= {Dismissal.BRAKE, Dismissal.SLOW}
         assert kept_s(found) == (0.0, pytest.approx(200.0, abs=10.0))
+
+    def test_a_hull_that_is_caught_is_cut(self, scale: float) -> None:
+        found = self.found(np.where(TIME_S < 220.0, glide(TIME_S), 0.0), scale)
+        assert reasons(found) <= {Dismissal.BRAKE, Dismissal.SLOW}
+        assert kept_s(found) == (0.0, pytest.approx(220.0, abs=8.0))
 
     def test_acceleration_before_the_coast_is_cut(self, scale: float) -> None:
         speed = np.minimum(1.0 + TIME_S * 0.05, glide(TIME_S, start_s=60.0))
         found = self.found(speed, scale)
-        assert found.cuts[-1].reason is Dismissal.LEAD_IN
+        # the bin of the highest speed may be a regime of its own
+        assert found.cuts[0].reason is Dismissal.LEAD_IN
+        assert reasons(found) <= {Dismissal.LEAD_IN, Dismissal.BRAKE}
         assert kept_s(found) == (pytest.approx(62.0, abs=8.0), LENGTH_S)
 
     def test_steady_sailing_before_the_coast_is_cut(self, scale: float) -> None:
@@ -213,28 +241,39 @@ class TestSpeedAlone:
 
     def test_a_plateau_is_cut(self, scale: float) -> None:
         found = self.found(np.maximum(glide(TIME_S), 1.4), scale, noise=0.01)
-        assert found.cuts[0].reason is Dismissal.PLATEAU
+        assert reasons(found) == {Dismissal.PLATEAU}
         assert kept_s(found) == (0.0, pytest.approx(77.0, abs=8.0))
 
 
-def test_a_hull_that_is_caught_is_cut() -> None:
-    found = judged(block(LOG, noisy(np.where(TIME_S < 220.0, glide(TIME_S), 0.0))))
-    assert reasons(found) <= {Dismissal.BRAKE, Dismissal.SLOW}
-    assert kept_s(found) == (0.0, pytest.approx(220.0, abs=8.0))
-
-
-@pytest.mark.parametrize('seed', range(3))
-def test_a_brake_that_is_let_go_is_cut(seed: int) -> None:
-    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
-    speed = [6.0]
-    for time_s in np.arange(1.0, 780.0):
+def held_at_first(until_s: float, length_s: float, *, start: float = 6.0) -> np.ndarray:
+    """Return the speed of a ship of 150 m that something slows until a time."""
+    speed = [start]
+    for time_s in np.arange(1.0, length_s):
         water = 5e-4 + 2.7e-4 * speed[-1] ** 2
-        speed.append(speed[-1] - water - (0.015 if time_s < 120.0 else 0.0))
+        speed.append(speed[-1] - water - (0.015 if time_s < until_s else 0.0))
+    return np.array(speed)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_a_brake_that_is_let_go_is_cut_and_nothing_else(seed: int) -> None:
+    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    speed = held_at_first(120.0, 780.0)
     noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
-    log = block(LOG, np.array(speed) + noise, np.arange(780.0))
+    log = block(LOG, speed + noise, np.arange(780.0))
     found = judge(window(log, end_s=780.0), ship, Parameters())
-    assert Dismissal.BRAKE in reasons(found)
+    assert [cut.reason for cut in found.cuts] == [Dismissal.BRAKE]
     assert kept_s(found) == (pytest.approx(120.0, abs=10.0), 780.0)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_a_brake_that_is_let_go_late_leaves_no_coastdown_before_it(seed: int) -> None:
+    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    speed = held_at_first(75.0, 102.0, start=4.87)
+    noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
+    log = block(LOG, speed + noise, np.arange(102.0))
+    found = judge(window(log, end_s=102.0), ship, Parameters())
+    assert {cut.reason for cut in found.cuts} == {Dismissal.BRAKE}
+    assert found.failure is not None or kept_s(found)[0] > 68.0
 
 
 def test_spikes_are_no_change_of_the_force() -> None:
@@ -242,9 +281,7 @@ def test_spikes_are_no_change_of_the_force() -> None:
     rng = np.random.default_rng(8)
     speed[rng.choice(300, 6, replace=False)] += rng.choice([-3.0, 3.0], 6)
     speed[rng.choice(300, 4, replace=False)] = 0.0
-    found = judged(block(LOG, speed))
-    assert found.failure is None
-    assert kept_s(found) == (0.0, pytest.approx(LENGTH_S, abs=10.0))
+    assert is_whole(judged(block(LOG, speed)))
 
 
 # clean coastdowns of simulated ships
@@ -270,4 +307,4 @@ def test_clean_coastdowns_of_a_ship_in_a_seaway_stay_whole(ship: Ship, seed: int
     one = Window.from_block(record, start_ns, START_NS + round((200.0 + duration_s) * 1e9))
     found = judge(one, ship, Parameters())
     assert found.failure is None
-    assert found.end_ns - found.start_ns > 0.8 * (one.end_ns - one.start_ns)
+    assert found.cuts == ()

@@ -85,8 +85,9 @@ def test_a_car_accelerates_coasts_and_brakes(window_s: tuple[float, float]) -> N
     record = table('car/shotgoose_RR-Coastdown-1_whole_100hz.csv')
     values = {Channel.SPEED_OVER_GROUND: record['v_mps']}
     found = examined(Ship.load(SHIPS / 'car.yaml'), record['t_s'], window_s, values)
-    assert found.judged.cuts[-1].reason in (Dismissal.BRAKE, Dismissal.PLATEAU)
+    assert found.judged.cuts[-1].reason is Dismissal.BRAKE
     assert kept_s(found)[0] == pytest.approx(9.5, abs=0.3)
+    # the brake is pressed in half a second, and a bin takes up to a third of one
     assert kept_s(found)[1] == pytest.approx(17.2, abs=0.4)
     r, band = resistance(found, 7.0)
     assert abs(r - 0.82) < np.hypot(0.01, band)
@@ -103,13 +104,13 @@ def blueboat(number: int) -> dict[Channel, NDArray[np.float64]]:
     }
 
 
-@pytest.mark.parametrize(('number', 'stop_s', 'end_s'), [(222, 59.8, 95.3), (218, 24.6, 44.6)])
+@pytest.mark.parametrize(('number', 'stop_s', 'end_s'), [(222, 59.8, 95.3), (218, 24.6, 44.8)])
 def test_a_catamaran_coasts_from_where_both_thrusters_stand(
     number: int, stop_s: float, end_s: float
 ) -> None:
     time_s = table(f'blueboat_{number}_10hz.csv')['t']
     found = examined(BLUEBOAT, time_s, (stop_s, end_s), blueboat(number), convention='compass')
-    assert kept_s(found) == (pytest.approx(stop_s, abs=1.0), end_s)
+    assert kept_s(found) == (pytest.approx(stop_s, abs=0.15), end_s)
     assert found.estimate is not None
     if number == 222:
         curve = found.estimate.valid_curve
@@ -118,6 +119,7 @@ def test_a_catamaran_coasts_from_where_both_thrusters_stand(
         passed_s = np.mean(1.0 / np.interp(speed, curve.speed_m_s, curve.resistance_m_s2))
         sigma = np.mean(np.interp(speed, curve.speed_m_s, curve.sigma_m_s2))
         assert abs(1.0 / passed_s - 0.231) < 2.0 * sigma
+        assert sigma < 0.1  # far wider than the independent figure's, but no blank cheque
 
 
 def test_a_catamaran_that_goes_astern_is_refused() -> None:
@@ -145,6 +147,8 @@ def test_a_ferry_with_motors_running_in_the_window() -> None:
     assert {cut.reason for cut in found.judged.cuts} == {Dismissal.THRUST}
     r, band = resistance(found, 0.116)
     assert abs(r - 0.0053) < np.hypot(0.0009, band)
+    # noise of which nothing can be learnt in so short a record is in the band
+    assert band < 2.7 * 0.0009
 
 
 def esso_osaka(name: str) -> tuple[NDArray[np.float64], dict[Channel, NDArray[np.float64]]]:
@@ -157,12 +161,19 @@ def esso_osaka(name: str) -> tuple[NDArray[np.float64], dict[Channel, NDArray[np
     }
 
 
-@pytest.mark.xfail(reason='in a record that wobbles the catch is taken for an error of the log')
-def test_a_glide_before_a_hull_is_caught_is_all_that_is_kept() -> None:
+def test_a_crash_stop_leaves_no_coastdown() -> None:
     time_s, values = esso_osaka('180s')
-    found = examined(ESSO_OSAKA, time_s, (651.0, 683.0), values)
-    # a kick ahead until 656 s, nothing until 663 s, then stopped from outside
-    assert kept_s(found) == (pytest.approx(656.0, abs=1.5), pytest.approx(663.0, abs=0.5))
+    found = examined(ESSO_OSAKA, time_s, (180.0, 683.0), values)
+    assert found.refused
+    assert Dismissal.BRAKE in reasons(found)
+
+
+@pytest.mark.parametrize('start_s', [630.0, 651.0])
+def test_a_glide_before_a_hull_is_caught_is_all_that_is_kept(start_s: float) -> None:
+    time_s, values = esso_osaka('180s')
+    found = examined(ESSO_OSAKA, time_s, (start_s, 683.0), values)
+    # kicks ahead until 656 s that hardly act, nothing until 663 s, then stopped from outside
+    assert kept_s(found) == (pytest.approx(656.0, abs=3.0), pytest.approx(663.0, abs=0.5))
     assert Dismissal.BRAKE in reasons(found)
 
 

@@ -9,9 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import amid, bear, brakes, driven, glides, levels, switch, thin
+from shipdrag_ros.coastdown.regimes.births import (
+    amid,
+    bear,
+    brakes,
+    driven,
+    glides,
+    levels,
+    switch,
+    thin,
+)
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import predict, pushes, weigh
+from shipdrag_ros.coastdown.regimes.motion import predict, pushes, rest_speed, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -130,7 +139,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             by_log = not np.isnan(log) and liar != THE_LOG
             speed = log if by_log else track
             if not np.isnan(speed):
-                speed = max(math.exp(hull.first - 1.0), abs(speed))
+                speed = max(rest_speed(hull), abs(speed))
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
@@ -305,9 +314,11 @@ def step(bank: Bank, setting: BankSetting) -> float:
         bear(all_, setting, both, not (np.isnan(said[RATE]) and np.isnan(said[RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0
+    rests = abs(advance) < setting.step_s * rest_speed(setting.hull)
     for i in range(all_.used[0]):
         # an engine may drive her astern
-        way = abs(advance) if claimed and all_.whole[i, REGIME] == AMID else advance
+        astern = claimed and (rests or all_.whole[i, REGIME] == AMID)
+        way = abs(advance) if astern else advance
         slowing = predict(all_, i, setting, used, way, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)

@@ -112,7 +112,6 @@ class _Bins(NamedTuple):
                 out[k] = some[off : len(some) - off].mean()
         return out
 
-
     def speeds(self, kind: str) -> Float64:
         """
         Average a speed: of the first instrument, where it is silent of others in its scale.

@@ -14,7 +14,7 @@ from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import Bank, step
 from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
 from shipdrag_ros.coastdown.regimes.read_out import Spans, median, probability_of, spans_of
 from shipdrag_ros.coastdown.regimes.state import (
     AMID,
@@ -114,8 +114,8 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     setting = BankSetting.of(hull, binned.step_s, shafts=int(heard.sum()))._replace(
         told_s=binned.before * binned.step_s, engine=max(resistance, binned.swing)
     )
-    # a log errs by less where she is slower than she sails
-    wanders = n.WANDER * min(binned.top / math.exp(hull.sails), 1.0)
+    # a log errs by a part of the speed: as that of the ship of the table
+    wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
     runs = []
     short, long = n.WANDER_S
     settings = [*product(n.GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
@@ -136,7 +136,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
         probability_of(joined.part(np.isin(joined.what, codes)), len(binned.said), binned.step_s)
         for codes in REGIMES
     ]
-    return WindowRegimes(binned, joined, np.array(probability), math.exp(hull.first - 1.0))
+    return WindowRegimes(binned, joined, np.array(probability), rest_speed(hull))
 
 
 def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, Spans]:

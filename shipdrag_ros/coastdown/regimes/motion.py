@@ -100,10 +100,25 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
+def rest_speed(hull: HullPrior) -> float:
+    """
+    Return the speed of a hull at rest, which is never quite so [m/s].
+    """
+    return math.exp(hull.first - 1.0)
+
+
+@compiled(inline=True, uncounted=True)
 def _bounded(hull: HullPrior, log_u: float) -> float:
     """Return ln u of a hull that is at rest at least, and no faster than any."""
     last = hull.first + (len(hull.curve) - 1.0) * hull.step
     return float(min(max(log_u, hull.first - 1.0), last + 2.0))
+
+
+@compiled(inline=True, uncounted=True)
+def _at_rest(setting: BankSetting, u: float) -> float:
+    """Return the sd of a speed of a claimed window that tells nothing at rest [m/s]."""
+    rest = rest_speed(setting.hull) if setting.engine > 0.0 else 0.0
+    return float(rest * (rest / u) ** 4)
 
 
 @compiled(inline=True, uncounted=True)
@@ -538,7 +553,8 @@ def _by_way(
         h[j] = 0.0
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
-    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull)
+    variance = noise[N_FIX] ** 2 + (setting.step_s * _at_rest(setting, u)) ** 2
+    gained, excess = _take(x, p, h, work, -expected, variance, bad, setting.hull)
     f[EXCESS] += excess
     if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
         _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
@@ -592,9 +608,8 @@ def weigh(
         h[LN_U] = u
         expected = u + f[MEAN_U]
         sd, value = noise[N_LOG], said[which]
-        rest = math.exp(setting.hull.first - 1.0)
         # an engine may drive her astern, and a ship at rest is never quite so
-        if claimed and (regime == AMID or abs(value) < rest):
+        if claimed and (regime == AMID or abs(value) < rest_speed(setting.hull)):
             value = abs(value)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
@@ -606,7 +621,7 @@ def weigh(
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
         if claimed:
-            sd = math.hypot(sd, rest * (rest / u) ** 4)
+            sd = math.hypot(sd, _at_rest(setting, u))
         shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
         gained += shown
         f[EXCESS] += excess
