@@ -8,6 +8,7 @@ instead is the reason of a cut.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -180,11 +181,10 @@ class _Judge:
         cuts = _fitted(cuts, start_ns, end_ns)
         notes: tuple[str, ...] = ()
         seen = any(reading.stretches(TURNS)) if TURNS in which else bool(len(window.heading))
-        if seen and self._swing(kept) > self._turn_rad:
-            part = float(reading.probability[TURNS, kept[0] : kept[1]].mean())
-            notes = (
-                f'she turns in {part:.0%} of it: the drag of drifting and turning is part of r',
-            )
+        swing = self._swing(kept)
+        if seen and swing > self._turn_rad:
+            by = f'by {math.degrees(swing):.0f} degrees' if swing < np.inf else 'by her rudder'
+            notes = (f'she turns {by}: the drag of drifting and turning is part of r',)
         shown = self._shown() if cuts else ()
         return GivenPart(start_ns, end_ns, tuple(cuts), None, notes, shown)
 

@@ -69,7 +69,7 @@ def test_a_turn_all_the_time_is_told_and_not_cut(tmp_path: Path) -> None:
     coastdown = coasted(tmp_path / 'a.mcap', np.linspace(0.0, 3.0, 100), Parameters())
     assert coastdown.cuts == ()
     assert coastdown.estimate is not None
-    assert any('she turns in' in note for note in coastdown.estimate.notes)
+    assert any('she turns by 17' in note for note in coastdown.estimate.notes)
 
 
 def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Event]]) -> None:

@@ -181,8 +181,8 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:
                     odds = len(n.ENGINE) * n.TOLD[0] / (1.0 - n.TOLD[0])
-                    glides(all_, j, setting, -setting.step_s, odds)
-                    brakes(all_, j, setting, -setting.step_s, 1.0)
+                    glides(all_, j, setting, -setting.step_s, (1.0 - n.BRAKED) * odds)
+                    brakes(all_, j, setting, -setting.step_s, n.BRAKED * odds)
 
 
 @compiled(uncounted=True)
