@@ -8,6 +8,8 @@ STAMP := $(VENV)/installed
 
 # all traffic of demo and tests stays on this machine
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+# what was imported once is compiled: without it each of hundreds of processes does it again
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help env warm demo test lint types tests docs peers lock clean
 

@@ -37,6 +37,12 @@ INPUTS = (
     'rudder',
     'wind_apparent',
     'depth',
+    'speed_through_water_2',
+    'speed_through_water_3',
+    'speed_over_ground_2',
+    'speed_over_ground_3',
+    'position_2',
+    'position_3',
 )
 
 

@@ -55,6 +55,8 @@ NO_BROWSER = 'no browser'
 _REQUIRED = 'SHIPDRAG_BROWSER_REQUIRED'
 _BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 _FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
+_TESTS = Path(__file__).parent
+_WAITING = ('node', 'live', 'peers')  # rooms; in turn with others they would all wait at the end
 _START_NS = 1_700_000_000_000_000_000
 _SECOND_NS = 1_000_000_000
 
@@ -97,6 +99,11 @@ def defects(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[tuple[str, int]]]:
 def own_domain() -> Callable[[], tuple[int, TextIO]]:
     """A function that finds one more domain, until its lock is closed."""
     return _own_domain
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what waits for other processes: one worker waits while the others work."""
+    items.sort(key=lambda item: item.path.relative_to(_TESTS).parts[0] not in _WAITING)
 
 
 def pytest_collection_finish() -> None:

@@ -21,18 +21,18 @@ def record(seed: int = 1, seconds: int = 60) -> Block:
     rng = np.random.default_rng(seed)
     blocks = []
     for channel in Channel:
-        if channel is Channel.POSITION_GEODETIC:
+        if channel.kind is Channel.POSITION_GEODETIC:
             continue  # one type a topic
         n = int(rng.integers(seconds, 3 * seconds))
         stamps = START_NS + np.sort(rng.integers(0, seconds * 10**9, n))
-        two = channel in (Channel.POSITION, Channel.WIND_APPARENT)
+        two = channel.kind in (Channel.POSITION, Channel.WIND_APPARENT)
         value = rng.normal(3.0, 0.1, (n, 2)) if two else rng.normal(3.0, 0.1, n)
         if channel in (Channel.DEPTH, Channel.HEADING):
             value = np.full(n, 0.25)  # survives float32, and sine and cosine
         variance = np.full((n, 2), np.nan)
-        if channel <= Channel.SPEED_OVER_GROUND:
+        if channel.kind <= Channel.SPEED_OVER_GROUND:
             variance[:, 0] = 0.01
-        if channel is Channel.POSITION:
+        if channel.kind is Channel.POSITION:
             variance[:] = 4.0
         delays = rng.integers(10**6, 10**8, n)
         blocks.append(

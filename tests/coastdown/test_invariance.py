@@ -171,7 +171,7 @@ def test_where_the_record_is_cut_changes_no_bit(
     assert health_again == health
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(data=st.data(), into_s=st.integers(1, 200), seed=st.integers(0, 1000))
 def test_a_reset_in_mid_coastdown_is_a_fresh_start(
     ship, eventful, said, bits, data, into_s: int, seed: int
@@ -243,7 +243,7 @@ def long_records(ship, long_record) -> list:
     return [(block, run(ship, [block])[0]) for block in (long_record, fixes)]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(start_s=st.integers(1, 2000), globe=st.booleans())
 def test_a_monitor_that_starts_later_says_the_same(
     ship, long_records, bits, start_s: int, globe: bool

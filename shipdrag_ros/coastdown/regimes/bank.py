@@ -122,7 +122,7 @@ class Bank(NamedTuple):
             np.array([0.0, 0.0, np.nan]),
             np.full(SAID, np.nan),
             np.zeros(OUTS),
-            np.zeros((STATES + 1, STATES)),
+            np.zeros((2, STATES)),
         )
 
 
@@ -319,7 +319,7 @@ def step(bank: Bank, setting: BankSetting) -> float:
         # an engine may drive her astern
         astern = claimed and (rests or all_.whole[i, REGIME] == AMID)
         way = abs(advance) if astern else advance
-        slowing = predict(all_, i, setting, used, way, bank.work)
+        slowing = predict(all_, i, setting, used, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
     shown = thin(all_, setting)

@@ -401,7 +401,7 @@ def _children(
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to
     if regime in (DRIVEN, LEVEL) or (claimed and regime == AMID):
-        if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
+        if regime == LEVEL and age_s < f[RAMP_S]:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
         if claimed or age_s < n.MANOEUVRING_S * setting.pace:

@@ -192,20 +192,9 @@ def _force(
     return net, -a * left * slope - a * by_u, -a * left, by_open, a
 
 
-@compiled(inline=True, uncounted=True)
-def _rows(p: Float64, work: Float64, row: int, c: Float64) -> None:
-    """Put sum_j c[j] p[j] into a row of `work`."""
-    for k in range(STATES):
-        total = 0.0
-        for j in range(STATES):
-            if c[j] != 0.0:
-                total += c[j] * p[j, k]
-        work[row, k] = total
-
-
 @compiled(uncounted=True)
 def predict(
-    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float
 ) -> float:
     """
     Carry a history to the end of the bin; return its acceleration there [m/s^2].
@@ -218,7 +207,6 @@ def predict(
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
     keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
     keep_f = math.exp(-dt / (_LAG_S * pace))
-    c = work[STATES]
     slowing = mean_u = mean_lag = 0.0
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
@@ -226,36 +214,26 @@ def predict(
         net, by_u, by_a, by_open, a = _force(regime, free, x, f, now_s, law, slope)
         u = math.exp(x[LN_U])
         change = min(max(dt * net / u, -0.5), 0.5)
-        for j in range(STATES):
-            c[j] = 0.0
-        c[LN_U] = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
-        c[LN_A] = dt * by_a / u
-        c[OPEN] = dt * by_open / u
-        c[GUST] = dt / u
+        l_l = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
+        l_a, l_o, l_g = dt * by_a / u, dt * by_open / u, dt / u
         power = x[POWER]
-        _rows(p, work, 0, c)
         # ln a follows ln u by the exponent on top of the curve; the curve itself by its table
         for k in range(STATES):
-            work[1, k] = p[LN_A, k] + power * (work[0, k] - p[LN_U, k]) + change * p[POWER, k]
-            work[2, k] = p[WAY, k] + dt * (u * p[LN_U, k] + p[CURRENT, k])
-            work[3, k] = keep_f * p[LAG, k] - u * (work[0, k] - p[LN_U, k])
-        l_l, l_a, l_o, l_g = c[LN_U], c[LN_A], c[OPEN], c[GUST]
-        for k in range(STATES):
-            p[LN_U, k], p[LN_A, k], p[WAY, k] = work[0, k], work[1, k], work[2, k]
-            p[LAG, k] = work[3, k]
-            p[GUST, k] *= keep_g
+            old, gust = p[LN_U, k], p[GUST, k]
+            new = l_l * old + l_a * p[LN_A, k] + l_o * p[OPEN, k] + l_g * gust
+            p[LN_A, k] = p[LN_A, k] + power * (new - old) + change * p[POWER, k]
+            p[WAY, k] += dt * (u * old + p[CURRENT, k])
+            p[LAG, k] = keep_f * p[LAG, k] - u * (new - old)
+            p[LN_U, k], p[GUST, k] = new, gust * keep_g
             p[WANDER, k] *= keep_b
             p[EDDY, k] *= keep_e
         for k in range(STATES):
-            new = (
-                l_l * p[k, LN_U] + l_a * p[k, LN_A] + l_o * p[k, OPEN]
-                + l_g * p[k, GUST]
-            )  # fmt: skip
-            old, way = p[k, LN_U], p[k, WAY] + dt * (u * p[k, LN_U] + p[k, CURRENT])
+            old, gust = p[k, LN_U], p[k, GUST]
+            new = l_l * old + l_a * p[k, LN_A] + l_o * p[k, OPEN] + l_g * gust
             p[k, LN_A] += power * (new - old) + change * p[k, POWER]
+            p[k, WAY] += dt * (u * old + p[k, CURRENT])
             p[k, LAG] = keep_f * p[k, LAG] - u * (new - old)
-            p[k, LN_U], p[k, WAY] = new, way
-            p[k, GUST] *= keep_g
+            p[k, LN_U], p[k, GUST] = new, gust * keep_g
             p[k, WANDER] *= keep_b
             p[k, EDDY] *= keep_e
         p[LN_U, LN_U] += 1e-10
@@ -328,8 +306,9 @@ def _take(
         around = (usual / total**2 + wide / wider**2 - gain * gain) * off * off
         for j in range(STATES):
             x[j] += gain * work[0, j] * off
+            more = (around - gain) * work[0, j]
             for k in range(j + 1):
-                p[j, k] += (around - gain) * work[0, j] * work[0, k]
+                p[j, k] += more * work[0, k]
                 p[k, j] = p[j, k]
         x[LN_U] = _bounded(hull, x[LN_U])
     return math.log(density), 0.5 + math.log(density * _ROOT * math.sqrt(total))
@@ -544,7 +523,7 @@ def _by_way(
 ) -> float:
     """Update a history by the way between fixes; return its log density."""
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
-    bad, half, h = float(n.BAD_DENSITY), 0.5 * setting.step_s, work[STATES]
+    bad, half, h = float(n.BAD_DENSITY), 0.5 * setting.step_s, work[1]
     if bank.whole[i, LIAR] == THE_TRACK:
         wide = math.hypot(2.5 * noise[N_FIX], noise[N_WALK] * math.sqrt(setting.step_s))
         return _untrue(f, STAYS_WAY, advance, wide, bad / setting.step_s)
@@ -591,7 +570,7 @@ def weigh(
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
-    h = work[STATES]
+    h = work[1]
     gained = f[EXCESS] = 0.0
     bad, claimed = float(n.BAD_DENSITY), setting.engine > 0.0
     for which in (LOG, GROUND):
