@@ -222,11 +222,11 @@ class _Judge:
         return float(np.ptp(np.cumsum(turned))) if not np.isfinite(rudder).any() else np.inf
 
     def _worth(self, span: _SPAN) -> float:
-        """Return the time that is kept, times the speed that is lost in it."""
+        """Return the time that is kept, times the part of the speed that is lost in it."""
         first = float(np.nanmean(self._binned.speed[span[0] : span[0] + 3]))
         if not first > self._slow:
             return -1.0
-        return (span[1] - span[0]) * self._reading.lost(span)
+        return (span[1] - span[0]) * self._reading.lost(span) / first
 
     def _gaps(self, data_stop_s: float) -> list[_SPAN]:
         """Return the bins of stretches in which nothing shows the motion for long."""
@@ -269,7 +269,12 @@ class _Judge:
     ) -> tuple[Dismissal, str]:
         """Name the reason of a cut."""
         speed = self._binned.speed[first:last]
-        if regime != BRAKES and 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
+        before = kept is None or last <= kept[0]
+        braked = regime == BRAKES
+        if kept is not None and regime == ENGINES:  # beside the glide next to it
+            near = kept[0] if before else max(kept[1] - _SHORTEST, kept[0])
+            braked = self._slows(first, last) > self._slows(near, near + _SHORTEST)
+        if not braked and 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
             return Dismissal.SLOW, f'she is all but at rest, at {np.nanmax(speed):.2g} m/s'
         if np.nansum(speed) < 0.0:
             fastest = -float(np.nanmin(speed))
@@ -283,11 +288,8 @@ class _Judge:
                 return Dismissal.ASTERN, 'the propeller is reversed'
             if np.abs(revs).max(initial=0.0) > n.CREEPS:
                 return Dismissal.THRUST, 'the shaft turns as if it drove her'
-            before = kept is None or last <= kept[0]
-            if kept is not None:  # beside the glide next to it
-                near = kept[0] if before else max(kept[1] - _SHORTEST, kept[0])
-                if self._slows(first, last) > self._slows(near, near + _SHORTEST):
-                    return Dismissal.BRAKE, 'something but the water slows her'
+            if braked:
+                return Dismissal.BRAKE, 'something but the water slows her'
             if before:
                 return Dismissal.LEAD_IN, 'she does not slow as a ship that glides, as if driven'
             return Dismissal.PLATEAU, 'she slows no longer as a ship that glides'

@@ -118,7 +118,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
     runs = []
     short, long = n.WANDER_S
-    settings = [*product(n.GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
+    settings = [*product(n.ANY_GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
     for gust, wander, wander_s in settings:
         noise = binned.noise.copy()
         noise[N_GUST] = gust

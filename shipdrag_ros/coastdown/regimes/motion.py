@@ -250,7 +250,7 @@ def predict(
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
         if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
-            gusts = f[FIRST_A] ** 2
+            gusts = (noise[N_GUST] * setting.engine) ** 2 + f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -403,6 +403,14 @@ def _running_down(
     return part * density + (1.0 - part) * any_
 
 
+@compiled(inline=True, uncounted=True)
+def _holds(f: Float64, nu: float, density: float, scaled: bool) -> None:
+    """Keep the revs; of a claimed window only as far as they are no error."""
+    known = not scaled and not np.isnan(f[REVS])
+    share = density / (density + n.SHAFT_LIES) if known else 1.0
+    f[REVS] = f[REVS] + share * (nu - f[REVS]) if known else nu
+
+
 @compiled(uncounted=True)
 def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> float:
     """
@@ -425,16 +433,22 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
     if kind == STANDS or np.isnan(revs):
         stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
-        f[REVS] = nu
         # or anything below its last: it runs down
         below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
-        if not scaled and last < n.CREEPS:  # or creeps on
-            return (stands + below + _off(nu, last)) / 3.0
-        return 0.5 * stands + 0.5 * below
-    if kind == HELD:  # a sensor that is stuck stays where it was
-        f[REVS] = nu
+        if not scaled:  # and does not stay
+            below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
+        density = 0.5 * stands + 0.5 * below
+        if not scaled and last < n.CREEPS:  # or creeps on, as it likes
+            density = 0.9 * _off(nu, last) + (0.1 / n.CREEPS if nu < n.CREEPS else 0.0)
+        _holds(f, nu, density, scaled)
+        return density
     moves = 0.1 if kind == HELD and scaled else 0.01
-    return (1.0 - moves) * _off(nu, revs) + moves
+    if not scaled and (kind != HELD or min(nu, revs) < n.CREEPS):
+        moves = 0.0  # an engine starts and stops such a screw, and what is stuck stays
+    density = (1.0 - moves) * _off(nu, revs) + moves
+    if kind == HELD:  # a sensor that is stuck stays where it was
+        _holds(f, nu, density, scaled)
+    return density
 
 
 @compiled(uncounted=True)
@@ -457,6 +471,8 @@ def _shaft(
         if stands and before >= n.CREEPS:
             stops = n.MANOEUVRE * n.OF_MANOEUVRES[0] * n.BIN_S / 3600.0  # as often as she glides
             return math.log(n.BAD * stops)
+        if stands:  # of the other they say nothing
+            return 0.0
         moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
         return math.log((1.0 - moves) * _off(nu, before) + moves)
     if regime == AMID:

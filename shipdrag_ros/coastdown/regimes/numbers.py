@@ -159,8 +159,9 @@ ODD = _grid('ODD', (0.0, -2.0, 2.5), 'ln', 'over that: a hull ahead, on wheels, 
 ODD_SHARE = _grid('ODD_SHARE', (0.8, 0.1, 0.1), '1', 'of these')
 ANY_EXPONENT = _grid('ANY_EXPONENT', (0.0, 0.9), '1', 'over that of friction: wheels to waves')
 ANY_WIND_SD = _number('ANY_WIND_SD', 0.15, 'of the first resistance', 'slow craft, wheels')
+ANY_GUST = _grid('ANY_GUST', (0.01, 0.03, 0.08, 0.2), 'of the resistance', 'and in a basin')
 ENGINE = _grid('ENGINE', (0.01, 0.3, 0.3, 0.3), 'of the resistance', 'what it gives over it: sd')
-ENGINE_GUST = _grid('ENGINE_GUST', (0.02, 0.02, 0.15, 1.0), 'the same', 'how it is handled: sd')
+ENGINE_GUST = _grid('ENGINE_GUST', (0.0, 0.02, 0.15, 1.0), 'the same', 'how it is handled: sd')
 ENGINE_MOVES = _grid('ENGINE_MOVES', (0.01, 0.01, 0.1, 0.3), '1', 'bins in which its revs change')
 RUDDER = _grid('RUDDER', (0.08, 0.5), 'rad', 'angle of one that keeps a course, that turns: sd')
 
