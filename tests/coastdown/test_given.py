@@ -101,6 +101,30 @@ def test_a_ship_that_goes_faster_leaves_nothing() -> None:
     assert reasons(found) == {Dismissal.THRUST}
 
 
+@pytest.mark.parametrize('creep', [0.0, 0.3])
+def test_a_shaft_that_stands_is_no_thrust(creep: float) -> None:
+    shaft = np.where(TIME_S < 20.0, 12.0, creep)
+    found = judged(block(LOG, noisy(glide(TIME_S))), block(SHAFT, shaft))
+    assert reasons(found) == {Dismissal.THRUST}
+    assert kept_s(found) == (pytest.approx(20.0, abs=BIN_S), LENGTH_S)
+
+
+@pytest.mark.parametrize(('kick', 'reason'), [(9.0, 'thrust'), (-9.0, 'astern')])
+def test_a_kick_in_the_glide_is_cut_out(kick: float, reason: str) -> None:
+    shaft = np.where(TIME_S < 5.0, 12.0, 0.0) + np.where(abs(TIME_S - 100.0) < 3.0, kick, 0.0)
+    found = judged(block(LOG, noisy(glide(TIME_S))), block(SHAFT, shaft))
+    assert kept_s(found) == (pytest.approx(103.0, abs=BIN_S), LENGTH_S)
+    assert reason in {cut.reason.value for cut in found.cuts if cut.start_ns > START_NS + 9e10}
+
+
+def test_a_shaft_that_is_let_go_may_speed_up_to_windmill() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    speed = glide(time_s)
+    turning = np.where(time_s < 0.0, 12.0, np.where(time_s < 40.0, 3.0, 0.5 * 3.0 * speed))
+    inputs = [block(LOG, noisy(speed), time_s), block(SHAFT, turning, time_s)]
+    assert is_whole(judge(window(*inputs, before_s=600.0), BOAT, Parameters()))
+
+
 def test_of_several_parts_the_better_one_is_kept_and_the_other_told() -> None:
     driven = (TIME_S > 60.0) & (TIME_S < 90.0)
     speed = np.where(TIME_S < 60.0, glide(TIME_S), glide(TIME_S, start_s=90.0, speed=1.64))
@@ -177,12 +201,10 @@ def test_going_astern_is_refused_by_the_log_and_by_the_course() -> None:
 
 def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
     log = noisy(glide(TIME_S))
-    # before it she loses more speed in less time, or less
-    for first, last, kept in ((20.0, 110.0, (111.0, LENGTH_S)), (60.0, 150.0, (0.0, 60.0))):
-        long = (first > TIME_S) | (last < TIME_S)
-        found = judged(block(LOG, log[long], TIME_S[long]))
-        assert Dismissal.GAP in reasons(found)
-        assert kept_s(found) == pytest.approx(kept, abs=BIN_S)
+    long = (TIME_S < 60.0) | (TIME_S > 150.0)
+    found = judged(block(LOG, log[long], TIME_S[long]))
+    assert Dismissal.GAP in reasons(found)
+    assert kept_s(found)[0] == pytest.approx(151.0, abs=BIN_S)
     short = (TIME_S < 60.0) | (TIME_S > 90.0)
     assert is_whole(judged(block(LOG, log[short], TIME_S[short])))
 

@@ -394,7 +394,9 @@ def _running_down(
     """
     falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
     if np.isnan(f[FREE]):
-        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) if scaled else 1.0
+        density = 1.0 if nu > n.CREEPS else 0.0  # one that stands has run down
+        if scaled:
+            density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
         f[FREE] = nu / falls
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
