@@ -91,6 +91,14 @@ FURTHER: Mapping[str, str] = {
 }
 """Inputs of further instruments, and the input of the first one of the kind."""
 
+
+def kind_of(name: str) -> str:
+    """
+    Return the first input of the kind of one: of `position_2` that is `position`.
+    """
+    return FURTHER.get(name, name)
+
+
 ALL_MOTION: tuple[str, ...] = (*MOTION_INPUTS, *FURTHER)
 """Inputs that show how the ship moves, those of further instruments too."""
 

@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.coastdown.past import CHANNELS
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND, Channel, Float64, Int64
 
-CHANNELS = len(Channel)
 FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are positions
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 KINDS = _GEODETIC + 1  # of these, a speed can be had from

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import CHANNELS, Bins
+from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.past import CHANNELS
 from shipdrag_ros.coastdown.ring import RingBuffer, first_store
 from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
 from shipdrag_ros.coastdown.validate import NEVER, CheckMemory, Limits

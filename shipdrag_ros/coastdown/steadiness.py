@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import CHANNELS, FIRST_TRACK, Bins, line, smoothing, speeds_kept
+from shipdrag_ros.coastdown.bins import FIRST_TRACK, Bins, line, smoothing, speeds_kept
+from shipdrag_ros.coastdown.past import CHANNELS
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters

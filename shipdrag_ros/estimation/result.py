@@ -11,7 +11,7 @@ import numpy as np
 
 from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.posterior.weather import Reference
-from shipdrag_ros.samples import FURTHER, Float64, Int64
+from shipdrag_ros.samples import Float64, Int64, kind_of
 
 if TYPE_CHECKING:
     from shipdrag_ros.ship import Ship
@@ -201,12 +201,12 @@ class Estimate:
     @property
     def by_log(self) -> bool:
         """Whether a speed through water was measured."""
-        return any(name.startswith('speed_through_water') for name in self.samples)
+        return 'speed_through_water' in map(kind_of, self.samples)
 
     @property
     def by_position(self) -> bool:
         """Whether positions were used."""
-        return any(name.startswith('position') for name in self.samples)
+        return 'position' in map(kind_of, self.samples)
 
     def tracks_of(self, *kinds: str) -> dict[str, Track]:
         """
@@ -216,7 +216,7 @@ class Estimate:
             name: track
             for kind in kinds
             for name, track in self.tracks.items()
-            if FURTHER.get(name, name) == kind
+            if kind_of(name) == kind
         }
 
     @property

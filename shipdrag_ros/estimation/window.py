@@ -25,6 +25,7 @@ from shipdrag_ros.samples import (
     Channel,
     Float64,
     Int64,
+    kind_of,
 )
 
 _PLANE = ('position', 'wind_apparent')  # inputs of two columns
@@ -151,17 +152,18 @@ class Window:
         chosen: dict[str, str] = {}
         span_ns = {name: np.ptp(series.time_ns) for name, series in heard.items()}
         for kind in MOTION_INPUTS:
-            of_kind = [name for name in heard if FURTHER.get(name, name) == kind]
+            of_kind = [name for name in heard if kind_of(name) == kind]
             longest = max((span_ns[name] for name in of_kind), default=0)
             long = [name for name in of_kind if 2 * span_ns[name] >= longest]
             if long:
                 chosen[kind] = long[0]
         notes = []
         for name, reads in heard.items():
-            used = heard[chosen[FURTHER.get(name, name)]]
+            which = chosen[kind_of(name)]
+            used = heard[which]
             if used is reads:
                 continue
-            notes.append(f'{name} is not used beside {chosen[FURTHER.get(name, name)]}')
+            notes.append(f'{name} is not used beside {which}')
             both = (reads.time_ns >= used.time_ns[0]) & (reads.time_ns <= used.time_ns[-1])
             if reads.value.ndim == 1 and both.any():
                 beside = np.median(np.interp(reads.time_ns[both], used.time_ns, used.value))

@@ -18,7 +18,7 @@ from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast.result import Band, Forecast, Milestone
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.rows import right
-from shipdrag_ros.samples import SECOND_NS, Float64
+from shipdrag_ros.samples import SECOND_NS, Float64, kind_of
 
 OUTSIDE = 0.1
 """Share of what follows that the band leaves out."""
@@ -230,6 +230,6 @@ def _monotone(values: Float64, weights: Float64 | None = None) -> Float64:
 def _as_estimated(speed: Float64, name: str, whole: Estimate) -> Float64:
     """Take from readings what the estimate says that the instrument adds."""
     read, is_so = float(whole.tracks[name].fitted[-1]), whole.last_speed_m_s
-    if name.startswith('speed_through_water'):
+    if kind_of(name) == 'speed_through_water':
         return speed * (is_so / read) if read > 0.0 < is_so else speed
     return speed - (read - is_so)

@@ -66,7 +66,7 @@ from shipdrag_ros.messages.heard import (
     Samples,
     ShipFile,
 )
-from shipdrag_ros.samples import ALL_MOTION, FURTHER, MOTION_INPUTS, SHAFTS, Channel
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SHAFTS, Channel, kind_of
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -271,7 +271,7 @@ class Bridge:
         """Return how long ago the node received any of some kinds; None if that is not known."""
         if self._health is None or self._heard_s is None:
             return None
-        names = [name for name in ALL_MOTION if FURTHER.get(name, name) in kinds]
+        names = [name for name in ALL_MOTION if kind_of(name) in kinds]
         each = [self._health.of(f'input {name}') for name in names]
         ages = [one.number('age') for one in each if one is not None]
         age_s = min((age for age in ages if age is not None), default=None)

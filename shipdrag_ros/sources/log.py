@@ -18,7 +18,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
-from shipdrag_ros.samples import FURTHER, SECOND_NS, Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, kind_of
 
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
@@ -83,7 +83,7 @@ class Understood:
     def __str__(self) -> str:
         unit = f' [{self.unit}]' if self.unit else ''
         values = ', '.join(f'{value:.6g}' for value in self.first)
-        si = 'deg' if self.geodetic else _SI[FURTHER.get(self.input, self.input)]
+        si = 'deg' if self.geodetic else _SI[kind_of(self.input)]
         return f'{self.input} <- {self.source}{unit}, first {values} {si}'
 
 

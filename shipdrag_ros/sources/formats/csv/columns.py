@@ -12,7 +12,7 @@ from enum import Enum
 from math import pi
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import FURTHER, GEODETIC, PITCHES, SHAFTS, Channel
+from shipdrag_ros.samples import FURTHER, GEODETIC, PITCHES, SHAFTS, Channel, kind_of
 
 _KNOT, _KMH, _MPH = 1852.0 / 3600.0, 1.0 / 3.6, 0.44704
 _SPEED = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
@@ -154,7 +154,7 @@ def parse_input(text: str) -> InputColumns:
     if not channels:
         known = ', '.join(dict.fromkeys(map(_name, _UNITS)))
         raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
-    counts = _COUNTS.get(FURTHER.get(name, name), (1,))
+    counts = _COUNTS.get(kind_of(name), (1,))
     columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
     if len(columns) not in counts or not all(column for column, _ in columns):
         expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
