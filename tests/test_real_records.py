@@ -121,7 +121,7 @@ def test_the_model_ship_drifts_and_the_joint_fit_shows_it(results: dict[str, Any
     name = 'speed_through_water'
     np.testing.assert_allclose(alone['noise_sd'][name], 0.0004, rtol=0.2)
     np.testing.assert_allclose(joint['noise_sd'][name], 0.014, rtol=0.1)
-    assert any('heading swings over 47 degrees' in note for note in alone['notes'])
+    assert any('she turns by 4' in note for note in alone['notes'])
 
 
 @needs_data

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.coastdown import Monitor, validate
-from shipdrag_ros.coastdown.driving import start_of
 from shipdrag_ros.coastdown.events import (
     Dismissal,
     EndedBy,
@@ -79,18 +78,19 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     found = []
     for coastdown in coastdowns:
         if not coastdown.withdrawn:
-            start_ns, steady = begins(coastdown, result.ship)
+            start_ns, steady = begins(coastdown)
             window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
             found.append((coastdown, window))
     return found
 
 
-def begins(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
+def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
     """
-    Return when the thrust began to fall, and whether what comes before is steady sailing.
+    Return when the thrust began to fall, and whether what comes before may be steady sailing.
     """
-    if coastdown.stop_ns is None:
-        return start_of(coastdown, ship)
+    if coastdown.stop_ns is None:  # given, and whatever she did before was cut
+        cut = any(each.start_ns < coastdown.start_ns for each in coastdown.cuts)
+        return coastdown.start_ns, not cut
     return coastdown.stop_ns, True
 
 
@@ -103,7 +103,7 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
     Window or None
         None where there is none.
     """
-    start_ns, steady = begins(coastdown, result.ship)
+    start_ns, steady = begins(coastdown)
     # what acted from the stop on leaves all that was before it
     steady = steady or any(cut.start_ns < coastdown.start_ns for cut in coastdown.cuts)
     acted: list[WholeGlide | NotCoastdown] = [

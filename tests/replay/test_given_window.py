@@ -50,26 +50,26 @@ def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> EndedCoa
 
 @pytest.mark.parametrize(
     ('swing_deg', 'turn_rad', 'told'),
-    [(30.0, 0.35, True), (30.0, 0.6, False), (15.0, 0.35, False)],
+    [(60.0, 0.35, True), (60.0, 1.2, False), (15.0, 0.35, False)],
 )
-def test_a_turn_inside_the_window(
+def test_a_turn_at_the_end_of_the_window_is_cut(
     tmp_path: Path, swing_deg: float, turn_rad: float, told: bool
 ) -> None:
     # across the cut at 180 degrees, where the reading jumps
-    yaw = np.pi - 0.1 + np.linspace(0.0, np.radians(swing_deg), 100)
-    coastdown = coasted(tmp_path / 'a.mcap', yaw, Parameters(turn_rad=turn_rad))
+    turned = np.radians(swing_deg) * np.clip((np.arange(100.0) - 70.0) / 30.0, 0.0, 1.0)
+    coastdown = coasted(tmp_path / 'a.mcap', np.pi - 0.1 + turned, Parameters(turn_rad=turn_rad))
     assert ([cut.reason for cut in coastdown.cuts] == [Dismissal.TURN]) is told
     assert (coastdown.end_ns == START_NS + 99 * 10**9) is not told
     if told:
-        assert f'swings over {swing_deg:.0f} degrees' in coastdown.cuts[0].text
-        assert coastdown.end_ns == pytest.approx(START_NS + 66e9, abs=2e9)
+        assert 'she turns' in coastdown.cuts[0].text
+        assert coastdown.end_ns == pytest.approx(START_NS + 70e9, abs=5e9)
 
 
 def test_a_turn_all_the_time_is_told_and_not_cut(tmp_path: Path) -> None:
     coastdown = coasted(tmp_path / 'a.mcap', np.linspace(0.0, 3.0, 100), Parameters())
     assert coastdown.cuts == ()
     assert coastdown.estimate is not None
-    assert 'swings over 17' in coastdown.estimate.notes[0]
+    assert any('she turns by 17' in note for note in coastdown.estimate.notes)
 
 
 def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Event]]) -> None:

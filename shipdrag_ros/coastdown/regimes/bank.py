@@ -9,9 +9,18 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.births import bear, driven, free, switch, thin
+from shipdrag_ros.coastdown.regimes.births import (
+    amid,
+    bear,
+    brakes,
+    driven,
+    glides,
+    levels,
+    switch,
+    thin,
+)
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, pushes, weigh
+from shipdrag_ros.coastdown.regimes.motion import predict, pushes, rest_speed, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -23,12 +32,12 @@ from shipdrag_ros.coastdown.regimes.state import (
     CURRENT,
     DRIVEN,
     EXCESS,
-    FIRST_A,
     GLIDE,
     GLIDED,
     GONE,
     GROUND,
     HIGH,
+    LAG,
     LEVEL,
     LIAR,
     LN_A,
@@ -37,7 +46,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     LONGER,
     LOW,
     N_FIX,
-    OPEN,
     P0,
     P_VAR,
     POWER,
@@ -45,6 +53,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RATE,
     REGIME,
     REVS,
+    RUDDER,
     SAID,
     SHAFTS,
     SINCE,
@@ -121,15 +130,22 @@ class Bank(NamedTuple):
 def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     """Give birth to the first histories: driven evenly, or not; any instrument may lie."""
     all_ = bank.histories
-    hull = setting.hull
+    hull, claimed = setting.hull, setting.engine > 0.0
     both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
         by_log = log > 0.0 and liar != THE_LOG  # the logarithm of rest is of no use
         speed = log if by_log else track
+        if claimed:  # she may be at rest, or go astern
+            by_log = not np.isnan(log) and liar != THE_LOG
+            speed = log if by_log else track
+            if not np.isnan(speed):
+                speed = max(rest_speed(hull), abs(speed))
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
         for regime in (DRIVEN, AMID):
+            if claimed and regime == DRIVEN:  # nobody knows
+                continue
             chance = n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
@@ -151,6 +167,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
             x[WAY] = 0.5 * setting.step_s * speed
             p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
+            p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
             p[LONGER, LONGER] = n.LOG_LAG_SD**2
             p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
@@ -159,9 +176,13 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             w[REGIME], w[LIAR] = regime, liar
             driven(all_, j, hull)
             if regime == AMID:
-                law = hull_law(hull, max(x[LN_U], hull.sails))[0] + x[LN_A]
-                f[FIRST_A] = math.exp(law)
-                free(all_, j, OPEN, 0.0, (n.AMID[1] * f[FIRST_A]) ** 2)
+                amid(all_, j, setting, 0)
+            if claimed:
+                levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
+                if setting.told_s <= 0.0:
+                    odds = len(n.ENGINE) * n.TOLD[0] / (1.0 - n.TOLD[0])
+                    glides(all_, j, setting, -setting.step_s, (1.0 - n.BRAKED) * odds)
+                    brakes(all_, j, setting, -setting.step_s, n.BRAKED * odds)
 
 
 @compiled(uncounted=True)
@@ -264,13 +285,16 @@ _SETTING = BankSetting(
     0.0,
     0,
     0.0,
+    0.0,
 )  # its types are all that counts
 
 
-@compiled('void(Bank, Setting)', like={'Bank': Bank.fresh(), 'Setting': _SETTING}, uncounted=True)
-def step(bank: Bank, setting: BankSetting) -> None:
+@compiled('f8(Bank, Setting)', like={'Bank': Bank.fresh(), 'Setting': _SETTING}, uncounted=True)
+def step(bank: Bank, setting: BankSetting) -> float:
     """
     Take the bin in `bank.said`; the probabilities are then in `bank.out`.
+
+    Returns its log predictive density.
     """
     all_, said = bank.histories, bank.said
     log, ground, way = said[LOG], said[GROUND], said[ADVANCE]
@@ -279,7 +303,7 @@ def step(bank: Bank, setting: BankSetting) -> None:
     if all_.used[0] == 0:
         _begin(bank, setting, log, way / setting.step_s if np.isnan(ground) else ground)
         if all_.used[0] == 0:
-            return
+            return 0.0
         thin(all_, setting)
         _sum_up(bank, setting)
         bank.out[P_EVEN] = bank.out[P_STEADY] = 1.0
@@ -287,12 +311,19 @@ def step(bank: Bank, setting: BankSetting) -> None:
     _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
-        bear(all_, setting, both, not np.isnan(said[RATE]))
+        bear(all_, setting, both, not (np.isnan(said[RATE]) and np.isnan(said[RUDDER])))
     advance = 0.0 if np.isnan(way) else way
+    claimed = setting.engine > 0.0
+    rests = abs(advance) < setting.step_s * rest_speed(setting.hull)
     for i in range(all_.used[0]):
-        slowing = predict(all_, i, setting, used, advance)
+        # an engine may drive her astern
+        astern = claimed and (rests or all_.whole[i, REGIME] == AMID)
+        way = abs(advance) if astern else advance
+        slowing = predict(all_, i, setting, used, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
-    thin(all_, setting)
+    shown = thin(all_, setting)
     _sum_up(bank, setting)
-    listen(bank.noise, setting, said, bank.out[P_STEADY])
+    if not claimed:
+        listen(bank.noise, setting, said, bank.out[P_STEADY])
+    return shown

@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDE_KIND,
     GLIDE_TURN,
     GLIDED,
+    GUST,
     GUST_A,
     HELD,
     KEPT,
@@ -33,6 +34,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     LIAR,
     LN_A,
     LN_U,
+    LONGER,
     NOBODY,
     OPEN,
     P0,
@@ -138,40 +140,58 @@ def _born(
     return int(j)
 
 
+@compiled(inline=True, uncounted=True)
+def _wind(setting: BankSetting) -> float:
+    return float(n.ANY_WIND_SD if setting.engine > 0.0 else n.WIND_SD)
+
+
 @compiled(uncounted=True)
-def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
+def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
-    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
     bank.number[j, FIRST_A] = math.exp(law)
     bank.whole[j, GLIDED] = 1
-    free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+    free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+    if setting.engine > 0.0:  # what an engine gave is over
+        free(bank, j, GUST, 0.0, 0.0)
 
 
 @compiled(uncounted=True)
-def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
-    """Let the thrust run down."""
-    if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
+def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """
+    Let the thrust run down.
+    """
+    if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, AMID):
         j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
         if j >= 0:
-            free(bank, j, OPEN, 0.0, n.WIND_SD**2)
+            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
         return
     learnt = bank.whole[i, REGIME] == LEVEL
     last = bank.whole[i, COUNT] - 1
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
-    for k in range(1 if idles else len(n.RUN_DOWN_S)):
-        ramp_s = _NO_RAMP_S if idles else n.RUN_DOWN_S[k] * setting.pace
+    already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
+    downs = 1 if already else len(n.RUN_DOWN_S)
+    odds = len(n.ODD) if any_ and bank.whole[i, GLIDED] == 0 else 1  # later she is known
+    for each in range(downs * odds):
+        k, odd = each % downs, each // downs
+        ramp_s = _NO_RAMP_S if already else n.RUN_DOWN_S[k] * setting.pace
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
-            part = chance * (1.0 if idles else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
-            j = _born(bank, i, now_s, part, GLIDE, ramp_s)
+            part = chance * (1.0 if already else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
+            share = part * n.ODD_SHARE[odd] if odds > 1 else part
+            j = _born(bank, i, now_s, share, GLIDE, ramp_s)
             if j < 0:
                 continue
             if idles:  # it is the same glide
                 bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
             bank.number[j, BEFORE] = x[OPEN]
-            _glide(bank, j, setting.hull)
+            if any_:
+                bank.number[j, BEFORE] = x[LN_U]
+                x[LN_A] += n.ODD[odd]
+            _glide(bank, j, setting)
             bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
-            bank.number[j, FREE] = bank.number[j, REVS] if kind >= HELD else np.nan
+            held = kind >= HELD and not any_
+            bank.number[j, FREE] = bank.number[j, REVS] if held else np.nan
             bank.number[j, REVS] = np.nan
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
@@ -182,11 +202,30 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
 
 
+@compiled(inline=True, uncounted=True)
+def _engages(bank: Histories, j: int) -> None:
+    """End what the screw dragged."""
+    kind = bank.whole[j, GLIDE_KIND]
+    bank.mean[j, LN_A] -= n.DRAGGED[kind]
+    bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[kind] * n.DRAGGED[kind]
+
+
 @compiled(uncounted=True)
-def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
-    """Let the engine go to another level, or engage."""
-    f = bank.number[i]
+def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """
+    Let the engine go to another level, or engage.
+    """
     regime = bank.whole[i, REGIME]
+    if setting.engine > 0.0:  # at any level
+        for kind in range(len(n.ENGINE)):
+            if regime != AMID or bank.whole[i, KIND] != kind:
+                j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
+                if j >= 0:
+                    if regime != AMID:
+                        _engages(bank, j)
+                    amid(bank, j, setting, kind)
+        return
+    f = bank.number[i]
     engaged = regime in (DRIVEN, LEVEL)
     base = balance(bank.mean[i], f, regime, now_s)[0] if engaged else f[BEFORE]
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
@@ -205,10 +244,27 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
-            if not engaged:  # what the screw dragged is over
-                drag = n.DRAGGED[bank.whole[i, KIND]]
-                bank.mean[j, LN_A] -= drag
-                bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[bank.whole[i, KIND]] * drag
+            if not engaged:
+                _engages(bank, j)
+
+
+@compiled(uncounted=True)
+def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
+    """
+    Put a history amid a manoeuvre under power: an acceleration that drifts is what is left open.
+    """
+    x, f = bank.mean[j], bank.number[j]
+    if setting.engine > 0.0:
+        f[FIRST_A] = n.ENGINE_GUST[kind] * setting.engine
+        free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
+        free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
+        sd = n.ENGINE[kind] * setting.engine
+    else:
+        law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
+        f[FIRST_A] = math.exp(law)
+        sd = n.AMID[1] * f[FIRST_A]
+    bank.whole[j, KIND], f[REVS] = kind, np.nan
+    free(bank, j, OPEN, 0.0, sd * sd)
 
 
 @compiled(uncounted=True)
@@ -232,18 +288,22 @@ def _turns(
 
 
 @compiled(uncounted=True)
-def _brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
-    """Let something but the water slow her."""
-    for k in range(len(n.BRAKES)):
-        j = _born(bank, i, now_s, chance / len(n.BRAKES), BRAKE, 1.0)
+def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """
+    Let something but the water slow her.
+    """
+    sizes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
+    for k in range(sizes):
+        j = _born(bank, i, now_s, chance / sizes, BRAKE, 1.0)
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
-                _glide(bank, j, setting.hull)
+                _glide(bank, j, setting)
                 bank.number[j, BEFORE], bank.number[j, REVS] = bank.mean[i, OPEN], np.nan
                 bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
-            free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+            size = n.BRAKES[k] if k < len(n.BRAKES) else n.STOPPERS[k - len(n.BRAKES)]
+            free(bank, j, OPEN, math.log(size), n.BRAKES_SD**2)
 
 
 @compiled(uncounted=True)
@@ -325,7 +385,9 @@ def _children(
 ) -> None:
     """Let a history switch to all that it may."""
     f, w = bank.number[i], bank.whole[i]
-    hours = setting.step_s / 3600.0
+    claimed = setting.engine > 0.0
+    # a window is as long as a person finds it worth, and manoeuvres with it
+    hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
     regime = w[REGIME]
     age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
     if both and w[LIAR] == NOBODY:
@@ -338,11 +400,11 @@ def _children(
         f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to
-    if regime in (DRIVEN, LEVEL):
+    if regime in (DRIVEN, LEVEL) or (claimed and regime == AMID):
         if regime == LEVEL and age_s < f[RAMP_S]:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
-        if age_s < n.MANOEUVRING_S * setting.pace:
+        if claimed or age_s < n.MANOEUVRING_S * setting.pace:
             after = w[GLIDED] == 1
             stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
             rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
@@ -350,23 +412,24 @@ def _children(
             level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
         if not np.isnan(setting.told_s):
-            off = (now_s - setting.told_s) / n.TOLD[1]
+            off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
             stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
-        _glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-        _brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
-        _levels(bank, i, setting, now_s, level * hours)
-        _turns(bank, i, setting, now_s, turn * hours, TURN)
+        glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
+        brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
+        levels(bank, i, setting, now_s, level * hours)
+        if not claimed:
+            _turns(bank, i, setting, now_s, turn * hours, TURN)
         left = stop + level + turn
     elif regime == GLIDE:
-        _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+        levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
         if steered:
             _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
             left += n.GLIDE_TURN
-        _brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
+        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
     elif regime == BRAKE:
-        _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
-        _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
+        glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
+        levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
     elif regime == AMID:
         _settles(bank, i, setting, now_s, n.AMID[3] * hours)
@@ -375,7 +438,9 @@ def _children(
         if regime == TURN:
             _back(bank, i, setting, now_s, n.TURN_OUT * hours)
         else:
-            _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+            glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+            if claimed:
+                levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = float(n.TURN_OUT)
     f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
@@ -387,7 +452,7 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     last = w[COUNT] - 1
     if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
         first = w[COUNT] == 0 and v[COUNT] == 0 and w[REGIME] == v[REGIME]
-        return bool(first and w[LIAR] == v[LIAR])
+        return bool(first and w[LIAR] == v[LIAR] and w[KIND] == v[KIND])
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False
     if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
@@ -399,9 +464,11 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
 
 
 @compiled(uncounted=True)
-def thin(bank: Histories, setting: BankSetting) -> None:
+def thin(bank: Histories, setting: BankSetting) -> float:
     """
     Weigh against the best and keep the likeliest; merge now and then.
+
+    Returns the log predictive density of the bin.
     """
     count = bank.used[0]
     best = -np.inf
@@ -409,7 +476,7 @@ def thin(bank: Histories, setting: BankSetting) -> None:
         best = max(best, bank.number[i, WEIGHT])
     if best == -np.inf:  # it begins anew
         bank.used[0] = 0
-        return
+        return -np.inf
     total = 0.0
     for i in range(count):
         total += math.exp(bank.number[i, WEIGHT] - best)
@@ -425,11 +492,10 @@ def thin(bank: Histories, setting: BankSetting) -> None:
             _copy(bank, i, kept)
         kept += 1
     bank.used[0] = kept
-    if not due:
-        _keep_best(bank)  # or the next births find no room
-        return
-    _merge(bank, now_s, setting.pace)
-    _keep_best(bank)
+    if due:
+        _merge(bank, now_s, setting.pace)
+    _keep_best(bank)  # or the next births find no room
+    return float(norm)
 
 
 @compiled(uncounted=True)

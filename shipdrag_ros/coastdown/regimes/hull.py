@@ -19,6 +19,7 @@ _TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4
 _HUMP = 0.45  # Froude number from which on waves make no more
 _POINTS = 64
 _SPEEDS = (0.03, 1.2)  # Froude numbers of the table
+_ANY_SPEEDS = (0.014, 1.2)
 
 
 class HullPrior(NamedTuple):
@@ -76,6 +77,24 @@ class HullPrior(NamedTuple):
             ship.length_m,
             math.log(float(ship.speed(float(n.SAILS[0])))),
             _run_down(ship),
+        )
+
+    @classmethod
+    def any_body(cls, ship: Ship) -> HullPrior:
+        """
+        Take it for whatever glides: a hull of length and volume has its friction at least.
+        """
+        slow, fast = (math.log(float(ship.speed(each))) for each in _ANY_SPEEDS)
+        log_u = np.linspace(slow, fast, _POINTS)
+        (level, level_sd), (exponent, exponent_sd) = n.ANY_BODY.tolist(), n.ANY_EXPONENT.tolist()
+        return cls.of(ship)._replace(
+            first=slow,
+            step=float(log_u[1] - log_u[0]),
+            curve=_friction(ship, np.exp(log_u)),
+            level=level,
+            level_var=level_sd**2,
+            exponent=exponent,
+            exponent_var=exponent_sd**2,
         )
 
 

@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     FREE,
     GLIDE,
     GLIDE_TURN,
+    GLIDED,
     GONE,
     GROUND,
     GUST,
@@ -61,6 +62,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RATE,
     REGIME,
     REVS,
+    RUDDER,
     SINCE,
     STANDS,
     STATES,
@@ -98,10 +100,25 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
+def rest_speed(hull: HullPrior) -> float:
+    """
+    Return the speed of a hull at rest, which is never quite so [m/s].
+    """
+    return math.exp(hull.first - 1.0)
+
+
+@compiled(inline=True, uncounted=True)
 def _bounded(hull: HullPrior, log_u: float) -> float:
     """Return ln u of a hull that is at rest at least, and no faster than any."""
     last = hull.first + (len(hull.curve) - 1.0) * hull.step
     return float(min(max(log_u, hull.first - 1.0), last + 2.0))
+
+
+@compiled(inline=True, uncounted=True)
+def _at_rest(setting: BankSetting, u: float) -> float:
+    """Return the sd of a speed of a claimed window that tells nothing at rest [m/s]."""
+    rest = rest_speed(setting.hull) if setting.engine > 0.0 else 0.0
+    return float(rest * (rest / u) ** 4)
 
 
 @compiled(inline=True, uncounted=True)
@@ -232,6 +249,8 @@ def predict(
         if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
+        if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
+            gusts = (noise[N_GUST] * setting.engine) ** 2 + f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -365,7 +384,9 @@ def _driving(
 
 
 @compiled(uncounted=True)
-def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float) -> float:
+def _running_down(
+    f: Float64, nu: float, u_part: float, left: float, part: float, scaled: bool
+) -> float:
     """
     Return the density of revs while the thrust goes; `part` is that of shafts that fall together.
 
@@ -373,7 +394,9 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
     """
     falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
     if np.isnan(f[FREE]):
-        density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
+        density = 1.0 if nu > n.CREEPS else 0.0  # one that stands has run down
+        if scaled:
+            density = _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD)
         f[FREE] = nu / falls
     else:
         density = _normal(nu - f[FREE] * falls, 0.25 * n.SHAFT_FIRST_SD)
@@ -382,15 +405,29 @@ def _running_down(f: Float64, nu: float, u_part: float, left: float, part: float
     return part * density + (1.0 - part) * any_
 
 
+@compiled(inline=True, uncounted=True)
+def _holds(f: Float64, nu: float, density: float, scaled: bool) -> None:
+    """Keep the revs; of a claimed window only as far as they are no error."""
+    known = not scaled and not np.isnan(f[REVS])
+    share = density / (density + n.SHAFT_LIES) if known else 1.0
+    f[REVS] = f[REVS] + share * (nu - f[REVS]) if known else nu
+
+
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
+def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> float:
     """
     Return the density of the revs of a screw that does not drive.
+
+    Where they are not `scaled` by steady sailing, they are so by the most turns a metre there
+    were, and may be as many.
     """
     revs = f[REVS]
     if kind == WINDMILLS:
         if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
-            return _as_usual(f, nu, u_part, 0.05, 0.3)
+            return _as_usual(f, nu, u_part, 0.05, 0.3 if scaled else 0.05)
+        if not scaled:
+            f[REVS] = nu / u_part
+            return 1.0 / u_part if nu < u_part + n.SHAFT_SD[0] else 0.0
         f[REVS] = min(nu / u_part, n.WINDMILL[2])
         wide = math.hypot(n.SHAFT_SD[0], n.WINDMILL[1] * u_part)
         at = n.WINDMILL[0] * u_part
@@ -398,31 +435,48 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float) -> float:
     if kind == STANDS or np.isnan(revs):
         stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
-        f[REVS] = nu
         # or anything below its last: it runs down
-        return 0.5 * stands + (0.5 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0)
+        below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+        if not scaled:  # and does not stay
+            below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
+        density = 0.5 * stands + 0.5 * below
+        if not scaled and last < n.CREEPS:  # or creeps on, as it likes
+            density = 0.9 * _off(nu, last) + (0.1 / n.CREEPS if nu < n.CREEPS else 0.0)
+        _holds(f, nu, density, scaled)
+        return density
+    moves = 0.1 if kind == HELD and scaled else 0.01
+    if not scaled and (kind != HELD or min(nu, revs) < n.CREEPS):
+        moves = 0.0  # an engine starts and stops such a screw, and what is stuck stays
+    density = (1.0 - moves) * _off(nu, revs) + moves
     if kind == HELD:  # a sensor that is stuck stays where it was
-        f[REVS] = nu
-    moves = 0.1 if kind == HELD else 0.01
-    return (1.0 - moves) * _off(nu, revs) + moves
+        _holds(f, nu, density, scaled)
+    return density
 
 
 @compiled(uncounted=True)
 def _shaft(
-    bank: Histories,
-    i: int,
-    said: Float64,
-    log_first: float,
-    now_s: float,
-    step_s: float,
-    several: bool,
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float, now_s: float
 ) -> float:
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
+    several, scaled = setting.shafts > 1, setting.engine == 0.0
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
-        return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
+        astern = regime == BRAKE or (regime == AMID and not scaled)
+        return math.log(1.0 if astern else n.SHAFT_LIES)
+    if regime == AMID and not scaled:  # at any revs, mostly at those of before
+        before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
+        f[REVS] = nu
+        if np.isnan(before):
+            return math.log(n.BAD if stands else 1.0)
+        if stands and before >= n.CREEPS:
+            stops = n.MANOEUVRE * n.OF_MANOEUVRES[0] * n.BIN_S / 3600.0  # as often as she glides
+            return math.log(n.BAD * stops)
+        if stands:  # of the other they say nothing
+            return 0.0
+        moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
+        return math.log((1.0 - moves) * _off(nu, before) + moves)
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0
     elif regime in (DRIVEN, LEVEL, TURN):
@@ -434,13 +488,13 @@ def _shaft(
         if regime == GLIDE and kind >= HELD and np.isnan(f[REVS]) and not np.isnan(f[FREE]):
             f[REVS] = f[FREE] * math.exp(min(f[BEFORE] - log_first, 1.0))  # as before the stop
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
-        if regime == GLIDE and kind < HELD and age_s < step_s:
+        if regime == GLIDE and kind < HELD and age_s < setting.step_s:
             # it stopped within the bin, of which the revs are a mean
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0 and kind < HELD:
-            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8)
+            density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
         else:
-            density = _dragged(f, kind, nu, u_part)
+            density = _dragged(f, kind, nu, u_part, scaled)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
             density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
@@ -496,7 +550,8 @@ def _by_way(
         h[j] = 0.0
     h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
     expected = x[WAY] - half * (u + x[CURRENT])
-    gained, excess = _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, setting.hull)
+    variance = noise[N_FIX] ** 2 + (setting.step_s * _at_rest(setting, u)) ** 2
+    gained, excess = _take(x, p, h, work, -expected, variance, bad, setting.hull)
     f[EXCESS] += excess
     if gained < math.log(2.0 * n.BAD * bad):  # from another mark: the way begins again at it
         _forget(x, p, WAY, half * (math.exp(x[LN_U]) + x[CURRENT]), noise[N_FIX] ** 2)
@@ -510,11 +565,11 @@ def _by_shafts(
     """Return the log density of the revs, and date the stop and the end of thrust by them."""
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
-    shown = _shaft(bank, i, said, log_first, now_s, step_s, setting.shafts > 1)
+    shown, scaled = _shaft(bank, i, setting, said, log_first, now_s), setting.engine == 0.0
     # a slow error of revs does not turn their sign
-    gained = shown if said[LOW] < _REVERSED else n.SHAFT_TEMPER * shown
+    gained = shown if said[LOW] < _REVERSED or not scaled else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
-    if young and bank.whole[i, KIND] < HELD:
+    if young and scaled and bank.whole[i, KIND] < HELD:
         # no slow error hides that the revs of all have not changed
         unchanged = math.log(_off(said[LOW], 1.0) + n.SHAFT_LIES)
         gained += (1.0 - n.SHAFT_TEMPER) * min(shown - unchanged, 0.0)
@@ -535,7 +590,7 @@ def weigh(
     regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
     h = work[1]
     gained = f[EXCESS] = 0.0
-    bad = float(n.BAD_DENSITY)
+    bad, claimed = float(n.BAD_DENSITY), setting.engine > 0.0
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
@@ -549,7 +604,10 @@ def weigh(
             h[j] = 0.0
         h[LN_U] = u
         expected = u + f[MEAN_U]
-        sd = noise[N_LOG]
+        sd, value = noise[N_LOG], said[which]
+        # an engine may drive her astern, and a ship at rest is never quite so
+        if claimed and (regime == AMID or abs(value) < rest_speed(setting.hull)):
+            value = abs(value)
         if which == LOG:
             longer, lags = math.exp(min(x[LONGER], _LONGEST)), x[LAG] + f[MEAN_LAG]
             h[WANDER], h[LAG] = 1.0, longer
@@ -559,7 +617,9 @@ def weigh(
             h[CURRENT] = h[EDDY] = 1.0
             expected += x[CURRENT] + x[EDDY] - setting.pace * _GROUND_LAG_S * slowing
             sd = noise[N_GROUND]
-        shown, excess = _take(x, p, h, work, said[which] - expected, sd * sd, bad, setting.hull)
+        if claimed:
+            sd = math.hypot(sd, _at_rest(setting, u))
+        shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
         gained += shown
         f[EXCESS] += excess
     if not np.isnan(said[ADVANCE]):
@@ -567,21 +627,26 @@ def weigh(
     else:  # the next fix begins the way anew
         way = 0.5 * setting.step_s * (math.exp(x[LN_U]) + x[CURRENT])
         _forget(x, p, WAY, way, noise[N_FIX] ** 2)
+    turning = regime in (TURN, GLIDE_TURN) or (
+        regime == AMID and (not claimed or bank.whole[i, KIND] == len(n.ENGINE) - 1)
+    )
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         # errors of fixes turn a course by more, the shorter the way
         sd = noise[N_RATE] * math.exp(min(max(log_first - x[LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
-        turning = regime in (TURN, GLIDE_TURN, AMID)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide) + (1.0 - share) * _normal(said[RATE], sd)
         # or anything up to a radian a second, as where fixes jump
         gained += n.SHAFT_TEMPER * math.log((1.0 - n.BAD) * density + 0.5 * n.BAD)
+    if not np.isnan(said[RUDDER]):
+        sd = n.RUDDER[1 if turning else 0]
+        gained += n.SHAFT_TEMPER * math.log(_normal(said[RUDDER], sd) + n.SHAFT_LIES)
     if not np.isnan(said[HIGH]):
         gained += _by_shafts(bank, i, setting, said, log_first)
     # a covariance that rounding broke weighs nothing
     f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
-    if regime in (DRIVEN, TURN, AMID):
+    if regime in (DRIVEN, TURN) or (regime == AMID and bank.whole[i, GLIDED] == 0):
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])

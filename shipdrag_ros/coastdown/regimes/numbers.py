@@ -53,6 +53,7 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
+BIN_LENGTH_M = _number('BIN_LENGTH_M', 150.0, 'm', 'of a ship of that bin; times go by the root')
 LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
 LOG_LAG_MOST = _number('LOG_LAG_MOST', 30.0, 's', 'no filter of a log is longer')
 LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
@@ -145,17 +146,31 @@ LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
 BRAKES = _grid('BRAKES', (0.4, 1.0, 2.5), 'of the first resistance', 'astern power, tugs')
 BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')
+STOPPERS = _grid('STOPPERS', (8.0, 30.0), 'of the first resistance', 'lines, wheels, a quay')
 TURNS = _grid('TURNS', (0.12, 0.4, 1.1, 3.0), 'of the resistance', 'helm')
 TURNS_SD = _number('TURNS_SD', 0.35, 'ln', 'of each')
 TURNS_DRIFT = _number('TURNS_DRIFT', 0.3, 'ln', 'of each in a minute')
 TURN_RATE = _number('TURN_RATE', 0.2, 'ship lengths', 'rate of turn over u / L')
 STEADY_TURNS = _number('STEADY_TURNS', 0.03, '1', 'share of bins with a yaw like that of a turn')
 
+# what a person claims
+ANY_BODY = _grid('ANY_BODY', (0.5, 0.7), 'ln', 'over the friction of a hull: mean, sd')
+ODD = _grid('ODD', (0.0, -2.0, 2.5), 'ln', 'over that: a hull ahead, on wheels, or sideways')
+ODD_SHARE = _grid('ODD_SHARE', (0.8, 0.1, 0.1), '1', 'of these')
+ANY_EXPONENT = _grid('ANY_EXPONENT', (0.0, 0.9), '1', 'over that of friction: wheels to waves')
+ANY_WIND_SD = _number('ANY_WIND_SD', 0.15, 'of the first resistance', 'slow craft, wheels')
+ANY_GUST = _grid('ANY_GUST', (0.01, 0.03, 0.08, 0.2), 'of the resistance', 'and in a basin')
+ENGINE = _grid('ENGINE', (0.01, 0.3, 0.3, 0.3), 'of the resistance', 'what it gives over it: sd')
+ENGINE_GUST = _grid('ENGINE_GUST', (0.0, 0.02, 0.15, 1.0), 'the same', 'how it is handled: sd')
+ENGINE_MOVES = _grid('ENGINE_MOVES', (0.01, 0.01, 0.1, 0.3), '1', 'bins in which its revs change')
+RUDDER = _grid('RUDDER', (0.08, 0.5), 'rad', 'angle of one that keeps a course, that turns: sd')
+
 # the shaft, revs times pitch over those of steady sailing
 SHAFT_TEMPER = _number('SHAFT_TEMPER', 0.35, '1', 'of its log likelihood: errors last a minute')
 SHAFT_SD = _grid('SHAFT_SD', (0.015, 0.04), '1', 'its own error, and that of an expectation')
 SHAFT_FIRST_SD = _number('SHAFT_FIRST_SD', 0.12, '1', 'of what a level should have')
 WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.85), '1', 'over u / U: mean, sd, most; 108 glides')
+CREEPS = _number('CREEPS', 0.1, '1', 'revs that give a hundredth of the thrust')
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss

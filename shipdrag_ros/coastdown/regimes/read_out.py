@@ -114,7 +114,8 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
     ramp = np.where(what == GLIDE, ramp, 0.0)
     gone = np.minimum(at + ramp, end)
-    seen = (setting.shafts > 0) & (all_.whole[:used, GLIDE_KIND, np.newaxis] < HELD)
+    scaled = setting.shafts > 0 and setting.engine == 0.0  # revs by those of steady sailing
+    seen = scaled & (all_.whole[:used, GLIDE_KIND, np.newaxis] < HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
     date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))
@@ -134,7 +135,10 @@ def _over_time(
     return np.cumsum(edges)[:-1]
 
 
-def _probability(found: Spans, bins: int, step_s: float) -> Float64:
+def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
+    """
+    Return the probability of some spans in each bin since the start.
+    """
     return _over_time(found.weight, found.begin_s, found.end_s, bins, step_s)
 
 
@@ -151,7 +155,7 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     }
     glide = found.part(found.what == GLIDE)
     of = {
-        number: _probability(found.part(which), bins, step_s) for number, which in chosen.items()
+        number: probability_of(found.part(which), bins, step_s) for number, which in chosen.items()
     }
     of[P_RUN_DOWN] = _over_time(glide.weight, glide.begin_s, glide.gone_s, bins, step_s)
     of[P_GLIDING] = _over_time(glide.weight, glide.gone_s, glide.end_s, bins, step_s)
@@ -200,7 +204,7 @@ def _one(found: Spans) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
     stop, start, begin, end = (
-        _median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
+        median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
@@ -209,7 +213,10 @@ def _one(found: Spans) -> SmoothedGlide:
     return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
 
 
-def _median(value: Float64, share: Float64) -> float:
+def median(value: Float64, share: Float64) -> float:
+    """
+    Return the median of values with shares that add up to one.
+    """
     order = np.argsort(value, kind='stable')
     place = np.searchsorted(np.cumsum(share[order]), 0.5)
     return float(value[order[min(int(place), len(order) - 1)]])
@@ -233,7 +240,7 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     Return the stretches [s] without thrust in which something but the water acted.
     """
     likely, acted = (
-        _probability(found.part(np.isin(found.what, codes)), bins, step_s)
+        probability_of(found.part(np.isin(found.what, codes)), bins, step_s)
         for codes in (_UNPOWERED, _ACTED)
     )
     return [
@@ -253,7 +260,9 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | 
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
     losses = [
-        float(_probability(found.part(found.what == code), len(speed), step_s)[first:last] @ lost)
+        float(
+            probability_of(found.part(found.what == code), len(speed), step_s)[first:last] @ lost
+        )
         for code in codes
     ]
     return codes[int(np.argmax(losses))] if max(losses) > 0.0 else None

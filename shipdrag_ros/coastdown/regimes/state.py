@@ -23,7 +23,7 @@ LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(1
 STATES = 11
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
-AMID = 6  # the record begins amid a manoeuvre under power
+AMID = 6  # amid a manoeuvre under power, as a record may begin and a claimed window may be
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
 # start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
@@ -48,7 +48,8 @@ LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
 SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
 GONE = 10  # when revs over speed fell through those without thrust [s since the start]
 RANGES = 11  # and that after it: range of the seconds of log and of speed over ground
-SAID = 13
+RUDDER = 13  # angle [rad]
+SAID = 14
 
 # noise in use: gust over resistance, sd and time of the slow error of log and speed over ground,
 # white noise of log, speed over ground and fixes, their walk, sd of the rate of turn
@@ -114,6 +115,9 @@ class BankSetting(NamedTuple):
         How many are read.
     told_s
         When a person says that the engine was stopped [s since the start]; NaN where nobody does.
+    engine
+        What an engine may give or take in a window that a person claims [m/s^2]; 0 where a record
+        is followed, in which she sails evenly between manoeuvres.
     """
 
     hull: HullPrior
@@ -121,10 +125,11 @@ class BankSetting(NamedTuple):
     pace: float
     shafts: int
     told_s: float
+    engine: float
 
     @classmethod
     def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan, 0.0)

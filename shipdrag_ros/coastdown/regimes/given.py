@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A window that a person claims to be a coastdown, read by the bank."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.bank import Bank, step
+from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
+from shipdrag_ros.coastdown.regimes.read_out import Spans, median, probability_of, spans_of
+from shipdrag_ros.coastdown.regimes.state import (
+    AMID,
+    BRAKE,
+    DRIVEN,
+    GLIDE,
+    GLIDE_TURN,
+    N_EDDY,
+    N_EDDY_S,
+    N_GUST,
+    N_WANDER,
+    N_WANDER_S,
+    SHAFTS,
+    BankSetting,
+)  # fmt: skip
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+REGIMES = ((DRIVEN, AMID), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
+ENGINES, GLIDES, BRAKES, TURNS = range(4)
+
+
+@dataclass(frozen=True)
+class WindowRegimes:
+    """
+    What the bank makes of a window.
+
+    Attributes
+    ----------
+    binned
+        What it was told.
+    probability : (4, bins)
+        That an engine acts, that she glides, that something stops her, that she glides in a turn.
+    rest
+        Speed of a ship at rest, which is never quite so [m/s].
+    """
+
+    binned: Binned
+    spans: Spans
+    probability: Float64
+    rest: float
+
+    def stretches(self, *which: int) -> list[tuple[int, int]]:
+        """
+        Return first bins, and those after the last, of the stretches that may be so.
+        """
+        likely = self.probability[list(which)].sum(axis=0) > n.HOLD[0]
+        likely[: self.binned.before] = False
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
+        return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+    def lost(self, span: tuple[int, int]) -> float:
+        """
+        Return the speed that is lost in some bins [m/s].
+        """
+        speed = self.binned.speed[span[0] : span[1]]
+        speed = speed[np.isfinite(speed)]
+        some = max(1, min(3, len(speed) // 3))
+        return float(speed[:some].mean() - speed[-some:].mean()) if len(speed) else 0.0
+
+    def dates(self, span: tuple[int, int], *which: int) -> tuple[float, float]:
+        """
+        Return when a stretch of bins began and ended [bins], of the histories that hold it.
+        """
+        codes = [code for each in which for code in REGIMES[each]]
+        step_s = self.binned.step_s
+        found = self.spans.part(np.isin(self.spans.what, codes))
+        likely = self.probability[list(which), slice(*span)].sum(axis=0)
+        likely = span[0] + np.flatnonzero(likely >= min(0.5, likely.max()))
+        places = []
+        for at, dated in ((likely[0], 'date_s'), (likely[-1], 'end_s')):
+            at_s = (at + 0.5) * step_s
+            held = found.part((found.begin_s < at_s) & (at_s < found.end_s))
+            share = held.weight / held.weight.sum()
+            places.append(median(getattr(held, dated), share) / step_s)
+        begin, end = places
+        return max(begin, span[0] - 0.5), min(end, span[1] + 0.5)
+
+
+def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | None:
+    """
+    Let the bank read a window and the record before it; None where nothing shows a speed.
+
+    Notes
+    -----
+    No steady record shows the noise: all settings of it are weighed by their evidence.
+    """
+    longest_s = float(n.BIN_S) * math.sqrt(ship.length_m / float(n.BIN_LENGTH_M))
+    binned = bin_window(window, parameters, longest_s)
+    if binned is None or not binned.top > 0.0:
+        return None
+    hull = HullPrior.any_body(ship)
+    heard = np.isfinite(binned.said[:, SHAFTS : SHAFTS + 4]).any(axis=0)
+    resistance = math.exp(hull_law(hull, math.log(binned.top))[0] + hull.level)
+    setting = BankSetting.of(hull, binned.step_s, shafts=int(heard.sum()))._replace(
+        told_s=binned.before * binned.step_s, engine=max(resistance, binned.swing)
+    )
+    # a log errs by a part of the speed: as that of the ship of the table
+    wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
+    runs = []
+    short, long = n.WANDER_S
+    settings = [*product(n.ANY_GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
+    for gust, wander, wander_s in settings:
+        noise = binned.noise.copy()
+        noise[N_GUST] = gust
+        noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
+        runs.append(_run(binned, setting, noise))
+    best = max(evidence for evidence, _ in runs)
+    share = np.exp([evidence - best for evidence, _ in runs])
+    share /= share.sum()
+    parts = [
+        spans._replace(weight=part * spans.weight)
+        for part, (_, spans) in zip(share, runs, strict=True)
+    ]
+    joined = Spans(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+    probability = [
+        probability_of(joined.part(np.isin(joined.what, codes)), len(binned.said), binned.step_s)
+        for codes in REGIMES
+    ]
+    return WindowRegimes(binned, joined, np.array(probability), rest_speed(hull))
+
+
+def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, Spans]:
+    """Run one bank; return the log evidence of the window, and the spans of its histories."""
+    bank = Bank.fresh()
+    bank.noise.used[:] = noise
+    bank.revs[:] = _most(binned.said[:, SHAFTS : SHAFTS + 4])
+    bank.first[:] = math.log(binned.top), 60.0, np.nan
+    # what nothing shows before the first bin that is heard goes by
+    bank.histories.clock[0] = np.argmax(np.isfinite(binned.speed))
+    evidence = 0.0
+    for k, said in enumerate(binned.said):
+        bank.said[:] = said
+        shown = step(bank, setting)
+        if k >= binned.before:
+            evidence += shown
+    return evidence, spans_of(bank, setting)
+
+
+def _most(turning: NDArray[np.float64]) -> Float64:
+    """Return the most revs of each shaft, with the sign that it mostly has."""
+    size = np.nan_to_num(np.abs(turning))
+    most = size.max(axis=0)
+    fast = np.where(size > 0.5 * most, turning, 0.0)
+    return np.asarray(most * np.where(np.nansum(np.sign(fast), axis=0) < 0.0, -1.0, 1.0))
