@@ -23,6 +23,7 @@ from shipdrag_ros.coastdown.regimes.given import (
     GLIDES,
     TURNS,
     WindowRegimes,
+    most_revs,
     read,
 )
 from shipdrag_ros.coastdown.regimes.state import RATE, RUDDER, SHAFTS
@@ -33,6 +34,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
+_NEAR = 2.0  # bins in which the shafts date an edge
 _MOST = 0.75  # of the speed lost without thrust
 _SHORTEST = round(float(n.SHORTEST_S) / float(n.BIN_S))  # bins
 _SPAN = tuple[int, int]
@@ -150,6 +152,7 @@ class _Judge:
         self._window = window
         self._reading = reading
         self._binned = reading.binned
+        self._revs = most_revs(reading.binned)
 
     def judgement(self, data_stop_s: float) -> GivenPart:
         """
@@ -166,6 +169,7 @@ class _Judge:
                 window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
             )
         first, last = reading.dates(kept, *which)
+        first, last = self._stood(first, -1), self._stood(last, 1)
         for gap in gaps:
             first = max(first, gap[1]) if gap[1] == kept[0] else first
             last = min(last, gap[0]) if gap[0] == kept[1] else last
@@ -186,7 +190,43 @@ class _Judge:
             by = f'by {math.degrees(swing):.0f} degrees' if swing < np.inf else 'by her rudder'
             notes = (f'she turns {by}: the drag of drifting and turning is part of r',)
         shown = self._shown() if cuts else ()
+        notes += self._turns_on(kept)
         return GivenPart(start_ns, end_ns, tuple(cuts), None, notes, shown)
+
+    def _stood(self, place: float, drives: int) -> float:
+        """
+        Return where the shafts begin or cease to stand, if they do so near a place in bins.
+
+        `drives` is -1 where they drive before it, and 1 where they do so after it.
+        """
+        found, parts = [], [self._window]
+        if self._window.before is not None:
+            parts.insert(0, self._window.before)
+        for k in range(len(self._window.shafts)):
+            time_ns, turning = (
+                np.concatenate([getattr(part.shafts[k], name) for part in parts])
+                for name in ('time_ns', 'value')
+            )
+            at = (time_ns - self._binned.zero_ns) / (SECOND_NS * self._binned.step_s)
+            near = np.abs(at - place) < _NEAR
+            driving = np.abs(turning[near]) >= n.CREEPS * abs(self._revs[k])
+            at, driving = at[near][::-drives], driving[::-drives]
+            if len(at) and driving[0] and not driving[-1]:
+                found.append(at[np.flatnonzero(driving)[-1] + (drives < 0)])
+        return float(max(found) if drives < 0 else min(found)) if found else place
+
+    def _turns_on(self, kept: _SPAN) -> tuple[str, ...]:
+        """Say that a shaft turns faster than water turns it, and is taken not to drive her."""
+        turning = np.abs(self._binned.said[kept[0] : kept[1], SHAFTS : SHAFTS + 4])
+        part = np.abs(self._binned.speed[kept[0] : kept[1], np.newaxis]) / self._binned.top
+        with np.errstate(invalid='ignore', divide='ignore'):
+            over = turning / np.abs(self._revs) > n.WINDMILL[2] * part + n.CREEPS
+        if not over.any(axis=1).mean() > 0.5:
+            return ()
+        return (
+            'the shaft turns faster than the water turns it, though she slows as without thrust: '
+            'zero pitch, a shaft that is declutched, or a sensor that is stuck',
+        )
 
     def _best(self, gaps: list[_SPAN]) -> tuple[_SPAN | None, tuple[int, ...]]:
         """Return the bins of the coastdown, and the regimes that make it."""
@@ -283,7 +323,7 @@ class _Judge:
             return Dismissal.PLATEAU, 'nothing of it slows her for long enough'
         if regime == ENGINES:
             turning = self._binned.said[first:last, SHAFTS : SHAFTS + 4]
-            revs = np.nan_to_num(turning / np.maximum(self._most_revs, 1e-9))
+            revs = np.nan_to_num(turning / np.maximum(np.abs(self._revs), 1e-9))
             if self._reversed(turning):
                 return Dismissal.ASTERN, 'the propeller is reversed'
             if np.abs(revs).max(initial=0.0) > n.CREEPS:
@@ -307,16 +347,9 @@ class _Judge:
             return 0.0
         return float((speed[there[0]] - speed[there[-1]]) / (there[-1] - there[0]))
 
-    @property
-    def _most_revs(self) -> Float64:
-        turning = np.nan_to_num(np.abs(self._binned.said[:, SHAFTS : SHAFTS + 4]))
-        return np.asarray(turning.max(axis=0))
-
     def _reversed(self, turning: Float64) -> bool:
         """Say whether a shaft turns the other way than it mostly does."""
-        all_ = np.nan_to_num(self._binned.said[:, SHAFTS : SHAFTS + 4])
-        usual = np.sign(np.median(np.where(np.abs(all_) > 0.5 * self._most_revs, all_, 0), axis=0))
-        against = np.nan_to_num(turning) * usual < -n.CREEPS * self._most_revs
+        against = np.nan_to_num(turning) * np.sign(self._revs) < -n.CREEPS * np.abs(self._revs)
         return bool(against.any(axis=1).mean() > 0.5)
 
     def _shown(self) -> tuple[tuple[int, float], ...]:

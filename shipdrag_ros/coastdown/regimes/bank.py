@@ -286,6 +286,7 @@ _SETTING = BankSetting(
     0,
     0.0,
     0.0,
+    0.0,
 )  # its types are all that counts
 
 

@@ -63,7 +63,8 @@ from shipdrag_ros.coastdown.regimes.state import (
 from shipdrag_ros.compiled import compiled
 
 _PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have children, in turn
-_LOST = 16.0  # and one that is dropped
+LOST = 16.0
+"""Nats below the best of a history that is dropped."""
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
 _NO_RAMP_S = 1e-3  # nothing pushed before
@@ -128,7 +129,7 @@ def _born(
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
     j = bank.used[0]
     # one that is not likelier would be dropped at once
-    if j >= ROOM or not share > 0.0 or bank.number[i, BEHIND] + math.log(share) < -_LOST:
+    if j >= ROOM or not share > 0.0 or bank.number[i, BEHIND] + math.log(share) < -LOST:
         return -1
     _copy(bank, i, j)
     bank.used[0] = j + 1
@@ -166,7 +167,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         if j >= 0:
             free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
         return
-    learnt = bank.whole[i, REGIME] == LEVEL
+    learnt, claimed = bank.whole[i, REGIME] == LEVEL, setting.engine > 0.0
     last = bank.whole[i, COUNT] - 1
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
     already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
@@ -190,8 +191,9 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
                 x[LN_A] += n.ODD[odd]
             _glide(bank, j, setting)
             bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
-            held = kind >= HELD and not any_
-            bank.number[j, FREE] = bank.number[j, REVS] if held else np.nan
+            # the revs of an engine that is cut off may change as they like
+            held = kind == STUCK or (kind == HELD and not claimed)
+            bank.number[j, FREE] = bank.number[i, REVS] if held else np.nan
             bank.number[j, REVS] = np.nan
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
@@ -211,37 +213,51 @@ def _engages(bank: Histories, j: int) -> None:
 
 
 @compiled(uncounted=True)
+def _any_power(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let an engine act in any way."""
+    regime = bank.whole[i, REGIME]
+    for kind in range(len(n.ENGINE)):
+        if regime != AMID or bank.whole[i, KIND] != kind:
+            j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
+            if j >= 0:
+                if regime not in (AMID, LEVEL):
+                    _engages(bank, j)
+                amid(bank, j, setting, kind)
+
+
+@compiled(uncounted=True)
 def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """
     Let the engine go to another level, or engage.
     """
-    regime = bank.whole[i, REGIME]
-    if setting.engine > 0.0:  # at any level
-        for kind in range(len(n.ENGINE)):
-            if regime != AMID or bank.whole[i, KIND] != kind:
-                j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
-                if j >= 0:
-                    if regime != AMID:
-                        _engages(bank, j)
-                    amid(bank, j, setting, kind)
-        return
-    f = bank.number[i]
-    engaged = regime in (DRIVEN, LEVEL)
-    base = balance(bank.mean[i], f, regime, now_s)[0] if engaged else f[BEFORE]
+    f, regime = bank.number[i], bank.whole[i, REGIME]
+    engaged, claimed = regime in (DRIVEN, LEVEL), setting.engine > 0.0
+    if claimed:
+        # what the level was before, and is then, shafts alone show
+        even = engaged or (regime == AMID and bank.whole[i, KIND] == 0)
+        level = 0.5 * chance if even and setting.shafts > 0 else 0.0
+        _any_power(bank, i, setting, now_s, chance - level)
+        engaged, chance = True, level
+    base = f[BEFORE]
+    if regime == AMID:
+        base = bank.mean[i, LN_U]
+    elif engaged:
+        base = balance(bank.mean[i], f, regime, now_s)[0]
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
+    kinds = 1 if claimed else 2  # torque that is held is any power there
     for k in range(len(n.LEVELS)):
-        for m in range(2 * ramps):
-            share = chance * n.LEVELS_SHARE[k] / (2 * ramps)
-            ramp_s = (n.LEVEL_RAMP_S[m // 2] if engaged else n.ENGAGE_S) * setting.pace
+        for m in range(kinds * ramps):
+            share = chance * n.LEVELS_SHARE[k] / (kinds * ramps)
+            ramp_s = (n.LEVEL_RAMP_S[m // kinds] if engaged else n.ENGAGE_S) * setting.pace
             j = _born(bank, i, now_s, share, LEVEL, ramp_s)
             if j < 0:
                 continue
-            bank.whole[j, KIND] = m % 2
+            bank.whole[j, KIND] = m % kinds
             bank.number[j, FREE] = n.WINDMILL[0]
             if regime == GLIDE and bank.whole[i, KIND] == WINDMILLS:
                 revs = f[REVS]
                 bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
-            bank.number[j, REVS] = np.nan
+            bank.number[j, REVS] = f[REVS] if claimed else np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
             if not engaged:
@@ -413,7 +429,8 @@ def _children(
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
         if not np.isnan(setting.told_s):
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
-            stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
+            told = 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
+            stop, level = stop + n.TOLD[0] * told, level + (1.0 - n.TOLD[0]) * told
         glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
         brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
         levels(bank, i, setting, now_s, level * hours)
@@ -486,7 +503,7 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     kept = 0
     for i in range(count):
         bank.number[i, WEIGHT] -= norm
-        if bank.number[i, WEIGHT] < -_LOST:
+        if bank.number[i, WEIGHT] < -LOST:
             continue
         if kept != i:
             _copy(bank, i, kept)
@@ -533,7 +550,7 @@ def _keep_best(bank: Histories) -> None:
     count = bank.used[0]
     if count <= KEPT:
         return
-    low, high = -_LOST - 1.0, 0.0
+    low, high = -LOST - 1.0, 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)
         above = 0

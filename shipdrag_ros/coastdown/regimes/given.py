@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import Bank, step
 from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
+from shipdrag_ros.coastdown.regimes.births import LOST
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
 from shipdrag_ros.coastdown.regimes.read_out import Spans, median, probability_of, spans_of
@@ -22,6 +22,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     DRIVEN,
     GLIDE,
     GLIDE_TURN,
+    LEVEL,
     N_EDDY,
     N_EDDY_S,
     N_GUST,
@@ -35,7 +36,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-REGIMES = ((DRIVEN, AMID), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
+REGIMES = ((DRIVEN, AMID, LEVEL), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
 ENGINES, GLIDES, BRAKES, TURNS = range(4)
 
 
@@ -109,27 +110,33 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     if binned is None or not binned.top > 0.0:
         return None
     hull = HullPrior.any_body(ship)
-    heard = np.isfinite(binned.said[:, SHAFTS : SHAFTS + 4]).any(axis=0)
+    read_out = np.isfinite(binned.said[:, SHAFTS : SHAFTS + 4]).any(axis=0)
     resistance = math.exp(hull_law(hull, math.log(binned.top))[0] + hull.level)
-    setting = BankSetting.of(hull, binned.step_s, shafts=int(heard.sum()))._replace(
-        told_s=binned.before * binned.step_s, engine=max(resistance, binned.swing)
+    setting = BankSetting.of(hull, binned.step_s, shafts=int(read_out.sum()))._replace(
+        told_s=binned.before * binned.step_s,
+        engine=max(resistance, binned.swing),
+        log_first=math.log(binned.top),
     )
     # a log errs by a part of the speed: as that of the ship of the table
     wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
-    runs = []
     short, long = n.WANDER_S
     settings = [*product(n.ANY_GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
-    for gust, wander, wander_s in settings:
-        noise = binned.noise.copy()
-        noise[N_GUST] = gust
-        noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
-        runs.append(_run(binned, setting, noise))
-    best = max(evidence for evidence, _ in runs)
-    share = np.exp([evidence - best for evidence, _ in runs])
+    banks = [_bank(binned, setting, *each) for each in settings]
+    evidence = [0.0 for _ in banks]
+    for k, said in enumerate(binned.said):
+        for each, bank in enumerate(banks):
+            bank.said[:] = said
+            shown = step(bank, setting)
+            if k >= binned.before:
+                evidence[each] += shown
+        # one so far behind would weigh nothing, as a history that is so
+        likely = [each >= max(evidence) - LOST for each in evidence]
+        banks, evidence = list(compress(banks, likely)), list(compress(evidence, likely))
+    share = np.exp(np.array(evidence) - max(evidence))
     share /= share.sum()
     parts = [
         spans._replace(weight=part * spans.weight)
-        for part, (_, spans) in zip(share, runs, strict=True)
+        for part, spans in zip(share, (spans_of(bank, setting) for bank in banks), strict=True)
     ]
     joined = Spans(*(np.concatenate(each) for each in zip(*parts, strict=True)))
     probability = [
@@ -139,26 +146,25 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     return WindowRegimes(binned, joined, np.array(probability), rest_speed(hull))
 
 
-def _run(binned: Binned, setting: BankSetting, noise: Float64) -> tuple[float, Spans]:
-    """Run one bank; return the log evidence of the window, and the spans of its histories."""
+def _bank(
+    binned: Binned, setting: BankSetting, gust: float, wander: float, wander_s: float
+) -> Bank:
+    """Return a bank that is to read a window with some noise."""
     bank = Bank.fresh()
-    bank.noise.used[:] = noise
-    bank.revs[:] = _most(binned.said[:, SHAFTS : SHAFTS + 4])
-    bank.first[:] = math.log(binned.top), 60.0, np.nan
-    # what nothing shows before the first bin that is heard goes by
+    noise = bank.noise.used
+    noise[:] = binned.noise
+    noise[N_GUST] = gust
+    noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
+    bank.revs[:] = most_revs(binned)
+    bank.first[:] = setting.log_first, 60.0, np.nan
+    # what nothing shows before the first bin that is read goes by
     bank.histories.clock[0] = np.argmax(np.isfinite(binned.speed))
-    evidence = 0.0
-    for k, said in enumerate(binned.said):
-        bank.said[:] = said
-        shown = step(bank, setting)
-        if k >= binned.before:
-            evidence += shown
-    return evidence, spans_of(bank, setting)
+    return bank
 
 
-def _most(turning: NDArray[np.float64]) -> Float64:
-    """Return the most revs of each shaft, with the sign that it mostly has."""
-    size = np.nan_to_num(np.abs(turning))
-    most = size.max(axis=0)
-    fast = np.where(size > 0.5 * most, turning, 0.0)
-    return np.asarray(most * np.where(np.nansum(np.sign(fast), axis=0) < 0.0, -1.0, 1.0))
+def most_revs(binned: Binned) -> Float64:
+    """
+    Return the most revs times pitch of each shaft, (4,) [rad/s], with the sign it drives by.
+    """
+    turning = np.nan_to_num(binned.said[:, SHAFTS : SHAFTS + 4])
+    return np.asarray(np.abs(turning).max(axis=0) * np.where(turning.sum(axis=0) < 0.0, -1.0, 1.0))

@@ -454,9 +454,27 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
 
 
 @compiled(uncounted=True)
-def _shaft(
-    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float, now_s: float
+def _shown_level(
+    bank: Histories, i: int, setting: BankSetting, nu: float, now_s: float, work: Float64
 ) -> float:
+    """Take the revs for those of a level that is reached in this bin; return the log density."""
+    f, x = bank.number[i], bank.mean[i]
+    reached_s = f[SINCE] + f[RAMP_S]
+    if not now_s - setting.step_s < reached_s <= now_s or nu < n.CREEPS:
+        return 0.0
+    h = work[1]
+    for j in range(STATES):
+        h[j] = 0.0
+    h[OPEN] = 1.0
+    off = math.log(nu) - (x[OPEN] - setting.log_first)
+    return float(_take(x, bank.spread[i], h, work, off, n.SHAFT_FIRST_SD**2, 1.0, setting.hull)[0])
+
+
+@compiled(uncounted=True)
+def _shaft(
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float, now_s: float,
+    work: Float64,
+) -> float:  # fmt: skip
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
@@ -465,7 +483,7 @@ def _shaft(
     if low < _REVERSED:
         astern = regime == BRAKE or (regime == AMID and not scaled)
         return math.log(1.0 if astern else n.SHAFT_LIES)
-    if regime == AMID and not scaled:  # at any revs, mostly at those of before
+    if regime in (AMID, LEVEL) and not scaled:  # at any revs, mostly at those of before
         before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
         f[REVS] = nu
         if np.isnan(before):
@@ -476,7 +494,10 @@ def _shaft(
         if stands:  # of the other they say nothing
             return 0.0
         moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
-        return math.log((1.0 - moves) * _off(nu, before) + moves)
+        shown = math.log((1.0 - moves) * _off(nu, before) + moves)
+        if regime == LEVEL:
+            shown += _shown_level(bank, i, setting, nu, now_s, work)
+        return shown
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0
     elif regime in (DRIVEN, LEVEL, TURN):
@@ -486,7 +507,8 @@ def _shaft(
     else:
         kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
         if regime == GLIDE and kind >= HELD and np.isnan(f[REVS]) and not np.isnan(f[FREE]):
-            f[REVS] = f[FREE] * math.exp(min(f[BEFORE] - log_first, 1.0))  # as before the stop
+            # as before the stop
+            f[REVS] = f[FREE] * (math.exp(min(f[BEFORE] - log_first, 1.0)) if scaled else 1.0)
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
         if regime == GLIDE and kind < HELD and age_s < setting.step_s:
             # it stopped within the bin, of which the revs are a mean
@@ -560,12 +582,12 @@ def _by_way(
 
 @compiled(uncounted=True)
 def _by_shafts(
-    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float
+    bank: Histories, i: int, setting: BankSetting, said: Float64, log_first: float, work: Float64
 ) -> float:
     """Return the log density of the revs, and date the stop and the end of thrust by them."""
     f, step_s = bank.number[i], setting.step_s
     now_s = (bank.clock[0] - 0.5) * step_s
-    shown, scaled = _shaft(bank, i, setting, said, log_first, now_s), setting.engine == 0.0
+    shown, scaled = _shaft(bank, i, setting, said, log_first, now_s, work), setting.engine == 0.0
     # a slow error of revs does not turn their sign
     gained = shown if said[LOW] < _REVERSED or not scaled else n.SHAFT_TEMPER * shown
     young = bank.whole[i, REGIME] == GLIDE and now_s - f[SINCE] < 2.0 * step_s
@@ -643,7 +665,7 @@ def weigh(
         sd = n.RUDDER[1 if turning else 0]
         gained += n.SHAFT_TEMPER * math.log(_normal(said[RUDDER], sd) + n.SHAFT_LIES)
     if not np.isnan(said[HIGH]):
-        gained += _by_shafts(bank, i, setting, said, log_first)
+        gained += _by_shafts(bank, i, setting, said, log_first, work)
     # a covariance that rounding broke weighs nothing
     f[WEIGHT] = -np.inf if np.isnan(gained) else f[WEIGHT] + gained
     if regime in (DRIVEN, TURN) or (regime == AMID and bank.whole[i, GLIDED] == 0):
