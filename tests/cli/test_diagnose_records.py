@@ -130,9 +130,9 @@ def test_a_coast_without_steady_sailing_before_it_says_what_to_give(
 ) -> None:
     rng = np.random.default_rng(1)
     time = np.arange(0.0, 35.0, 0.1)
-    after = np.maximum(time - 5.0, 0.0)
-    # v' = -0.1 v - 0.004 after 5 s of steady speed: it comes to rest, and goes astern
-    speed = (0.25 + 0.04) * np.exp(-0.1 * after) - 0.04 + rng.normal(0.0, 0.001, len(time))
+    # v' = -0.3 v^2 after 5 s of steady speed
+    speed = 0.25 / (1.0 + 0.3 * 0.25 * np.maximum(time - 5.0, 0.0))
+    speed = speed + rng.normal(0.0, 0.001, len(time))
     path = bag(tmp_path / 'model.mcap', time, speed_through_water=speed)
     ship = tmp_path / 'model.yaml'
     ship.write_text(MODEL)

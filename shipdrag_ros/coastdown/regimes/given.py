@@ -164,7 +164,9 @@ def _bank(
 
 def most_revs(binned: Binned) -> Float64:
     """
-    Return the most revs times pitch of each shaft, (4,) [rad/s], with the sign it drives by.
+    Return the most revs times pitch of each shaft, (4,) [rad/s], with the sign it mostly has.
     """
     turning = np.nan_to_num(binned.said[:, SHAFTS : SHAFTS + 4])
-    return np.asarray(np.abs(turning).max(axis=0) * np.where(turning.sum(axis=0) < 0.0, -1.0, 1.0))
+    most = np.abs(turning).max(axis=0)
+    mostly = np.sign(np.where(np.abs(turning) > 0.5 * most, turning, 0.0)).sum(axis=0)
+    return np.asarray(most * np.where(mostly < 0.0, -1.0, 1.0))
