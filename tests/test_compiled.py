@@ -266,7 +266,7 @@ def test_a_closure_is_refused() -> None:
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
     whiten = 'from shipdrag_ros.inference.noise import whiten\n'
-    products = 'from shipdrag_ros.inference.gaussian import products_of\n'
+    products = 'from shipdrag_ros.inference.linear import products_of\n'
     wrong = "products_of('wrong')\nproducts_of()\n"
     snippet.write_text(f"{whiten}{products}whiten(1, 2, 3, 'wrong')\n{wrong}")
     # with the options of `make types`, whose cache it takes; others would empty it
@@ -320,8 +320,7 @@ CALLERS = (
 CALLEES = (
     'inference.settings',
     'inference.noise',
-    'inference.gaussian',
-    'regression.refit',
+    'inference.linear',
 )
 
 

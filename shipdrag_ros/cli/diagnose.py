@@ -23,7 +23,7 @@ from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
 
 if TYPE_CHECKING:
-    from shipdrag_ros.diagnosis import DiagnosisResult
+    from shipdrag_ros.diagnosis.result import DiagnosisResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,9 +93,10 @@ def run(options: argparse.Namespace) -> int:
     Diagnose and show it.
     """
     # what follows takes half a second to import
-    from shipdrag_ros.diagnosis import Verdict, with_effects
+    from shipdrag_ros.diagnosis import with_effects
     from shipdrag_ros.diagnosis.document import document
-    from shipdrag_ros.diagnosis.earlier_file import read_earlier
+    from shipdrag_ros.diagnosis.earlier import read_earlier
+    from shipdrag_ros.inference.decision import Verdict
     from shipdrag_ros.library.diagnosing import diagnose_runs
     from shipdrag_ros.library.replaying import refuse_overlaps
 
@@ -118,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
     _show(output, found, ship)
     if options.report is not None:
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.score import Score
+        from shipdrag_ros.diagnosis.tables import Score
 
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')

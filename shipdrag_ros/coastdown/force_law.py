@@ -18,7 +18,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.readings import binned
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _LEAST = 8  # bins in which a law can be separated from another

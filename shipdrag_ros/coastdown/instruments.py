@@ -12,7 +12,7 @@ from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.readings import binned, clean_readings, readings, seconds
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Float64
 from shipdrag_ros.ship import Ship

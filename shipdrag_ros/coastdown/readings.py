@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _BINS = 48  # of a stretch; a change in it is found to within one of them

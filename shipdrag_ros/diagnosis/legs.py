@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
-from shipdrag_ros.inference.rows import bin_means
+from shipdrag_ros.inference.rows import MAD_TO_SD, bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import GEODETIC, Block, Channel, Float64, Int64
 

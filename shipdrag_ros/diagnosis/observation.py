@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from shipdrag_ros.diagnosis.context import Context, Stop
+from shipdrag_ros.diagnosis.context import Context, Stop, stop_time_s
 from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, measured, whitener_of
-from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
@@ -27,7 +26,7 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, Ship
 
 _STEADY_BIN_S = 30.0  # in the steady record, where the motion hardly changes
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
@@ -39,6 +38,29 @@ _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
 _KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
+
+
+@dataclass(frozen=True)
+class CoastRun:
+    """
+    A coastdown to be diagnosed.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    window
+        With the steady record before it.
+    facts
+        That a log book knows of this run.
+    ship
+        The ship as she was in this run; None: as in all.
+    """
+
+    name: str
+    window: Window
+    facts: tuple[Fact, ...] = ()
+    ship: Ship | None = None
 
 
 @dataclass(frozen=True)

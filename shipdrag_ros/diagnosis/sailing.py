@@ -22,8 +22,7 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, shown
-from shipdrag_ros.diagnosis.units import asked, waiting
-from shipdrag_ros.diagnosis.verdict import judge
+from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.estimator import WindowEstimator
+from shipdrag_ros.estimation.estimators import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 30.0  # a steady record is condensed to its means over this

@@ -115,7 +115,7 @@ class Trends(Shown):
         matplotlib.axes.Axes
             Percent over the clean hull.
         """
-        from shipdrag_ros.trend.pictures import draw_added_resistance
+        from shipdrag_ros.trend.page import draw_added_resistance
 
         if ship is None and not self.ships:
             raise FleetError('there is no ship; give coastdowns of one')

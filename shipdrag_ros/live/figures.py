@@ -19,7 +19,7 @@ from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
-from shipdrag_ros.forecast.path import places
+from shipdrag_ros.forecast.result import places
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure

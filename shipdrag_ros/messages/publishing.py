@@ -24,8 +24,7 @@ from shipdrag_ros.coastdown.events import (
     WholeGlide,
 )
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast.path import PathAhead
-from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.reporting import (
     EventKind,

@@ -16,13 +16,13 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.inference.gaussian import substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.linear import (
     Families,
     of_family,
     solve,
+    substitute,
     whitened_products,
 )
 from shipdrag_ros.inference.noise import Noise

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters

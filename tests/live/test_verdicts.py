@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.result import Advice
+from shipdrag_ros.diagnosis.result import Advice, Candidate, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import json_text
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.live.bridge import Bridge, verdict_part
 from shipdrag_ros.messages.heard import OK, WARN, Health, NodeMessage, Status
 from shipdrag_ros.messages.reporting import diagnosis_message

@@ -21,7 +21,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.forecast.foretell import foretell
-from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import PathAhead
 from shipdrag_ros.messages import (
     EventKind,
     EventNote,

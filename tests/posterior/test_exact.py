@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.gaussian import products_of
-from shipdrag_ros.inference.linear import Families, of_family, whitened_products
+from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.inference.settings import Settings

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.estimation.estimator import Estimator
+from shipdrag_ros.estimation.estimators import Estimator
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.s1.estimate import PROBLEMS, estimate
 from shipdrag_ros.estimation.window import Window

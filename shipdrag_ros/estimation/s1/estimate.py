@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.assemble import AtEnd, assembled
-from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
+from shipdrag_ros.estimation.curve import AtEnd, ValidRange, resistance_curve
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
@@ -94,12 +93,11 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     _check_deceleration(inputs, solution)
     motion = solution.fit.motion(_GRID)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
-    valid = ValidRange.of_polynomial(curve)
     scale = solution.fit.scale
-    return assembled(
+    return Estimate(
         inputs.estimator,
-        valid,
-        AtEnd.of(motion, ship),
+        **ValidRange.of_polynomial(curve)._asdict(),
+        **AtEnd.of(motion, ship)._asdict(),
         calm=curve,
         conditions=curve,
         start_ns=scale.first_ns,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.estimation.motion import PolynomialMotion
+from shipdrag_ros.estimation.curve import PolynomialMotion
 from shipdrag_ros.estimation.result import OrderTrial
 from shipdrag_ros.regression.least_squares import inverse, triangle
 from shipdrag_ros.regression.order import OrderTable, fit_orders, rounding

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipdrag_ros.estimation.motion import sigma
+from shipdrag_ros.estimation.curve import sigma
 from shipdrag_ros.estimation.s1.problems import (
     ScalarInput,
     Solution,
