@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.noise import Noise, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows
-from shipdrag_ros.inference.settings import Settings, noise_of
 from shipdrag_ros.samples import Float64
 
 

@@ -25,10 +25,9 @@ from shipdrag_ros.inference.linear import (
     substitute,
     whitened_products,
 )
-from shipdrag_ros.inference.noise import Noise
+from shipdrag_ros.inference.noise import Noise, NoisePosterior, Settings
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.inference.sampling import Seen
-from shipdrag_ros.inference.settings import NoisePosterior, Settings
 from shipdrag_ros.posterior.motion import damping_of, predict
 from shipdrag_ros.posterior.problem import Family, RunModel
 from shipdrag_ros.posterior.start import along_readings
