@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.regression import OrthogonalBasis, TimeScale
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 
 START_NS = 1_700_000_000_123_456_789
 EVEN = START_NS + np.round(np.linspace(0.0, 1500e9, 40)).astype(np.int64)

@@ -16,7 +16,7 @@ from shipdrag_ros.estimation.s1.problems import (
     solve_joint,
     solve_one,
 )
-from shipdrag_ros.regression import OrthogonalBasis, TimeScale
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 
 START_NS = 1_700_000_000_123_456_789
 
