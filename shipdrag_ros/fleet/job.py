@@ -13,7 +13,7 @@ import hashlib
 import posixpath
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -377,15 +377,9 @@ def _failed(job: BagJob, why: str) -> BagResult:
 @contextmanager
 def _runs(sources: Sequence[BagToRead]) -> Iterator[list[Run]]:
     """Open the runs of a bag, whatever it is written in."""
-    with _all_fetched(sources) as paths:
+    with ExitStack() as stack:
+        paths: list[Path] = []
+        for source in sources:
+            files = stack.enter_context(fetched(source))
+            paths += [files[0].parent] if source.folder else files
         yield read_any(paths)
-
-
-@contextmanager
-def _all_fetched(sources: Sequence[BagToRead]) -> Iterator[list[Path]]:
-    if not sources:
-        yield []
-        return
-    with fetched(sources[0]) as files, _all_fetched(sources[1:]) as others:
-        own = [files[0].parent] if sources[0].folder else list(files)
-        yield [*own, *others]

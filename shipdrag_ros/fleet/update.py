@@ -18,11 +18,17 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
-from shipdrag_ros.fleet.events import HullEvent, read_events, write_events
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, identify, work
 from shipdrag_ros.fleet.rows import BagResult, bag_row, same_time
-from shipdrag_ros.fleet.store import Done, Store, read_coastdowns
+from shipdrag_ros.fleet.store import (
+    Done,
+    HullEvent,
+    Store,
+    read_coastdowns,
+    read_events,
+    write_events,
+)
 from shipdrag_ros.progress import Progress
 from shipdrag_ros.simulation.effects import terms
 

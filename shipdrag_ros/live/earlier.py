@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Coastdowns of this ship that have ended: heard, or recorded by a node in a folder of bags.
+The node's outputs read back from their bytes, and the coastdowns that ended, as they say.
 
 Nothing is estimated anew: a bag that a node recorded holds its curve and its event.
 """
@@ -12,11 +12,220 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live.outputs import Curve, read_curve
-from shipdrag_ros.messages import EventKind, EventNote, MalformedMessage, read_event
-from shipdrag_ros.messages.topics import EVENTS, RESISTANCE_CURVE
+from shipdrag_ros.estimation.force import usual_within
+from shipdrag_ros.messages import EventKind, EventNote, MalformedMessage, read_event, types
+from shipdrag_ros.messages.publishing import CURVE_FIELDS, FORECAST_FIELDS
+from shipdrag_ros.messages.topics import (
+    EVENTS,
+    FORECAST,
+    FORECAST_PATH,
+    RESISTANCE,
+    RESISTANCE_CURVE,
+    SPEED,
+    OutputTopic,
+)
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with its standard deviation, at a stamp [ns]."""
+
+    stamp_ns: int
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """
+    r(v) with its standard deviation, speeds ascending.
+
+    Attributes
+    ----------
+    stamp_ns
+    speed_m_s, resistance_m_s2, sigma_m_s2 : (n,)
+    """
+
+    stamp_ns: int
+    speed_m_s: Float64
+    resistance_m_s2: Float64
+    sigma_m_s2: Float64
+
+    def at(self, speed_m_s: float) -> tuple[float, float]:
+        """
+        Return r and its standard deviation [m/s^2] at a speed inside the curve.
+        """
+        r = np.interp(speed_m_s, self.speed_m_s, self.resistance_m_s2)
+        return float(r), float(np.interp(speed_m_s, self.speed_m_s, self.sigma_m_s2))
+
+    def usual_m_s(self, ship: Ship | None) -> float:
+        """
+        Return the speed at which figures are stated; where the curve ends above it, its lowest.
+        """
+        span = np.array([[self.speed_m_s[0], self.speed_m_s[-1]]])
+        return max(usual_within(span, ship), float(self.speed_m_s[0]))
+
+    def band(self, ship: Ship | None) -> float:
+        """
+        Return two standard deviations over r, at the speed at which figures are stated.
+        """
+        r, sigma = self.at(self.usual_m_s(ship))
+        return 2.0 * sigma / r if r > 0.0 else math.inf
+
+
+def read_speed(payload: bytes) -> Figure:
+    """
+    Read `~/speed` [m/s].
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(SPEED.type, payload)
+    variance = float(message.twist.covariance[0])
+    return _figure(message, float(message.twist.twist.linear.x), variance)
+
+
+def read_resistance(payload: bytes) -> Figure:
+    """
+    Read `~/resistance` [m/s^2].
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(RESISTANCE.type, payload)
+    variance = float(message.accel.covariance[0])
+    return _figure(message, float(message.accel.accel.linear.x), variance)
+
+
+def read_curve(payload: bytes) -> Curve | None:
+    """
+    Read `~/resistance_curve`; None where it has too few points to be drawn.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    stamp_ns, points = _points(RESISTANCE_CURVE, CURVE_FIELDS, payload)
+    if len(points) < 2:
+        return None
+    return Curve(stamp_ns, points[:, 0], points[:, 1], points[:, 2])
+
+
+@dataclass(frozen=True)
+class ComingGlide:
+    """
+    The rest of the glide.
+
+    Attributes
+    ----------
+    stamp_ns
+    points : (n, 7)
+        Time, speed, its low and high, distance, its low and high; times ascending from 0.
+    """
+
+    stamp_ns: int
+    points: Float64
+
+    def time_s(self, speed_m_s: float) -> tuple[float | None, float | None, float | None]:
+        """
+        Return when she has a speed, and the earliest and latest of that; None where not said.
+        """
+
+        def passed(column: int) -> float | None:
+            below = np.flatnonzero(self.points[:, column] <= speed_m_s)
+            if not len(below):
+                return None
+            i = max(int(below[0]), 1)
+            part = slice(i - 1, i + 1)
+            return float(np.interp(-speed_m_s, -self.points[part, column], self.points[part, 0]))
+
+        return passed(1), passed(2), passed(3)
+
+    def way_m(self, time_s: float) -> float:
+        """
+        Return how far on she is then.
+        """
+        return float(np.interp(time_s, self.points[:, 0], self.points[:, 4]))
+
+
+def read_forecast(payload: bytes) -> ComingGlide | None:
+    """
+    Read `~/forecast`; None where it is withdrawn.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    stamp_ns, points = _points(FORECAST, FORECAST_FIELDS, payload)
+    return ComingGlide(stamp_ns, points) if len(points) >= 2 else None
+
+
+@dataclass(frozen=True)
+class ComingPath:
+    """
+    The positions to come.
+
+    Attributes
+    ----------
+    stamp_ns
+    time_s : (n,)
+        From the stamp on.
+    place_m : (n, 2)
+        In the plane of the positions since the stop, two of them at least.
+    """
+
+    stamp_ns: int
+    time_s: Float64
+    place_m: Float64
+
+
+def read_path(payload: bytes) -> ComingPath | None:
+    """
+    Read `~/forecast_path`; None where it is withdrawn, or she has no positions.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(FORECAST_PATH.type, payload)
+    stamp_ns = types.stamp_ns(message)
+    places = [
+        ((types.stamp_ns(each) - stamp_ns) * 1e-9, each.pose.position.x, each.pose.position.y)
+        for each in message.poses
+    ]
+    rows = np.array(places, np.float64).reshape(-1, 3)
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    return ComingPath(stamp_ns, rows[:, 0], rows[:, 1:]) if len(rows) >= 2 else None
+
+
+def _points(topic: OutputTopic, names: tuple[str, ...], payload: bytes) -> tuple[int, Float64]:
+    message = types.deserialize(topic.type, payload)
+    given = tuple(field.name for field in message.fields)
+    if given != names or message.is_bigendian:
+        raise MalformedMessage(f'fields {", ".join(given)}, expected {", ".join(names)}')
+    try:
+        points = np.frombuffer(message.data.tobytes(), '<f8').reshape(-1, len(names))
+    except ValueError as error:
+        raise MalformedMessage(f'not whole points: {error}') from error
+    return types.stamp_ns(message), points[np.isfinite(points).all(axis=1)]
+
+
+def _figure(message: object, value: float, variance: float) -> Figure:
+    return Figure(types.stamp_ns(message), value, math.sqrt(max(variance, 0.0)))
+
 
 _OPPOSITE_DEG = 30.0  # by which a reciprocal heading may be off
 _ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair

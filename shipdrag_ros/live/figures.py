@@ -21,8 +21,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.forecast.path import places
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
-from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure
+from shipdrag_ros.live.earlier import ComingGlide, ComingPath, Curve, Figure, PastRun
 from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
 from shipdrag_ros.ship import Ship
 

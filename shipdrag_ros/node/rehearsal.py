@@ -27,6 +27,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import DEFAULT_NODE, encode, input_type
 from shipdrag_ros.messages.heard import health_of
 from shipdrag_ros.messages.topics import RESISTANCE, SPEED
+from shipdrag_ros.messages.types import stamp_ns
 from shipdrag_ros.node.inputs import message_class
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
@@ -258,13 +259,13 @@ class Rehearsal:
             self._ready = state.values['lifecycle'] == 'active' and not compiling
 
     def _hear_speed(self, message: Any) -> None:
-        self._speeds[_stamp_ns(message)] = message.twist.twist.linear.x
-        self._join(_stamp_ns(message))
+        self._speeds[stamp_ns(message)] = message.twist.twist.linear.x
+        self._join(stamp_ns(message))
 
     def _hear_resistance(self, message: Any) -> None:
         variance = message.accel.covariance[0]
-        self._resistances[_stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
-        self._join(_stamp_ns(message))
+        self._resistances[stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
+        self._join(stamp_ns(message))
 
     def _join(self, stamp_ns: int) -> None:
         """Report a moment once both of its figures are there, whichever came first."""
@@ -273,8 +274,3 @@ class Rehearsal:
         resistance, sigma = self._resistances.pop(stamp_ns)
         self.estimates += 1
         self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)

@@ -24,6 +24,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
+    EncodedMessage,
     EventKind,
     EventNote,
     OutputMessage,
@@ -36,7 +37,7 @@ from shipdrag_ros.messages import (
     types,
 )
 from shipdrag_ros.messages.publishing import outputs
-from shipdrag_ros.node.recorder import RawMessage, Recorder
+from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
@@ -128,7 +129,7 @@ class Session:
         """
         arrival_ns = self.watch_clock(now_ns)
         # also what will be rejected: the bag holds what came, not what was liked
-        keep = partial(RawMessage, source.input, source.type, payload, arrival_ns)
+        keep = partial(EncodedMessage, source.input, source.type, payload, arrival_ns)
         waits = bool(self._waiting) or not self._ready()
         if waits:  # nothing compiled may be called
             self.recorder.input(keep(types.stated_stamp_ns(source.type, payload, arrival_ns)))
@@ -169,7 +170,9 @@ class Session:
         Record one message that feeds no input by itself.
         """
         arrival_ns = self.watch_clock(now_ns)
-        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, arrival_ns))
+        self.recorder.input(
+            EncodedMessage(source.input, source.type, payload, arrival_ns, arrival_ns)
+        )
 
     def watch_clock(self, now_ns: int) -> int:
         """
@@ -235,12 +238,12 @@ class Session:
             self._reset(reason)
         self._note(EventKind.CLOCK_JUMP, reason)
 
-    def note_lifecycle(self, text: str, now_ns: int) -> None:
+    def note(self, kind: EventKind, text: str, now_ns: int) -> None:
         """
-        Publish and record a change of the node's own state.
+        Publish and record what happened to the node itself or to what it receives.
         """
         self.watch_clock(now_ns)
-        self._note(EventKind.LIFECYCLE, text)
+        self._note(kind, text)
 
     def note_removed(self, now_ns: int, warn: Callable[[str], object]) -> None:
         """
@@ -250,20 +253,6 @@ class Session:
         for part in self.recorder.removed():
             warn(part.text)
             self._note(EventKind.FILES, part.text)
-
-    def note_lost(self, text: str, now_ns: int) -> None:
-        """
-        Publish and record that messages were lost on their way here.
-        """
-        self.watch_clock(now_ns)
-        self._note(EventKind.MESSAGE_LOST, text)
-
-    def note_source(self, text: str, now_ns: int) -> None:
-        """
-        Publish and record that an input is fed by another source from now on.
-        """
-        self.watch_clock(now_ns)
-        self._note(EventKind.SOURCE, text)
 
     def note_diagnosis(self, message: OutputMessage, now_ns: int) -> None:
         """

@@ -35,9 +35,9 @@ def test_a_bag(write_bag: Callable[..., Path], compression: Compression) -> None
     assert told.indexed
     (topic,) = told.topics
     assert topic.rate_hz == pytest.approx(10.0)
-    assert (topic.topic.topic, topic.topic.input) == ('/shaft', 'shaft')
-    assert 'shaft' not in told.missing
-    assert len(told.missing) == 7
+    assert (topic.topic, topic.input) == ('/shaft', 'shaft')
+    assert 'shaft' not in told.missing_inputs
+    assert len(told.missing_inputs) == 7
     assert told.software == __version__
     assert told.node is None
     assert told.warnings == ()

@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.node.recorder import SEGMENT_BYTES, RawMessage, RawRing
+from shipdrag_ros.messages import EncodedMessage
+from shipdrag_ros.node.recorder import SEGMENT_BYTES, RawRing
 
 SECOND_NS = 10**9
 
 
-def message(second: int, *, size: int = 100) -> RawMessage:
-    return RawMessage('depth', 'sensor_msgs/msg/Range', bytes(size), second * SECOND_NS, second)
+def message(second: int, *, size: int = 100) -> EncodedMessage:
+    return EncodedMessage(
+        'depth', 'sensor_msgs/msg/Range', bytes(size), second * SECOND_NS, second
+    )
 
 
 def fill(ring: RawRing, count: int, *, size: int = 100) -> None:
