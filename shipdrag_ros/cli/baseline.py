@@ -79,6 +79,8 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
     """
     from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
 
+    enough = len(found.runs) >= ENOUGH
+    scatter = found.scatter, found.scatter_low, found.scatter_high
     return {
         'runs': [
             {
@@ -95,11 +97,7 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
             )
         },
         'covariance': found.covariance,
-        'scatter': {
-            'value': found.scatter if len(found.runs) >= ENOUGH else None,
-            'low': found.scatter_low if len(found.runs) >= ENOUGH else None,
-            'high': found.scatter_high if len(found.runs) >= ENOUGH else None,
-        },
+        'scatter': dict(zip(('value', 'low', 'high'), scatter if enough else [None] * 3)),
         'relative_sd': {
             'before': None
             if found.stated_sd is None
@@ -138,19 +136,15 @@ def _show(output: Output, found: LearntBaseline) -> None:
         )
     if len(found.runs) > 1:
         output.heading('Each run beside the others')
-        output.table(
-            Table(
-                ('', 'resistance', 'sd', 'chi2 a sample'),
-                tuple(
-                    (
-                        each.name,
-                        f'{each.factor.value:+.1%}',
-                        f'{each.factor.sd:.1%}',
-                        f'{each.chi2_per_row:.2f}',
-                    )
-                    for each in found.runs
-                ),
+        beside = tuple(
+            (
+                one.name,
+                f'{one.factor.value:+.1%}',
+                f'{one.factor.sd:.1%}',
+                f'{one.chi2_per_row:.2f}',
             )
+            for one in found.runs
         )
+        output.table(Table(('', 'resistance', 'sd', 'chi2 a sample'), beside))
     for warning in found.warnings:
         output.say(f'WARNING: {warning}')

@@ -103,6 +103,7 @@ def run(options: argparse.Namespace) -> int:
         ]
         found = read_joined(parts)
         found.log.copy_to(bag)
+    documents = []
     for source, each, result in zip(options.sources, chosen, found.results, strict=True):
         output.log(f'{source}: {each.kind}')
         for understood in result.understood:
@@ -112,12 +113,9 @@ def run(options: argparse.Namespace) -> int:
         output.table(result.table())
         for line in result.details():
             output.say(line)
+        documents.append({'source': str(source), 'format': each.name, **asdict(result)})
     for line in found.notes:
         output.say(line)
-    documents = [
-        {'source': str(source), 'format': each.name, **asdict(result)}
-        for source, each, result in zip(options.sources, chosen, found.results, strict=True)
-    ]
     whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': found.notes}
     output.json({'bag': str(options.out), **whole})
     return 0

@@ -32,7 +32,7 @@ from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:
     from shipdrag_ros.live.app import FleetPages
-    from shipdrag_ros.live.earlier import PastRun
+    from shipdrag_ros.live.outputs import PastRun
     from shipdrag_ros.live.source import PictureFeed
 
 SHORTEST_TOKEN = 16
@@ -158,11 +158,9 @@ def _source(
 
     if options.bags:
         runs = open_sources(options.bags, output, remap=dict(options.remap))
-        bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
-        try:
+        player = BagSource(runs, ship=ship, speed=options.speed, past=past)
+        with contextlib.closing(player) as bags:
             yield bags, None
-        finally:
-            bags.close()
         return
     from shipdrag_ros.node.spectator import Spectator
 
@@ -192,7 +190,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
     """Yield the coastdowns of a folder; what gave none is said."""
-    from shipdrag_ros.live.earlier import recorded_runs
+    from shipdrag_ros.live.outputs import recorded_runs
 
     for found in recorded_runs(folder):
         if isinstance(found, str):

@@ -216,10 +216,10 @@ def work(job: BagJob) -> BagResult:
         with _runs(job.sources) as runs:
             return _result(job, runs)
     except (ShipdragError, OSError) as error:
-        return _failed(job, str(error))
+        return failed(job, str(error))
     except Exception as error:  # one bag of thousands; the others go on
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return _failed(
+        return failed(
             job,
             f'a defect of this program, please report it: {type(error).__name__}: {error} '
             f'({Path(place.filename).name}:{place.lineno})',
@@ -366,12 +366,15 @@ def _name(ship: Ship, source: BagToRead) -> str:
     return name
 
 
-def _bag_row(job: BagJob, *, error: str | None = None) -> Row:
+def _bag_row(job: BagJob, error: str | None = None) -> Row:
     return bag_row(job.sources[0].root, job.sources[0].bag, job.content_hash, error=error)
 
 
-def _failed(job: BagJob, why: str) -> BagResult:
-    return BagResult(_bag_row(job, error=why))
+def failed(job: BagJob, why: str) -> BagResult:
+    """
+    Return the row of a bag of which nothing came.
+    """
+    return BagResult(_bag_row(job, why))
 
 
 @contextmanager

@@ -16,16 +16,6 @@ from typing import Any
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live.earlier import (
-    Curve,
-    Figure,
-    PastRun,
-    read_curve,
-    read_forecast,
-    read_path,
-    read_resistance,
-    read_speed,
-)
 from shipdrag_ros.live.figures import (
     Ahead,
     PagePart,
@@ -52,6 +42,16 @@ from shipdrag_ros.live.headline import (
     rudder_check,
     shaft_check,
     wind_check,
+)
+from shipdrag_ros.live.outputs import (
+    Curve,
+    Figure,
+    PastRun,
+    read_curve,
+    read_forecast,
+    read_path,
+    read_resistance,
+    read_speed,
 )
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types

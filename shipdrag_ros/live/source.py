@@ -19,7 +19,7 @@ from shipdrag_ros.errors import ShipdragError, reason_of
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
-from shipdrag_ros.live.earlier import PastRun
+from shipdrag_ros.live.outputs import PastRun
 from shipdrag_ros.messages.heard import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.node.background import Diagnosing

@@ -64,7 +64,7 @@ class MessageRows(NamedTuple):
     found: UInt8
 
 
-class _Layout(NamedTuple):
+class _JointLayout(NamedTuple):
     """Channel and place of each value, joints without a slot, and bytes that may not differ."""
 
     channels: list[Channel]
@@ -131,7 +131,7 @@ def _fill(
     rows: MessageRows,
     taken: NDArray[np.intp],
     messages: UInt8,
-    layout: _Layout,
+    layout: _JointLayout,
     more: list[tuple[NDArray[np.intp], int, Float64]],
 ) -> None:
     """Read messages of one layout, (n, bytes of each)."""
@@ -152,10 +152,10 @@ def _fill(
         rows.value[taken, 2:COLUMNS] = np.nan
 
 
-_known: dict[tuple[int, bool], _Layout] = {}
+_known: dict[tuple[int, bool], _JointLayout] = {}
 
 
-def _layout_of(content: UInt8, *, rudder: bool) -> _Layout | None:
+def _layout_of(content: UInt8, *, rudder: bool) -> _JointLayout | None:
     """Return where the values of a message lie, found now if it is not as the last of its size."""
     key = len(content), rudder
     known = _known.get(key)
@@ -166,7 +166,7 @@ def _layout_of(content: UInt8, *, rudder: bool) -> _Layout | None:
     return known
 
 
-def _layout(content: UInt8, *, rudder: bool) -> _Layout | None:
+def _layout(content: UInt8, *, rudder: bool) -> _JointLayout | None:
     """Find where the values of a message lie; None of what is no JointState."""
     try:
         sent = types.deserialize(types.JOINT_STATE, content.tobytes())
@@ -194,7 +194,7 @@ def _layout(content: UInt8, *, rudder: bool) -> _Layout | None:
     ]
     fixed = np.flatnonzero(~varies)
     places = [place for _, place in found]
-    return _Layout([each for each, _ in found], places, surplus, fixed, content[fixed])
+    return _JointLayout([each for each, _ in found], places, surplus, fixed, content[fixed])
 
 
 def _behind(at: int, text: str) -> int:

@@ -47,16 +47,11 @@ class Player:
         Owner of the publishers.
     executor
         Spun while waiting, so that the owner hears the answers.
-    namespace
-        Of the topics, '' or `/ship`.
     """
 
-    def __init__(
-        self, node: Node, executor: SingleThreadedExecutor, *, namespace: str = ''
-    ) -> None:
+    def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
         self._node = node
         self._executor = executor
-        self._namespace = namespace
         self._topics: dict[str, Publisher] = {}
         self._clock: Publisher | None = None
 
@@ -71,14 +66,14 @@ class Player:
         """
         for code in np.unique(block.channel).tolist():
             channel = Channel(code)
-            self._publisher(f'{self._namespace}/{channel.input}', input_type(channel))
+            self._publisher(f'/{channel.input}', input_type(channel))
         self._wait_for_listeners(timeout_s)
 
     def publish(self, block: Block) -> None:
         """
         Publish samples at once, in the order of the block.
         """
-        for message in encode(block, namespace=self._namespace):
+        for message in encode(block):
             self._publisher(message.topic, message.type).publish(message.payload)
 
     def set_clock(self, time_ns: int) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
@@ -60,6 +61,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def block_of(*paths: Path, **options: object) -> Block:
     """Read the samples of logs as one run."""
+    if is_bag(paths[0]):
+        (run,) = read_any(paths)
+        return concatenate([part for part in run.inputs() if isinstance(part, Block)])
     chosen = [(format_of(path, options), path) for path in paths]
     found = read_joined([(each, job_of(each, path, options)) for each, path in chosen])
     run = LogRun(found.log, paths)

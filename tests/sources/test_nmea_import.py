@@ -25,7 +25,6 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.nmea.reading import Checksum
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
-from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
 
@@ -606,7 +605,7 @@ def test_files_that_are_no_log() -> None:
     with pytest.raises(ImportDataError, match=r'gave no sample.*give a log with any of'):
         run(lines(sentence('GPZDA,120000.00,28,02,2024,00,00')))
     with pytest.raises(ImportDataError, match='cannot be read: No such file'):
-        read_nmea(Job(Path('no.nmea')), Log())
+        read_nmea(Path('no.nmea'), Log())
 
 
 def test_a_huge_line_is_counted_once() -> None:

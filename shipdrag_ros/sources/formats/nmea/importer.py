@@ -308,20 +308,35 @@ class NmeaResult(ImportResult):
         return lines
 
 
-def read_nmea(job: Job, log: Log) -> NmeaResult:
+def read_nmea(
+    source: Path,
+    log: Log,
+    *,
+    day: date | None = None,
+    transducer_m: float | None = None,
+    checksum: Checksum = Checksum.REQUIRED,
+    progress: PartDone | None = None,
+) -> NmeaResult:
     """
     Read the measurements of a log.
 
     Parameters
     ----------
-    job
-        The log, see `NmeaLog`. Its options: `date` (UTC) of the first time in the log, needed if
-        the log has none; of a log whose dates are a whole number of GPS week cycles (1024 weeks)
-        away from it, the dates are shifted. `transducer`: depth of the echo sounder below the
-        surface [m], for sentences that do not state it. `no_checksum`: whether sentences without
-        one are taken; of a log that has none at all they are, unless it is said.
+    source
+        Log, see `NmeaLog`.
     log
         Where to.
+    day
+        Date (UTC) of the first time in the log; needed if the log has none. Of a
+        log whose dates are a whole number of GPS week cycles (1024 weeks)
+        away from it, the dates are shifted.
+    transducer_m
+        Depth of the echo sounder below the surface [m], for sentences that
+        do not state it.
+    checksum
+        Whether sentences without one are taken.
+    progress
+        Called with how much is read, and of how much.
 
     Raises
     ------
@@ -334,13 +349,10 @@ def read_nmea(job: Job, log: Log) -> NmeaResult:
     least half as many values as the most frequent; two instruments of
     different place or scale are never mixed.
     """
-    source, day, transducer_m = job.source, job.options.get('date'), job.options.get('transducer')
-    text, stated = NmeaLog(source), job.options.get('no_checksum')
-    bare = stated or (stated is None and _without_checksums(head_of(source)))
-    checksum = Checksum.OPTIONAL if bare else Checksum.REQUIRED
+    text = NmeaLog(source)
     reader = SentenceReader(Mounting(transducer_m), checksum)
     taken = TakenSentences()
-    for place, (line, each, receive_ns) in enumerate(text.texts(job.progress)):
+    for place, (line, each, receive_ns) in enumerate(text.texts(progress)):
         sentence = reader.read(each)
         if isinstance(sentence, str):
             text.reject(sentence, line, each)
@@ -460,12 +472,25 @@ def _without_checksums(head: Head) -> bool:
     return len(found) > 1 and not any(match[1] for match in found)
 
 
+def _open(job: Job, log: Log) -> NmeaResult:
+    checksum = job.options.get('no_checksum')
+    cut_off = checksum is None and _without_checksums(head_of(job.source))
+    return read_nmea(
+        job.source,
+        log,
+        day=job.options.get('date'),
+        transducer_m=job.options.get('transducer'),
+        checksum=Checksum.OPTIONAL if checksum or cut_off else Checksum.REQUIRED,
+        progress=job.progress,
+    )
+
+
 FORMAT = Format(
     name='nmea',
     kind='an NMEA 0183 log',
     about=__doc__,
     score=_score,
-    read=read_nmea,
+    read=_open,
     options=(
         DATE,
         TRANSDUCER,
