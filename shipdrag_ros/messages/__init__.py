@@ -16,9 +16,6 @@ from shipdrag_ros.messages.topics import (
     event_message,
     match_inputs,
     read_event,
-    reset_request,
-    silence_mark,
-    stop_mark,
 )
 from shipdrag_ros.messages.types import MalformedMessage
 
@@ -42,7 +39,4 @@ __all__ = [
     'input_type',
     'match_inputs',
     'read_event',
-    'reset_request',
-    'silence_mark',
-    'stop_mark',
 ]

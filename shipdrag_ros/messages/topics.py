@@ -8,7 +8,7 @@ A bag's topics are matched to the inputs here, in any namespace.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from shipdrag_ros.errors import BagError
@@ -248,7 +248,7 @@ class EventNote:
     kind: EventKind
     stamp_ns: int
     text: str
-    values: Mapping[str, str]
+    values: Mapping[str, str] = field(default_factory=dict)
 
 
 def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> OutputMessage:
@@ -264,35 +264,6 @@ def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> 
     """
     payload = types.serialize(DIAGNOSIS.type, types.make(DIAGNOSIS.type, data=text))
     return OutputMessage(DIAGNOSIS.under(node), DIAGNOSIS.type, payload, stamp_ns)
-
-
-def reset_request(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> OutputMessage:
-    """
-    Encode that a reset was asked for, so that replay resets there too.
-
-    To be recorded before the reset is done, at log time `receive_ns`. Resets
-    that the monitor decides by itself need none: the samples bring them about.
-    """
-    return event_message(EventNote(EventKind.RESET_REQUEST, receive_ns, reason, {}), node=node)
-
-
-def silence_mark(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> OutputMessage:
-    """
-    Encode that all sources are silent, so that replay ends a coastdown there too.
-
-    To be recorded before the coastdown is ended, at log time `receive_ns`.
-    """
-    return event_message(EventNote(EventKind.SILENCE, receive_ns, reason, {}), node=node)
-
-
-def stop_mark(receive_ns: int, *, node: str = DEFAULT_NODE) -> OutputMessage:
-    """
-    Encode that a person said that the engine was stopped just then, so that replay takes it too.
-
-    To be recorded before the monitor takes it, at log time `receive_ns`.
-    """
-    note = EventNote(EventKind.ENGINE_STOPPED, receive_ns, 'the engine was stopped', {})
-    return event_message(note, node=node)
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:

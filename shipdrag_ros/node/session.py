@@ -31,9 +31,6 @@ from shipdrag_ros.messages import (
     Source,
     decode,
     event_message,
-    reset_request,
-    silence_mark,
-    stop_mark,
     types,
 )
 from shipdrag_ros.messages.publishing import outputs
@@ -196,7 +193,7 @@ class Session:
         arrival_ns = self.watch_clock(now_ns)
         if self.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
             return
-        self._obey_in_replay(silence_mark(arrival_ns, reason, node=self._node), arrival_ns)
+        self._obey_in_replay(self._event(EventKind.SILENCE, reason), arrival_ns)
         self._in_turn(lambda: self._report(self.monitor.fall_silent()))
 
     def engine_stopped(self, now_ns: int) -> tuple[bool, str]:
@@ -209,7 +206,8 @@ class Session:
             Whether it is weighed, and what comes of it.
         """
         arrival_ns = self.watch_clock(now_ns)
-        self._obey_in_replay(stop_mark(arrival_ns, node=self._node), arrival_ns)
+        stopped = self._event(EventKind.ENGINE_STOPPED, 'the engine was stopped')
+        self._obey_in_replay(stopped, arrival_ns)
         if self._waiting or not self._ready():
             self._in_turn(partial(self.monitor.engine_stopped, arrival_ns))
             return True, 'recorded; it is weighed once compiled code is there'
@@ -280,7 +278,7 @@ class Session:
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too
         arrival_ns = self._arrival_ns
-        self._send(reset_request(arrival_ns, reason, node=self._node))
+        self._send(self._event(EventKind.RESET_REQUEST, reason))
         self.recorder.forget()
 
         def use() -> None:
@@ -296,7 +294,11 @@ class Session:
             self.recorder.request(mark, arrival_ns)
 
     def _note(self, kind: EventKind, text: str) -> None:
-        self._send(event_message(EventNote(kind, self._arrival_ns, text, {}), node=self._node))
+        self._send(self._event(kind, text))
+
+    def _event(self, kind: EventKind, text: str) -> OutputMessage:
+        """Encode what happens at the arrival of the last message."""
+        return event_message(EventNote(kind, self._arrival_ns, text), node=self._node)
 
     def _report(self, events: list[Event]) -> None:
         for event in events:

@@ -29,7 +29,7 @@ def test_gives_back_what_it_took_in_order() -> None:
 def test_forgets_by_age_but_not_too_early() -> None:
     ring = RawRing(1000 * SECOND_NS)
     fill(ring, 10_000)
-    seconds = [item.stamp_ns for item in ring]
+    seconds = [item.publish_ns for item in ring]
     segment = SEGMENT_BYTES // 100 + 1
     assert seconds[-1] == 9999
     assert 1000 <= len(seconds) <= 1000 + 2 * segment
@@ -39,7 +39,7 @@ def test_forgets_by_age_but_not_too_early() -> None:
 def test_forgets_by_bytes_and_says_so() -> None:
     ring = RawRing(10**9 * SECOND_NS, limit_bytes=10_000)
     fill(ring, 50_000, size=1000)
-    kept = [item.stamp_ns for item in ring]
+    kept = [item.publish_ns for item in ring]
     assert kept == list(range(kept[0], 50_000))
     assert kept[0] > 0
     assert ring.cut
