@@ -1,5 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag diagnose`: where model and data disagree, and which effect is missing."""
+"""
+Compare coastdowns with the baseline of the ship file and name the effect that is missing: a
+name only where the data decide, the smallest set and what would decide where they cannot,
+"unknown" with a place where it is none of them. Coastdowns of all bags are taken together;
+effects of the earth are stated along the first one. Without a baseline they are compared with
+all hulls of her length and volume. In a record without a coastdown the log is compared with
+the way over ground, for which neither baseline nor ship file is needed.
+
+Examples
+--------
+shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml
+shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800
+"""
 
 from __future__ import annotations
 
@@ -9,11 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import (
+    add_bags,
     add_json,
     add_remap,
     add_report,
+    add_ship,
     add_stop,
-    number,
+    add_window,
     unused_file,
 )
 from shipdrag_ros.cli.output import Output, stages
@@ -30,24 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Compare coastdowns with the baseline of the ship file and name the effect that is '
-        'missing: a name only where the data decide, the smallest set and what would decide '
-        'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
-        'bags are taken together; effects of the earth are stated along the first one. Without '
-        'a baseline they are compared with all hulls of her length and volume. In a record '
-        'without a coastdown the log is compared with the way over ground, for which neither '
-        'baseline nor ship file is needed.'
-    )
-    parser.add_argument(
-        'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
-    )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file with a baseline (default: the one attached to the first bag)',
-    )
+    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
+    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
     parser.add_argument(
         '--write',
         type=unused_file('.yaml'),
@@ -56,12 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'not overwritten',
     )
     add_report(parser, of='diagnosis')
-    parser.add_argument(
-        '--window',
-        nargs=2,
-        type=number(0.0, unit='s'),
-        metavar=('START', 'END'),
-        help='the coastdown [s from the start of each bag without a window of its own], without '
+    add_window(
+        parser,
+        'the coastdown [s from the start of each bag without a window of its own], without '
         'looking for one; what in it is no coastdown is cut',
     )
     add_stop(parser)

@@ -26,13 +26,6 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.reporting import (
-    EventKind,
-    EventNote,
-    OutputMessage,
-    event_message,
-    output_message,
-)
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
     FORECAST,
@@ -40,7 +33,12 @@ from shipdrag_ros.messages.topics import (
     RESISTANCE,
     RESISTANCE_CURVE,
     SPEED,
+    EventKind,
+    EventNote,
+    OutputMessage,
     OutputTopic,
+    event_message,
+    output_message,
 )
 from shipdrag_ros.samples import Float64
 

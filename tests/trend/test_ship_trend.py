@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.fleet.store import HullEvent
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import export, fleet_trends, words
 from shipdrag_ros.trend.page import draw_added_resistance
