@@ -96,7 +96,7 @@ def test_a_verb_without_its_extra_says_which_to_install(
     (tmp_path / 'can.log').write_text('(1700000000.000000) can0 09F80101#A1B2C3D4E5F60708\n' * 40)
     if 'run.mcap' in line:
         bag = str(tmp_path / 'run.mcap')
-        assert main(f'simulate --ship {SHIP} --lead-in 400 --duration 900 -o'.split() + [bag]) == 0
+        assert main(['simulate', '--ship', str(SHIP), '-o', bag, '--lead-in', '400']) == 0
     if 'store' in line and not line.startswith('fleet'):
         (tmp_path / 'store').mkdir()
     done = without({name for name, of in EXTRA_OF.items() if of == extra}, line)
