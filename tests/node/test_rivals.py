@@ -178,17 +178,9 @@ def test_a_flood_on_one_input_delays_no_other(
     assert flooded_s.max() < 2.0 + 10.0 * before_s.max()
 
 
-def test_a_node_of_the_same_name_is_said(start_node: Any, peer: Any, diagnostics: Any) -> None:
-    start_node()
-    namesake = type(peer)('coastdown_node')
-    try:
-        status = diagnostics.wait_for('state', '2 nodes have the name of this one')
-        assert status.level >= b'\x01'
-    finally:
-        namesake.close()
-
-
-def test_odd_requests_are_refused_and_others_are_answered(start_node: Any, peer: Any) -> None:
+def test_odd_requests_are_refused_and_a_node_of_the_same_name_is_said(
+    start_node: Any, peer: Any, diagnostics: Any
+) -> None:
     from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
     from rclpy.parameter import Parameter as Value
 
@@ -212,3 +204,9 @@ def test_odd_requests_are_refused_and_others_are_answered(start_node: Any, peer:
     node.wait_for_log('transition refused')
     assert '\x1b]' not in node.log
     assert '\x07' not in node.log
+    namesake = type(peer)('coastdown_node')
+    try:
+        status = diagnostics.wait_for('state', '2 nodes have the name of this one')
+        assert status.level >= b'\x01'
+    finally:
+        namesake.close()
