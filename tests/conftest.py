@@ -193,6 +193,12 @@ def read_page() -> type[Page]:
 
 
 @pytest.fixture(scope='session')
+def ship_file() -> Path:
+    """A ship to sail with."""
+    return Path(__file__).resolve().parents[1] / 'config' / 'vitus_bering.yaml'
+
+
+@pytest.fixture(scope='session')
 def ship() -> Ship:
     return Ship(name='Vitus Bering', length_m=150.0, displaced_volume_m3=20200.0)
 
