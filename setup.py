@@ -68,10 +68,10 @@ DEVELOPMENT = [
 ]
 FORMATS = {  # of logs: name and module
     'ardupilot': 'ardupilot',
-    'csv': 'csv.declaration',
+    'csv': 'csv.importer',
     'gpx': 'gpx',
-    'n2k': 'n2k.declaration',
-    'nmea': 'nmea.declaration',
+    'n2k': 'n2k',
+    'nmea': 'nmea.importer',
     'rosbag': 'rosbag',
     'signalk': 'signalk',
     'ulog': 'ulog',

@@ -25,6 +25,7 @@ EXTRA_OF = {
     'rclpy': 'ros',
 }
 """Module -> the extra of this package that installs it."""
+_OF_ROS = ('_msgs', '_srvs', '_interfaces')
 
 
 def need(*modules: str) -> None:
@@ -46,9 +47,14 @@ def what_to_install(error: ModuleNotFoundError) -> str | None:
     Say which extra brings a module that is missing; None of a module that none brings.
     """
     module = (error.name or '').partition('.')[0]
-    extra = EXTRA_OF.get(module)
+    extra = EXTRA_OF.get(module, 'ros' if module.endswith(_OF_ROS) else None)
     if extra is None:
         return None
+    if extra == 'ros':
+        return (
+            f'ROS 2 is not installed here (no module {module!r}): pip install {pip_name(extra)}, '
+            'or source the set-up file of a ROS 2 Jazzy installation'
+        )
     return f'{module} is not installed: pip install {pip_name(extra)}'
 
 

@@ -26,7 +26,7 @@ from hypothesis import HealthCheck, settings
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.estimation import shield
+from shipdrag_ros.estimation import estimators
 from shipdrag_ros.estimation.result import (
     Estimate,
     FroudeMax,
@@ -88,7 +88,7 @@ gc.disable()  # what is imported and collected stays
 def defects(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[tuple[str, int]]]:
     """Places of defects of estimators and forecasts: none, but where a test makes some."""
     found: set[tuple[str, int]] = set()
-    monkeypatch.setattr(shield, '_logged', found)
+    monkeypatch.setattr(estimators, '_logged', found)
     yield found
     assert not found, 'an estimator or a forecast failed by a defect of the program'
 
@@ -190,6 +190,12 @@ class Page(HTMLParser):
 @pytest.fixture(scope='session')
 def read_page() -> type[Page]:
     return Page
+
+
+@pytest.fixture(scope='session')
+def ship_file() -> Path:
+    """A ship to sail with."""
+    return Path(__file__).resolve().parents[1] / 'config' / 'vitus_bering.yaml'
 
 
 @pytest.fixture(scope='session')

@@ -220,7 +220,7 @@ def test_the_examples_of_the_help_run(
 ) -> None:
     text = help_text(verb, capsys)
     lines = re.findall(r'^ +(shipdrag .*)$', text, flags=re.MULTILINE)
-    assert len(lines) >= 2, 'give two in shipdrag_ros/cli/examples.py'
+    assert len(lines) >= 2, 'give two in the docstring of the module of the verb'
     for line in lines:
         assert line.split()[1] == verb
         for made in set(re.findall(r'-o (\S+)|--write (\S+)', line)):

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 
-from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters

@@ -21,10 +21,9 @@ from rich.progress import track
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.inference.learning import settings_at
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.noise import SIZE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen
-from shipdrag_ros.inference.settings import SIZE, noise_of
 from shipdrag_ros.posterior.laplace import infer
 from shipdrag_ros.posterior.motion import damping_of, predict, shapes_at
 from shipdrag_ros.posterior.problem import RunModel, StopPrior

@@ -21,7 +21,9 @@ from rich.table import Table
 from benchmarks.accuracy._coasts import coast, errors, read
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression import OrderTable, OrthogonalBasis, fit_orders, order
+from shipdrag_ros.regression import order
+from shipdrag_ros.regression.order import OrderTable, fit_orders
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.ship import Ship
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'

@@ -25,8 +25,8 @@ from rich.table import Table
 
 from benchmarks.accuracy._coasts import CARGO, Case, coasts
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.distance import refit
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression.refit import refit
 from shipdrag_ros.samples import Float64
 
 COUNTS = (100, 300, 500, 1_000, 3_000, 10_000)

@@ -23,9 +23,8 @@ from contextlib import suppress
 import numpy as np
 import psutil
 
-from shipdrag_ros.live import guard
 from shipdrag_ros.live.app import PAGE, LivePage
-from shipdrag_ros.live.serve import listen, serve
+from shipdrag_ros.live.serve import CONNECTIONS, listen, serve
 from shipdrag_ros.live.source import NodeSource
 from shipdrag_ros.messages.heard import Health, Samples, Status
 from shipdrag_ros.samples import Block, Channel
@@ -193,7 +192,7 @@ def main() -> None:
         closed, slowest = connect(address, options.connections)
         print(
             f'{options.connections} connections at once that ask nothing: {closed} closed (limit '
-            f'{guard.CONNECTIONS}); then a page within {1000 * slowest:.0f} ms'
+            f'{CONNECTIONS}); then a page within {1000 * slowest:.0f} ms'
         )
         slow = [socket.create_connection(address) for _ in range(options.slow)]
         for each in slow:

@@ -27,8 +27,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from shipdrag_ros.bags.locate import locate
-from shipdrag_ros.bags.mcap_file import not_mcap
+from shipdrag_ros.bags.mcap_file import locate, not_mcap
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
 from shipdrag_ros.bags.records import (
     HEAD,

@@ -25,8 +25,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from shipdrag_ros.bags.live import sync_directory
-from shipdrag_ros.bags.locate import BagFiles, locate
-from shipdrag_ros.bags.mcap_file import unpack_file
+from shipdrag_ros.bags.mcap_file import BagFiles, locate, unpack_file
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,

@@ -17,8 +17,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from shipdrag_ros.bags.contents import FileChannel
-from shipdrag_ros.bags.locate import BagFiles, locate
-from shipdrag_ros.bags.mcap_file import McapFile
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.writer import METADATA
@@ -28,7 +27,6 @@ from shipdrag_ros.messages import (
     TOPICS,
     EventKind,
     MalformedMessage,
-    MatchedTopics,
     OutputMessage,
     Source,
     match_inputs,
@@ -94,28 +92,22 @@ def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[Mcap
 
 
 @dataclass(frozen=True)
-class TopicRate:
-    """A topic with its mean rate over the bag; None where that says nothing."""
-
-    topic: TopicInfo
-    rate_hz: float | None
-
-
-@dataclass(frozen=True)
 class BagInfo:
     """
     What is in a bag.
 
     Attributes
     ----------
-    name
+    bag
         As the user gave it.
-    paths
-        Its files.
+    files
+        Their paths.
     size_bytes
         Of all files.
     start_ns, end_ns
         First and last time of arrival [ns]; None without messages.
+    duration_s
+        From the first to the last [s]; 0 without messages.
     messages
         In all topics.
     compression
@@ -124,8 +116,8 @@ class BagInfo:
         Whether all files have a sound index.
     topics
         By name.
-    missing
-        Inputs that it does not hold.
+    missing_inputs
+        Those that it does not hold.
     attachments
         Size by name [bytes].
     software
@@ -136,27 +128,21 @@ class BagInfo:
         What is wrong with it.
     """
 
-    name: str
-    paths: tuple[Path, ...]
+    bag: str
+    files: tuple[str, ...]
     size_bytes: int
     start_ns: int | None
     end_ns: int | None
+    duration_s: float
     messages: int
     compression: str
     indexed: bool
-    topics: tuple[TopicRate, ...]
-    missing: tuple[str, ...]
+    topics: tuple[TopicInfo, ...]
+    missing_inputs: tuple[str, ...]
     attachments: dict[str, int]
     software: str | None
     node: str | None
     warnings: tuple[str, ...]
-
-    @property
-    def duration_s(self) -> float:
-        """From the first message to the last [s]."""
-        if self.start_ns is None or self.end_ns is None:
-            return 0.0
-        return (self.end_ns - self.start_ns) * 1e-9
 
 
 def info(run: Run) -> BagInfo:
@@ -164,22 +150,22 @@ def info(run: Run) -> BagInfo:
     Say what is in a run; nothing but its index is read where it has one.
     """
     start_ns, end_ns = run.span_ns or (None, None)
-    duration_s = 0.0 if start_ns is None or end_ns is None else (end_ns - start_ns) * 1e-9
     found = {topic.input for topic in run.topics}
     compressions = {kind for part in run.parts for kind in part.contents.compressions}
     if run.paths != tuple(part.path for part in run.parts):
         compressions = set()  # those of a bag made for the moment, of a log
     return BagInfo(
-        name=run.name,
-        paths=run.paths,
+        bag=run.name,
+        files=tuple(map(str, run.paths)),
         size_bytes=sum(path.stat().st_size for path in run.paths),
         start_ns=start_ns,
         end_ns=end_ns,
+        duration_s=_duration_s(run.span_ns),
         messages=sum(topic.messages for topic in run.topics),
         compression=', '.join(sorted(kind or 'none' for kind in compressions)) or 'none',
         indexed=all(part.contents.indexed for part in run.parts),
-        topics=tuple(TopicRate(topic, _rate_hz(topic, duration_s)) for topic in run.topics),
-        missing=tuple(name for name in TOPICS if name not in found and name not in FURTHER),
+        topics=run.topics,
+        missing_inputs=tuple(name for name in TOPICS if name not in found and name not in FURTHER),
         attachments={name: len(text.encode()) for name, text in run.attachments.items()},
         software=run.software,
         node=run.node,
@@ -187,10 +173,9 @@ def info(run: Run) -> BagInfo:
     )
 
 
-def _rate_hz(topic: TopicInfo, duration_s: float) -> float | None:
-    if topic.messages < 2 or duration_s <= 0.0:
-        return None
-    return (topic.messages - 1) / duration_s
+def _duration_s(span_ns: tuple[int, int] | None) -> float:
+    first, last = span_ns or (0, 0)
+    return (last - first) * 1e-9
 
 
 # messages decoded at once: a chunk as writers make them, and of a giant one a part
@@ -231,13 +216,15 @@ class TopicInfo:
     """
     A topic of a run.
 
-    `input` is the input it carries, None where it carries none; `refused` says
-    that its name is an input's and its type is not accepted.
+    `rate_hz` is its mean over the whole run, None where that says nothing; `input` is the
+    input it carries, None where it carries none; `refused` says that its name is an input's
+    and its type is not accepted.
     """
 
     topic: str
     type: str
     messages: int
+    rate_hz: float | None
     input: str | None
     refused: bool
 
@@ -287,7 +274,7 @@ class Run:
             self._matched = match_inputs(counts, remap=remap, own=_is_own(parts))
         except BagError as error:
             raise BagError(f'{self.name!r}: {error}') from None
-        self.topics = tuple(_topic_info(key, counts[key], self._matched) for key in sorted(counts))
+        self.topics = tuple(self._topic(key, counts[key]) for key in sorted(counts))
         self.refused: Counter[str] = Counter()
         for key, name in self._matched.unaccepted.items():
             self.refused[name] += counts[key]
@@ -424,6 +411,16 @@ class Run:
                 found = replace(batch, channel=place_of[batch.channel])
                 yield _unpacked(found) if self._message_compression else found
 
+    def _topic(self, key: tuple[str, str], messages: int) -> TopicInfo:
+        source, duration_s = self._matched.heard.get(key), _duration_s(self.span_ns)
+        return TopicInfo(
+            *key,
+            messages,
+            rate_hz=(messages - 1) / duration_s if messages > 1 and duration_s > 0.0 else None,
+            input=None if source is None else source.input,
+            refused=key in self._matched.unaccepted,
+        )
+
     def _find_node(self, keys: set[tuple[str, str]]) -> str | None:
         nodes = sorted(
             {
@@ -530,16 +527,6 @@ def _key(channel: FileChannel) -> tuple[str, str]:
     if channel.encoding == 'cdr':
         return topic, channel.type
     return topic, f'{channel.type} ({channel.encoding})'
-
-
-def _topic_info(key: tuple[str, str], messages: int, matched: MatchedTopics) -> TopicInfo:
-    source = matched.heard.get(key)
-    return TopicInfo(
-        *key,
-        messages=messages,
-        input=None if source is None else source.input,
-        refused=key in matched.unaccepted,
-    )
 
 
 def _mark(payload: bytes) -> Mark | None:

@@ -47,7 +47,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import OUTPUT_TOPICS, encode, types
+from shipdrag_ros.messages import OUTPUT_TOPICS, EncodedMessage, encode, types
 from shipdrag_ros.samples import Block
 
 PROFILE = 'ros2'
@@ -500,13 +500,14 @@ class BagWriter(RecordWriter):
             If the file cannot be written.
         """
         for message in encode(block):
-            self.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+            self.put(message)
+
+    def put(self, message: EncodedMessage) -> None:
+        """
+        Write one message that is ready.
+        """
+        topic, kind, payload, log_ns, publish_ns = message
+        self.write(topic, kind, payload, log_ns=log_ns, publish_ns=publish_ns)
 
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)

@@ -19,54 +19,52 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help, add_effects
-from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
 from shipdrag_ros.studies import found
 
 
 class Verb(NamedTuple):
-    """A verb, its module (a leading dot: of this package), and what it does in one line."""
+    """
+    A verb, what it does in one line, and the module it stands in.
+
+    What its help says stands in the docstring of its module: how it is described, and
+    examples; a study gives these by itself.
+    """
 
     name: str
-    module: str
     summary: str
+    module: str
+    examples: tuple[str, ...] = ()
 
 
-_OWN = (
-    Verb(
-        'demo',
-        '.demo',
-        'simulated ship -> ROS topics -> node -> bag -> replay -> report',
-    ),
-    Verb('node', '.node', 'the onboard node: estimates live and records'),
-    Verb('watch', '.watch', 'the page of the bridge: over the running node, or over bags'),
-    Verb('replay', '.replay', 'the same estimator over bags, without ROS'),
-    Verb('simulate', '.simulate', 'simulated coastdown with sensors, as a bag'),
-    Verb('simulate-fleet', '.simulate_fleet', 'months of a few ships, as a folder of bags'),
-    Verb(
-        'baseline',
-        '.baseline',
-        'learn the baseline, and how far runs scatter, from clean runs',
-    ),
-    Verb(
-        'diagnose',
-        '.diagnose',
-        'where model and data disagree, and which effect is missing',
-    ),
-    Verb('learn', '.learn', 'an effect that has no name, learnt from several runs of one ship'),
-    Verb('effect', '.effect', 'files of learnt effects: what is in them, and may they be used'),
-    Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
-    Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
-    Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
-    Verb('poster', '.poster', 'stopping without engine: time and way from speed to speed'),
-    Verb('import', '.import_', 'logs and tables of other programs -> bag'),
-    Verb('completion', '.completion', 'completion of the command line in a shell'),
-    Verb('doctor', '.doctor', 'what of the installation works, and what to do about the rest'),
-    Verb('info', '.info', 'what is in a bag'),
-    Verb('check', '.check', 'is a bag sound'),
-    Verb('recover', '.recover', 'save what is whole in a damaged bag'),
+_SUMMARIES = {
+    'demo': 'simulated ship -> ROS topics -> node -> bag -> replay -> report',
+    'node': 'the onboard node: estimates live and records',
+    'watch': 'the page of the bridge: over the running node, or over bags',
+    'replay': 'the same estimator over bags, without ROS',
+    'simulate': 'simulated coastdown with sensors, as a bag',
+    'simulate-fleet': 'months of a few ships, as a folder of bags',
+    'baseline': 'learn the baseline, and how far runs scatter, from clean runs',
+    'diagnose': 'where model and data disagree, and which effect is missing',
+    'learn': 'an effect that has no name, learnt from several runs of one ship',
+    'effect': 'files of learnt effects: what is in them, and may they be used',
+    'forecast': 'the rest of each glide foretold, beside what followed',
+    'fleet': 'replay and diagnose every bag below folders, one row a coastdown',
+    'trend': 'added resistance of a fleet against time, which hull to clean',
+    'poster': 'stopping without engine: time and way from speed to speed',
+    'import': 'logs and tables of other programs -> bag',
+    'completion': 'completion of the command line in a shell',
+    'doctor': 'what of the installation works, and what to do about the rest',
+    'info': 'what is in a bag',
+    'check': 'is a bag sound',
+    'recover': 'save what is whole in a damaged bag',
+}
+_OWN = tuple(
+    Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
+    for name, summary in _SUMMARIES.items()
 )
+_EXAMPLES = '\n\nExamples\n--------\n'
 _WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -155,8 +153,11 @@ def verbs() -> tuple[Verb, ...]:
     """
     Return all verbs; those of studies are looked for, also in other packages, which takes a while.
     """
-    studies = found(frozenset(verb.name for verb in _OWN))
-    of_studies = (Verb(each.verb, f'{where}.face.verb', each.summary) for where, each in studies)
+    studies = found(frozenset(_SUMMARIES))
+    of_studies = (
+        Verb(each.verb, each.summary, f'{where}.face.verb', each.examples)
+        for where, each in studies
+    )
     return (*_OWN, *of_studies)
 
 
@@ -171,15 +172,18 @@ def parser(*of: str) -> argparse.ArgumentParser:
     )
     top.add_argument('--version', action='version', version=f'shipdrag_ros {__version__}')
     added_to = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
-    own = {verb.name for verb in _OWN}
-    for known in _OWN if of and own.issuperset(of) else verbs():
+    for known in _OWN if of and _SUMMARIES.keys() >= {*of} else verbs():
         added = added_to.add_parser(
             known.name, help=known.summary, description=known.summary, formatter_class=Help
         )
         if known.name in of:
-            added.epilog = epilog(known.name)
             with uncollected():
                 module = import_module(known.module, __name__)
+            examples: Sequence[str] = known.examples
+            if not examples:
+                added.description, _, text = str(module.__doc__).partition(_EXAMPLES)
+                examples = text.splitlines()
+            added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name not in _WITHOUT_EFFECTS:
                 add_effects(added)

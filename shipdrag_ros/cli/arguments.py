@@ -8,7 +8,9 @@ import math
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
+from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import need
 
 STDOUT = '-'
@@ -71,18 +73,54 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     """
     Add `--ship FILE` and `--parameters FILE`, in place of what is attached to a bag.
     """
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file (YAML) (default: the one attached to the bag)',
-    )
+    add_ship(parser, 'ship file (YAML) (default: the one attached to the bag)')
     parser.add_argument(
         '--parameters',
         type=Path,
         metavar='FILE',
         help='parameters as `name: value` (YAML) (default: those attached to the bag)',
     )
+
+
+def add_ship(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
+    """
+    Add `--ship FILE`, with what its help says.
+    """
+    parser.add_argument('--ship', required=required, type=Path, metavar='FILE', help=text)
+
+
+def add_out(
+    parser: argparse.ArgumentParser, kind: Callable[[str], Path], metavar: str, text: str
+) -> None:
+    """
+    Add `-o`, `--out`, which must be given: what is written.
+    """
+    parser.add_argument('-o', '--out', required=True, type=kind, metavar=metavar, help=text)
+
+
+def add_bags(
+    parser: argparse.ArgumentParser, kind: Callable[[str], Any], text: str, metavar: str = 'BAG'
+) -> None:
+    """
+    Add one bag or several, each read by `kind`.
+    """
+    parser.add_argument('bags', nargs='+', type=kind, metavar=metavar, help=text)
+
+
+def add_store(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the store of a fleet.
+    """
+    text = 'folder that `shipdrag fleet` has written'
+    parser.add_argument('store', type=Path, metavar='STORE', help=text)
+
+
+def add_window(parser: argparse.ArgumentParser, text: str) -> None:
+    """
+    Add `--window START END`.
+    """
+    ends = ('START', 'END')
+    parser.add_argument('--window', nargs=2, type=number(0.0, unit='s'), metavar=ends, help=text)
 
 
 def add_stop(parser: argparse.ArgumentParser) -> None:
@@ -205,6 +243,20 @@ def new_file(ending: str) -> Callable[[str], Path]:
         return path
 
     return read
+
+
+def checked(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """
+    Return a reader whose errors are of the use of the command.
+    """
+
+    def reader(text: str) -> Any:
+        try:
+            return read(text)
+        except (ValueError, ShipdragError) as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return reader
 
 
 def add_report(parser: argparse.ArgumentParser, *, of: str) -> None:

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag baseline`: the baseline that clean runs show, and how far runs scatter."""
+"""
+Learn the baseline of a ship from clean runs: clean hull, calm deep water, no wind. Writes the
+ship file with the baseline that they show, in the form that it has, and how well it is known
+for a further run: what the runs leave open, and by how much they differ from each other. Five
+runs show that well; with one or two the stated relative_sd is kept. Without a baseline in the
+ship file, r(v) of the runs is written as a table.
+
+Examples
+--------
+shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml
+shipdrag baseline clean_1.mcap --ship ship.yaml -o first.yaml --json baseline.json
+"""
 
 from __future__ import annotations
 
@@ -9,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
+from shipdrag_ros.cli.arguments import add_bags, add_json, add_out, add_remap, add_ship, new_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.display import Table
@@ -24,32 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Learn the baseline of a ship from clean runs: clean hull, calm deep water, no wind. '
-        'Writes the ship file with the baseline that they show, in the form that it has, and '
-        'how well it is known for a further run: what the runs leave open, and by how much they '
-        'differ from each other. Five runs show that well; with one or two the stated '
-        'relative_sd is kept. Without a baseline in the ship file, r(v) of the runs is written '
-        'as a table.'
-    )
-    parser.add_argument(
-        'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
-    )
-    parser.add_argument(
-        '--ship',
+    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
+    add_ship(
+        parser,
+        'ship file (YAML); the baseline in it is taken for what was known before',
         required=True,
-        type=Path,
-        metavar='FILE',
-        help='ship file (YAML); the baseline in it is taken for what was known before',
     )
-    parser.add_argument(
-        '-o',
-        '--out',
-        required=True,
-        type=new_file('.yaml'),
-        metavar='FILE',
-        help='ship file to write, with the learnt baseline',
-    )
+    add_out(parser, new_file('.yaml'), 'FILE', 'ship file to write, with the learnt baseline')
     add_remap(parser)
     add_json(parser)
 
@@ -87,6 +79,8 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
     """
     from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
 
+    enough = len(found.runs) >= ENOUGH
+    scatter = found.scatter, found.scatter_low, found.scatter_high
     return {
         'runs': [
             {
@@ -103,11 +97,7 @@ def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
             )
         },
         'covariance': found.covariance,
-        'scatter': {
-            'value': found.scatter if len(found.runs) >= ENOUGH else None,
-            'low': found.scatter_low if len(found.runs) >= ENOUGH else None,
-            'high': found.scatter_high if len(found.runs) >= ENOUGH else None,
-        },
+        'scatter': dict(zip(('value', 'low', 'high'), scatter if enough else [None] * 3)),
         'relative_sd': {
             'before': None
             if found.stated_sd is None
@@ -146,19 +136,15 @@ def _show(output: Output, found: LearntBaseline) -> None:
         )
     if len(found.runs) > 1:
         output.heading('Each run beside the others')
-        output.table(
-            Table(
-                ('', 'resistance', 'sd', 'chi2 a sample'),
-                tuple(
-                    (
-                        each.name,
-                        f'{each.factor.value:+.1%}',
-                        f'{each.factor.sd:.1%}',
-                        f'{each.chi2_per_row:.2f}',
-                    )
-                    for each in found.runs
-                ),
+        beside = tuple(
+            (
+                one.name,
+                f'{one.factor.value:+.1%}',
+                f'{one.factor.sd:.1%}',
+                f'{one.chi2_per_row:.2f}',
             )
+            for one in found.runs
         )
+        output.table(Table(('', 'resistance', 'sd', 'chi2 a sample'), beside))
     for warning in found.warnings:
         output.say(f'WARNING: {warning}')

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag check`: is a bag sound; damages as a table, for all verbs that find them."""
+"""
+Say whether bags are sound: checksums, lengths, references, index and statistics of every
+file, each damage with its offset [bytes]. Exit status: 0 all sound, 1 not. What is whole in a
+damaged bag is saved by `shipdrag recover`.
+
+Examples
+--------
+shipdrag check run.mcap
+shipdrag check out.mcap back.mcap --json check.json
+"""
 
 from __future__ import annotations
 
@@ -9,7 +18,7 @@ from typing import Any
 
 from shipdrag_ros.bags.check import FileCheck, check
 from shipdrag_ros.bags.records import Damage
-from shipdrag_ros.cli.arguments import add_json, bag
+from shipdrag_ros.cli.arguments import add_bags, add_json, bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 
@@ -21,14 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Say whether bags are sound: checksums, lengths, references, index and statistics of '
-        'every file, each damage with its offset [bytes]. Exit status: 0 all sound, 1 not. '
-        'What is whole in a damaged bag is saved by `shipdrag recover`.'
-    )
-    parser.add_argument(
-        'bags', nargs='+', type=bag, metavar='BAG', help='MCAP file or rosbag2 directory'
-    )
+    add_bags(parser, bag, 'MCAP file or rosbag2 directory')
     add_json(parser)
 
 

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag completion`: verbs, options and files are completed by the shell."""
+"""
+Print the script that completes verbs, options and files. Where a shell looks for it: bash:
+~/.local/share/bash-completion/completions/shipdrag; zsh: a file _shipdrag in a folder of
+$fpath; fish: ~/.config/fish/completions/shipdrag.fish.
+
+Examples
+--------
+shipdrag completion bash -o shipdrag.bash
+shipdrag completion fish
+"""
 
 from __future__ import annotations
 
@@ -19,11 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add what the verb takes.
     """
-    parser.description = (
-        'Print the script that completes verbs, options and files. Where a shell looks for it: '
-        'bash: ~/.local/share/bash-completion/completions/shipdrag; zsh: a file _shipdrag in a '
-        'folder of $fpath; fish: ~/.config/fish/completions/shipdrag.fish.'
-    )
     parser.add_argument('shell', choices=SHELLS, help='for which shell')
     parser.add_argument(
         '-o', '--out', type=Path, metavar='FILE', help='write it there (default: to stdout)'

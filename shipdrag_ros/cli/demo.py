@@ -1,46 +1,52 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-`shipdrag demo`: the whole way once, on this machine alone.
+Simulate a coastdown, send its readings over ROS topics on this machine to the node, show the
+estimates as they come, replay what the node recorded and write a report.
 
-A simulated ship sends its readings over real ROS topics to the node, in a
-process of its own; what the node records is replayed and compared with the
-truth of the simulation.
+Examples
+--------
+shipdrag demo
+shipdrag demo --out demo --speed-up 20
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, Self
+
+import numpy as np
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import number
-from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, show_run, write_results
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.imports import need
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.imports import need, what_to_install
 from shipdrag_ros.library import simulated
 from shipdrag_ros.library.replaying import replay_run
-from shipdrag_ros.replay import words
+from shipdrag_ros.replay import replay, words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:  # help must not need ROS
-    from shipdrag_ros.node.rehearsal import LiveEstimate, Rehearsal
+    from shipdrag_ros.node.rehearsal import LiveEstimate
 
 
 _CONNECT_S = 120.0  # the first start on a machine compiles the kernels
@@ -50,22 +56,28 @@ _FIRST_DOMAIN, _DOMAINS = 61, 41  # above 101 the ports run into those for outgo
 
 
 class OnboardNode:
-    """The node in a process of its own, on a domain that nobody else uses."""
+    """The node in a process of its own, on a domain that nobody else uses; a context manager."""
 
     def __init__(self, ship_file: Path, recordings: Path, log: Path, *settings: str) -> None:
         self.log = log
-        with log.open('w') as file:
+        self._line: list[str | Path] = [
+            *(sys.executable, '-m', 'shipdrag_ros.cli', 'node'),
+            *('--ship', ship_file, '--out', recordings),
+            *('--ros-args', '-p', 'use_sim_time:=true'),
+            *(word for each in settings for word in ('-p', each)),
+        ]
+
+    def __enter__(self) -> Self:
+        # nothing leaves this machine, and no other ROS on it is received or receives
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
+        os.environ.pop('ROS_STATIC_PEERS', None)
+        os.environ.setdefault('ROS_LOG_DIR', str(self.log.parent / 'ros'))
+        with self.log.open('w') as file:
             self._process = subprocess.Popen(
-                [
-                    *(sys.executable, '-m', 'shipdrag_ros.cli', 'node'),
-                    *('--ship', ship_file, '--out', recordings),
-                    *('--ros-args', '-p', 'use_sim_time:=true'),
-                    *(word for each in settings for word in ('-p', each)),
-                ],
-                stdin=subprocess.DEVNULL,
-                stdout=file,
-                stderr=subprocess.STDOUT,
+                self._line, stdin=subprocess.DEVNULL, stdout=file, stderr=subprocess.STDOUT
             )
+        return self
 
     @property
     def is_running(self) -> bool:
@@ -85,10 +97,8 @@ class OnboardNode:
         """
         self._process.send_signal(signal.SIGINT)
 
-    def end(self) -> None:
-        """
-        Leave no process behind, whatever happens meanwhile.
-        """
+    def __exit__(self, *error: object) -> None:
+        """Leave no process behind, whatever happens meanwhile."""
         try:
             if self.is_running:
                 self.interrupt()
@@ -109,30 +119,6 @@ class OnboardNode:
 
 
 @contextmanager
-def onboard_node(
-    ship_file: Path, recordings: Path, log: Path, *settings: str
-) -> Iterator[OnboardNode]:
-    """
-    Run a node, and end it.
-
-    Parameters
-    ----------
-    settings
-        More of its parameters, `name:=value` each.
-    """
-    # nothing leaves this machine, and no other ROS on it is received or receives
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
-    os.environ.pop('ROS_STATIC_PEERS', None)
-    os.environ.setdefault('ROS_LOG_DIR', str(log.parent / 'ros'))
-    node = OnboardNode(ship_file, recordings, log, *settings)
-    try:
-        yield node
-    finally:
-        node.end()
-
-
-@contextmanager
 def ended_by_sigterm() -> Iterator[None]:
     """
     Unwind on SIGTERM as on Ctrl-C, so that the node's process is ended too.
@@ -149,18 +135,22 @@ def ended_by_sigterm() -> Iterator[None]:
 
 
 def sail(
-    rehearsal: Rehearsal,
     node: OnboardNode,
     block: Block,
     *,
+    show: Callable[[LiveEstimate], None],
     speed_up: float,
     begins: Callable[[], None] = lambda: None,
-) -> None:
+) -> int:
     """
-    Send the readings and let the node end.
+    Send the readings, let the node end, and return how many estimates came.
 
     Parameters
     ----------
+    node
+        It is ended, whatever happens meanwhile.
+    show
+        Called with each estimate.
     speed_up
         Seconds of readings in a second of life.
     begins
@@ -171,17 +161,21 @@ def sail(
     ShipdragError
         If the node is not ready in time, ends too early, or sends nothing.
     """
-    rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
-    begins()
-    rehearsal.play(block, speed=speed_up, progress=lambda _: node.check())
-    # the answers to the last samples are on their way
-    rehearsal.listen(timeout_s=_ANSWER_S)
-    node.interrupt()
-    rehearsal.listen(until=lambda: not node.is_running, timeout_s=_END_S)
-    if node.is_running:
-        raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
-    if not rehearsal.estimates:
-        raise node.failed('no estimate was received')
+    from shipdrag_ros.node.rehearsal import Rehearsal
+
+    with ended_by_sigterm(), node, Rehearsal(show) as rehearsal:
+        rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
+        begins()
+        rehearsal.play(block, speed=speed_up, progress=lambda _: node.check())
+        # the answers to the last samples are on their way
+        rehearsal.listen(timeout_s=_ANSWER_S)
+        node.interrupt()
+        rehearsal.listen(until=lambda: not node.is_running, timeout_s=_END_S)
+        if node.is_running:
+            raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
+        if not rehearsal.estimates:
+            raise node.failed('no estimate was received')
+    return rehearsal.estimates
 
 
 SHIP = 'vitus_bering.yaml'
@@ -201,10 +195,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Simulate a coastdown, send its readings over ROS topics on this machine to the node, '
-        'show the estimates as they come, replay what the node recorded and write a report.'
-    )
     parser.add_argument(
         '--out',
         type=Path,
@@ -225,11 +215,7 @@ def run(options: argparse.Namespace) -> int:
     """
     Run the demonstration.
     """
-    try:
-        from shipdrag_ros.node.rehearsal import Rehearsal
-    except ModuleNotFoundError as error:
-        raise no_ros(error) from error
-    need(*REPORT_MODULES)
+    need('rclpy', *REPORT_MODULES)
     output = Output()
     out: Path = options.out
     recordings = out / 'recordings'
@@ -248,16 +234,15 @@ def run(options: argparse.Namespace) -> int:
     )
     output.log('starting the node; the first start on a machine compiles for some seconds')
     before = set(recordings.glob('*.mcap'))
-    with ended_by_sigterm(), onboard_node(ship_file, recordings, out / 'node.log') as node:
-        live = _Live(truth, block, output)
-        with Rehearsal(live.show) as rehearsal:
-            sail(
-                rehearsal,
-                node,
-                block,
-                speed_up=options.speed_up,
-                begins=lambda: output.heading('Live from the node, over ROS topics'),
-            )
+    live = _Live(truth, block, output)
+    node = OnboardNode(ship_file, recordings, out / 'node.log')
+    sail(
+        node,
+        block,
+        show=live.show,
+        speed_up=options.speed_up,
+        begins=lambda: output.heading('Live from the node, over ROS topics'),
+    )
     bags = sorted(set(recordings.glob('*.mcap')) - before)
     if not bags:
         raise node.failed('the node recorded nothing')
@@ -307,3 +292,76 @@ class _Live:
             f'{display.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
             f'true {self._truth.at(estimate.speed_m_s):.5f}'
         )
+
+
+_TRIAL = replace(SETTINGS, lead_in_s=600.0, duration_s=600.0)
+TRIAL_SETTINGS = ('steady_s:=300.0', 'diagnose:=false')
+_TRIAL_SPEED_UP = 200.0
+_SIGMAS = 4.0  # no figure of the run may be further from the truth
+_REPORT = 'send the folder to the maintainers, it holds log and bag'
+
+
+class RunStep(NamedTuple):
+    """A part of the way: whether it works, what was seen, and what to do where it does not."""
+
+    what: str
+    works: bool
+    seen: str
+    do: str = ''
+
+
+def run_through() -> Iterator[RunStep]:
+    """
+    Sail a simulated ship past the node, and yield each part of the way until one fails.
+
+    The files are kept where one does, in a folder that is named.
+    """
+    folder = Path(tempfile.mkdtemp(prefix='shipdrag-doctor-'))
+    works = True
+    try:
+        for step in _way(folder):
+            works = works and step.works
+            yield step if step.works else step._replace(seen=f'{step.seen}; files in {folder}')
+            if not works:
+                return
+    except (ShipdragError, ModuleNotFoundError) as error:
+        works = False
+        missing = what_to_install(error) if isinstance(error, ModuleNotFoundError) else None
+        do = 'look at the log above; is another ROS with the same domain in the way?'
+        yield RunStep('run: node', False, f'{missing or error}; files in {folder}', do)
+    finally:
+        if works:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _way(folder: Path) -> Iterator[RunStep]:
+    need('rclpy')
+    ship_file = folder / SHIP
+    ship_file.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
+    block, truth = simulated.make(Ship.load(ship_file), _TRIAL)
+    yield RunStep('run: simulated ship', True, f'{len(block)} readings')
+    node = OnboardNode(ship_file, folder, folder / 'node.log', *TRIAL_SETTINGS)
+    live = sail(node, block, show=lambda _: None, speed_up=_TRIAL_SPEED_UP)
+    yield RunStep('run: node', True, f'{live} estimates over ROS topics')
+    bags = sorted(folder.glob('*.mcap'))
+    if not bags:
+        yield RunStep('run: bag', False, 'nothing was recorded', 'see node.log')
+        return
+    yield RunStep('run: bag', True, f'{bags[0].stat().st_size / 1e3:.0f} kB')
+    (run,) = open_runs(bags)
+    result = replay(run)
+    recorded = result.recorded
+    same = 0 < recorded.compared == recorded.identical
+    yield RunStep('run: replay', same, words.recorded_sentence(recorded), _REPORT)
+    yield _figures([each.estimate for each in result.coastdowns], truth)
+
+
+def _figures(estimates: list[Estimate | None], truth: TrueCurve) -> RunStep:
+    what = 'run: figures'
+    if len(estimates) != 1 or estimates[0] is None:
+        return RunStep(what, False, f'{len(estimates)} coastdowns, expected one', _REPORT)
+    curve = estimates[0].valid_curve
+    off = (curve.resistance_m_s2 - truth.at(curve.speed_m_s)) / curve.sigma_m_s2
+    worst = float(np.nanmax(np.abs(off)))
+    seen = f'at most {worst:.1f} standard deviations from the truth'
+    return RunStep(what, worst <= _SIGMAS, seen, _REPORT)

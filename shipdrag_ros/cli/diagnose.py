@@ -1,5 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag diagnose`: where model and data disagree, and which effect is missing."""
+"""
+Compare coastdowns with the baseline of the ship file and name the effect that is missing: a
+name only where the data decide, the smallest set and what would decide where they cannot,
+"unknown" with a place where it is none of them. Coastdowns of all bags are taken together;
+effects of the earth are stated along the first one. Without a baseline they are compared with
+all hulls of her length and volume. In a record without a coastdown the log is compared with
+the way over ground, for which neither baseline nor ship file is needed.
+
+Examples
+--------
+shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml
+shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800
+"""
 
 from __future__ import annotations
 
@@ -9,11 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import (
+    add_bags,
     add_json,
     add_remap,
     add_report,
+    add_ship,
     add_stop,
-    number,
+    add_window,
     unused_file,
 )
 from shipdrag_ros.cli.output import Output, stages
@@ -23,31 +37,15 @@ from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
 
 if TYPE_CHECKING:
-    from shipdrag_ros.diagnosis import DiagnosisResult
+    from shipdrag_ros.diagnosis.result import DiagnosisResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Compare coastdowns with the baseline of the ship file and name the effect that is '
-        'missing: a name only where the data decide, the smallest set and what would decide '
-        'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
-        'bags are taken together; effects of the earth are stated along the first one. Without '
-        'a baseline they are compared with all hulls of her length and volume. In a record '
-        'without a coastdown the log is compared with the way over ground, for which neither '
-        'baseline nor ship file is needed.'
-    )
-    parser.add_argument(
-        'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
-    )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file with a baseline (default: the one attached to the first bag)',
-    )
+    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
+    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
     parser.add_argument(
         '--write',
         type=unused_file('.yaml'),
@@ -56,12 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'not overwritten',
     )
     add_report(parser, of='diagnosis')
-    parser.add_argument(
-        '--window',
-        nargs=2,
-        type=number(0.0, unit='s'),
-        metavar=('START', 'END'),
-        help='the coastdown [s from the start of each bag without a window of its own], without '
+    add_window(
+        parser,
+        'the coastdown [s from the start of each bag without a window of its own], without '
         'looking for one; what in it is no coastdown is cut',
     )
     add_stop(parser)
@@ -93,9 +88,10 @@ def run(options: argparse.Namespace) -> int:
     Diagnose and show it.
     """
     # what follows takes half a second to import
-    from shipdrag_ros.diagnosis import Verdict, with_effects
+    from shipdrag_ros.diagnosis import with_effects
     from shipdrag_ros.diagnosis.document import document
-    from shipdrag_ros.diagnosis.earlier_file import read_earlier
+    from shipdrag_ros.diagnosis.earlier import read_earlier
+    from shipdrag_ros.inference.decision import Verdict
     from shipdrag_ros.library.diagnosing import diagnose_runs
     from shipdrag_ros.library.replaying import refuse_overlaps
 
@@ -118,7 +114,7 @@ def run(options: argparse.Namespace) -> int:
     _show(output, found, ship)
     if options.report is not None:
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.score import Score
+        from shipdrag_ros.diagnosis.tables import Score
 
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')

@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag doctor`: what of the installation works, and what to do about the rest."""
+"""
+Look at the installation: Python, packages, ROS 2, where compiled code is kept, the port of
+the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 something is broken.
+
+Examples
+--------
+shipdrag doctor
+shipdrag doctor --out records --json
+"""
 
 from __future__ import annotations
 
@@ -52,6 +60,9 @@ class CheckState(Enum):
     BROKEN = 'BROKEN'
 
 
+_FINE, _LOOK, _BROKEN = CheckState
+
+
 class CheckResult(NamedTuple):
     """What was looked at, how it is, and what to do; '' where nothing is to be done."""
 
@@ -65,11 +76,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Look at the installation: Python, packages, ROS 2, where compiled code is kept, the '
-        'port of the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 '
-        'something is broken.'
-    )
     parser.add_argument(
         '--out',
         type=Path,
@@ -96,39 +102,25 @@ def run(options: argparse.Namespace) -> int:
     if options.sails:
         output.log('sailing a simulated ship past the node; a first start compiles for minutes')
         found += _sailed()
-    output.table(
-        Table(
-            ('what', 'state', 'found', 'what to do'),
-            tuple((each.what, each.state.value, each.found, each.do or '-') for each in found),
-        )
-    )
-    wrong = [each for each in found if each.state is CheckState.BROKEN]
+    rows = tuple((each.what, each.state.value, each.found, each.do or '-') for each in found)
+    output.table(Table(('what', 'state', 'found', 'what to do'), rows))
+    wrong = [each for each in found if each.state is _BROKEN]
     if options.sails:
-        output.say(
-            '\n'.join(f'FAIL: {each.what}: {each.found}; {each.do}' for each in wrong) or 'PASS'
-        )
-    output.json(
-        {
-            'works': not wrong,
-            'findings': [
-                {
-                    'what': each.what,
-                    'state': each.state.value.lower(),
-                    'found': each.found,
-                    'do': each.do or None,
-                }
-                for each in found
-            ],
-        }
-    )
+        failed = [f'FAIL: {each.what}: {each.found}; {each.do}' for each in wrong]
+        output.say('\n'.join(failed) or 'PASS')
+    documents = [
+        {**each._asdict(), 'state': each.state.value.lower(), 'do': each.do or None}
+        for each in found
+    ]
+    output.json({'works': not wrong, 'findings': documents})
     return BROKEN if wrong else 0
 
 
 def _sailed() -> Iterator[CheckResult]:
-    from shipdrag_ros.cli.doctor_run import run_through  # only who asks pays for it
+    from shipdrag_ros.cli.demo import run_through  # only who asks pays for it
 
     for step in run_through():
-        state = CheckState.FINE if step.works else CheckState.BROKEN
+        state = _FINE if step.works else _BROKEN
         yield CheckResult(step.what, state, step.seen, '' if step.works else step.do)
 
 
@@ -146,7 +138,7 @@ def findings(out: Path) -> Iterator[CheckResult]:
     Finding
     """
     yield CheckResult(
-        'shipdrag_ros', CheckState.FINE, f'{__version__} on Python {platform.python_version()}'
+        'shipdrag_ros', _FINE, f'{__version__} on Python {platform.python_version()}'
     )
     yield _machine()
     yield from _packages()
@@ -159,34 +151,26 @@ def findings(out: Path) -> Iterator[CheckResult]:
 
 def _machine() -> CheckResult:
     if platform.machine() in ('x86_64', 'AMD64'):
-        return CheckResult(
-            'machine', CheckState.FINE, f'{platform.machine()}, {os.cpu_count()} cores'
-        )
-    return CheckResult(
-        'machine',
-        CheckState.LOOK,
-        platform.machine(),
-        'the lock file is tried on x86-64 alone; without ROS most of it works elsewhere',
-    )
+        return CheckResult('machine', _FINE, f'{platform.machine()}, {os.cpu_count()} cores')
+    do = 'the lock file is tried on x86-64 alone; without ROS most of it works elsewhere'
+    return CheckResult('machine', _LOOK, platform.machine(), do)
 
 
 def _packages() -> Iterator[CheckResult]:
     missing = [name for name in _NEEDED if not _is_there(name)]
     if missing:
-        yield CheckResult(
-            'packages', CheckState.BROKEN, f'missing: {", ".join(missing)}', 'make env'
-        )
+        yield CheckResult('packages', _BROKEN, f'missing: {", ".join(missing)}', 'make env')
     else:
-        yield CheckResult('packages', CheckState.FINE, f'all {len(_NEEDED)} that every verb needs')
+        yield CheckResult('packages', _FINE, f'all {len(_NEEDED)} that every verb needs')
     for name, without in _OPTIONAL.items():
         if _is_there(name):
-            yield CheckResult(name, CheckState.FINE, 'there')
+            yield CheckResult(name, _FINE, 'there')
         else:
             extra = EXTRA_OF.get(name)
             do = f'pip install {pip_name(extra)}' if extra else 'make env'
             if name == 'rclpy':
                 do += ', or source ROS 2 Jazzy'
-            yield CheckResult(name, CheckState.LOOK, f'missing; does not work: {without}', do)
+            yield CheckResult(name, _LOOK, f'missing; does not work: {without}', do)
 
 
 def _is_there(name: str) -> bool:
@@ -200,15 +184,10 @@ def _discovery() -> CheckResult:
     reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
     domain = os.environ.get('ROS_DOMAIN_ID', '0')
     if reach:
-        return CheckResult(
-            'ROS discovery', CheckState.FINE, f'{reach}, domain {domain}, by the environment'
-        )
-    return CheckResult(
-        'ROS discovery',
-        CheckState.FINE,
-        f'not set, domain {domain}: shipdrag node receives from this machine alone',
-        'to receive from the network: shipdrag node --network',
-    )
+        return CheckResult('ROS discovery', _FINE, f'{reach}, domain {domain}, by the environment')
+    found = f'not set, domain {domain}: shipdrag node receives from this machine alone'
+    do = 'to receive from the network: shipdrag node --network'
+    return CheckResult('ROS discovery', _FINE, found, do)
 
 
 def _compiled() -> CheckResult:
@@ -217,15 +196,11 @@ def _compiled() -> CheckResult:
     root = cache_root()
     if root is None:
         do = f'set {CACHE_DIR} to a folder that can be written'
-        return CheckResult(
-            'compiled code', CheckState.LOOK, 'not kept: each start compiles again', do
-        )
+        return CheckResult('compiled code', _LOOK, 'not kept: each start compiles again', do)
     modules = sum(each.is_dir() for each in root.iterdir())
     if not modules:
-        return CheckResult(
-            'compiled code', CheckState.LOOK, f'none yet in {root}', 'make warm, once'
-        )
-    return CheckResult('compiled code', CheckState.FINE, f'of {modules} modules in {root}')
+        return CheckResult('compiled code', _LOOK, f'none yet in {root}', 'make warm, once')
+    return CheckResult('compiled code', _FINE, f'of {modules} modules in {root}')
 
 
 def _port(port: int) -> CheckResult:
@@ -234,29 +209,25 @@ def _port(port: int) -> CheckResult:
             probe.bind(('127.0.0.1', port))
         except OSError:
             do = 'a page may run there already; else shipdrag watch --port N'
-            return CheckResult(f'port {port}', CheckState.LOOK, 'in use', do)
-    return CheckResult(f'port {port}', CheckState.FINE, 'free for shipdrag watch')
+            return CheckResult(f'port {port}', _LOOK, 'in use', do)
+    return CheckResult(f'port {port}', _FINE, 'free for shipdrag watch')
 
 
 def _disk(out: Path) -> CheckResult:
     place = next(each for each in (out.absolute(), *out.absolute().parents) if each.exists())
     if not os.access(place, os.W_OK):
-        return CheckResult(
-            'disk', CheckState.BROKEN, f'{place} cannot be written', 'give --out DIR'
-        )
+        return CheckResult('disk', _BROKEN, f'{place} cannot be written', 'give --out DIR')
     free = shutil.disk_usage(place).free
     if free < _LITTLE_BYTES:
         do = 'make room, or bound the recordings: shipdrag node --keep-bytes N'
-        return CheckResult('disk', CheckState.LOOK, f'{free / 1e9:.1f} GB free in {place}', do)
-    return CheckResult('disk', CheckState.FINE, f'{free / 1e9:.0f} GB free in {place}')
+        return CheckResult('disk', _LOOK, f'{free / 1e9:.1f} GB free in {place}', do)
+    return CheckResult('disk', _FINE, f'{free / 1e9:.0f} GB free in {place}')
 
 
 def _clock() -> CheckResult:
     if sys.platform != 'linux' or not _SYNCHRONISED.parent.exists():
         do = 'see to it that one does (GNSS or NTP): runs are dated by this clock'
-        return CheckResult('clock', CheckState.LOOK, 'not known whether anything sets it', do)
+        return CheckResult('clock', _LOOK, 'not known whether anything sets it', do)
     if not _SYNCHRONISED.exists():
-        return CheckResult(
-            'clock', CheckState.LOOK, 'systemd has not set it yet', 'timedatectl status'
-        )
-    return CheckResult('clock', CheckState.FINE, 'set by systemd-timesyncd')
+        return CheckResult('clock', _LOOK, 'systemd has not set it yet', 'timedatectl status')
+    return CheckResult('clock', _FINE, 'set by systemd-timesyncd')

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag effect`: files of learnt effects checked, and all effects listed."""
+"""
+A learnt effect is data: a formula with units, which is read and never run. `check` refuses
+wrong units, names that are not known, poles inside the valid range and all that is no
+formula; `list` shows the effects of the library and of the folders given.
+
+Examples
+--------
+shipdrag effect check effects/weed.yaml
+shipdrag effect list --effects effects
+"""
 
 from __future__ import annotations
 
@@ -19,11 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'A learnt effect is data: a formula with units, which is read and never run. `check` '
-        'refuses wrong units, names that are not known, poles inside the valid range and all '
-        'that is no formula; `list` shows the effects of the library and of the folders given.'
-    )
     verbs = parser.add_subparsers(
         title='what to do', metavar='WHAT', dest='what', required=True, help='check or list'
     )

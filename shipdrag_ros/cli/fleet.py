@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag fleet`: every bag below folders, replayed and diagnosed, one row a coastdown."""
+"""
+Replay and diagnose every bag below folders, here or in an object store, and write one row a
+coastdown into a data set of Parquet files. The ship file of a bag is the nearest ship.yaml
+upwards, or the one attached. What is done already is not done again. Bags that cannot be read
+are skipped and listed, and the exit status is then 1.
+
+Examples
+--------
+shipdrag fleet records -o store --workers 1
+shipdrag fleet records -o store --json fleet.json
+"""
 
 from __future__ import annotations
 
@@ -11,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_json, whole
+from shipdrag_ros.cli.arguments import add_json, add_out, whole
 from shipdrag_ros.cli.output import Output, ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
@@ -29,12 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Replay and diagnose every bag below folders, here or in an object store, and write one '
-        'row a coastdown into a data set of Parquet files. The ship file of a bag is the nearest '
-        'ship.yaml upwards, or the one attached. What is done already is not done again. Bags '
-        'that cannot be read are skipped and listed, and the exit status is then 1.'
-    )
     parser.add_argument(
         'folders',
         nargs='+',
@@ -44,9 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'without options, and logs that `shipdrag import` knows by their first bytes, whatever '
         'their names',
     )
-    parser.add_argument(
-        '-o', '--out', required=True, type=Path, metavar='STORE', help='folder; made if missing'
-    )
+    add_out(parser, Path, 'STORE', 'folder; made if missing')
     engine = parser.add_mutually_exclusive_group()
     engine.add_argument(
         '--workers',

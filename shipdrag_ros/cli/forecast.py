@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag forecast`: the rest of each glide, foretold from what was known until then."""
+"""
+Find the coastdowns in bags and foretell the rest of each, from what was known some time after
+its stop: when she has each lower speed and how far on, with bands of 90 %, beside what
+followed.
+
+Examples
+--------
+shipdrag forecast run.mcap --after 120 300
+shipdrag forecast run.mcap --ship ship.yaml --json forecast.json
+shipdrag forecast run.mcap --if-stopped-now
+"""
 
 from __future__ import annotations
 
@@ -7,7 +17,14 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_settings, add_stop, number
+from shipdrag_ros.cli.arguments import (
+    add_bags,
+    add_json,
+    add_remap,
+    add_settings,
+    add_stop,
+    number,
+)
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
@@ -24,12 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Find the coastdowns in bags and foretell the rest of each, from what was known some '
-        'time after its stop: when she has each lower speed and how far on, with bands of 90 %, '
-        'beside what followed.'
-    )
-    parser.add_argument('bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'bag; {HELP}')
+    add_bags(parser, windowed_bag, f'bag; {HELP}')
     add_settings(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument(
@@ -105,6 +117,12 @@ def document(found: Forecasts) -> dict[str, Any]:
     """
     Return the document of the verb; a forecast that was not made says why under `not_made`.
     """
+    not_made: list[tuple[object, ...]] = [
+        (each.bag, each.stop_ns, each.after_s, each.why)
+        for each in found.made
+        if each.checked is None
+    ]
+    not_made += [(bag, None, None, why) for bag, why in found.without]
     return {
         'forecasts': [
             {
@@ -121,18 +139,7 @@ def document(found: Forecasts) -> dict[str, Any]:
             if each.checked is not None
         ],
         'not_made': [
-            {
-                'bag': each.bag,
-                'stop_ns': each.stop_ns,
-                'after_s': each.after_s,
-                'reason': each.why,
-            }
-            for each in found.made
-            if each.checked is None
-        ]
-        + [
-            {'bag': bag, 'stop_ns': None, 'after_s': None, 'reason': why}
-            for bag, why in found.without
+            dict(zip(('bag', 'stop_ns', 'after_s', 'reason'), each)) for each in not_made
         ],
     }
 

@@ -1,23 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag import`: logs or tables of measurements as a bag."""
+"""
+Write the measurements of logs or tables as a bag for replay. The format is known by the
+content of a file. What was understood is printed, and what was not used is counted. No value
+is ever repaired. `replay` and `diagnose` read such files directly, where no option is needed.
+
+Examples
+--------
+shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml
+shipdrag import log.csv -o plane.mcap --time t:ms --map speed_through_water=u:kn --map \
+position=x,y:km
+shipdrag import log.csv -o globe.mcap --rate 1 --map position=lat,lon:deg
+"""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json
+from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import Format, Option, best_of, head_of
+from shipdrag_ros.sources.format import Format, Option
 from shipdrag_ros.sources.log import new_bag
-from shipdrag_ros.sources.reading import job_of
-from shipdrag_ros.sources.run import read_joined
+from shipdrag_ros.sources.reading import format_of, job_of, read_joined
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     known = formats.found()
-    parser.description = (
-        'Write the measurements of logs or tables as a bag for replay. The format is known by the '
-        'content of a file. What was understood is printed, and what was not used is counted. No '
-        'value is ever repaired. `replay` and `diagnose` read such files directly, where no '
-        'option is needed.'
-    )
     parser.add_argument(
         'sources',
         nargs='+',
@@ -39,20 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are '
         'joined; where two hold the same input for the same time, the first file is taken',
     )
-    parser.add_argument(
-        '-o',
-        '--out',
-        required=True,
-        type=Path,
-        metavar='BAG',
-        help='MCAP file to make; an existing one is not overwritten',
-    )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file (YAML) to attach, so that replay needs no --ship',
-    )
+    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
+    add_ship(parser, 'ship file (YAML) to attach, so that replay needs no --ship')
     parser.add_argument(
         '--format',
         choices=[each.name for each in known],
@@ -76,22 +67,10 @@ def _add_option(group: argparse._ArgumentGroup, option: Option) -> None:
     group.add_argument(
         option.flag,
         action='append' if option.many else 'store',
-        type=_reader(option),
+        type=checked(option.read),
         metavar=option.metavar,
         help=option.help,
     )
-
-
-def _reader(option: Option) -> Callable[[str], Any]:
-    """Return what argparse calls; a mistake in a value is one in the use of the command."""
-
-    def read(text: str) -> Any:
-        try:
-            return option.read(text)
-        except (ValueError, ImportDataError) as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-
-    return read
 
 
 def run(options: argparse.Namespace) -> int:
@@ -124,6 +103,7 @@ def run(options: argparse.Namespace) -> int:
         ]
         found = read_joined(parts)
         found.log.copy_to(bag)
+    documents = []
     for source, each, result in zip(options.sources, chosen, found.results, strict=True):
         output.log(f'{source}: {each.kind}')
         for understood in result.understood:
@@ -133,12 +113,9 @@ def run(options: argparse.Namespace) -> int:
         output.table(result.table())
         for line in result.details():
             output.say(line)
+        documents.append({'source': str(source), 'format': each.name, **asdict(result)})
     for line in found.notes:
         output.say(line)
-    documents = [
-        {'source': str(source), 'format': each.name, **asdict(result)}
-        for source, each, result in zip(options.sources, chosen, found.results, strict=True)
-    ]
     whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': found.notes}
     output.json({'bag': str(options.out), **whole})
     return 0
@@ -149,12 +126,8 @@ def _keys(each: Format) -> set[str]:
 
 
 def _chosen(options: argparse.Namespace, source: Path, given: dict[str, Any]) -> Format:
-    known = formats.found()
-    named = next((each for each in known if each.name == options.format), None)
-    if named is not None:
-        return named
-    asked = next((each for each in known if each.chosen_by in given), None)
-    return asked or best_of(known, head_of(source))
+    named = [each for each in formats.found() if each.name == options.format]
+    return named[0] if named else format_of(source, given)
 
 
 def _foreign(key: str, chosen: Sequence[Format]) -> str:

@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag info`: what is in a bag."""
+"""
+Show what is in bags: length, topics with their rates, which of them are inputs, what is
+attached, and what is wrong. Of a log that is no bag: what a bag of it holds. Estimates
+nothing.
+
+Examples
+--------
+shipdrag info run.mcap
+shipdrag info out.mcap back.mcap --json info.json
+"""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from dataclasses import asdict
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import BagInfo, info
-from shipdrag_ros.cli.arguments import add_json, add_remap, bag
+from shipdrag_ros.cli.arguments import add_bags, add_json, add_remap, bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.display import Table
@@ -18,14 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Show what is in bags: length, topics with their rates, which of them are inputs, what '
-        'is attached, and what is wrong. Of a log that is no bag: what a bag of it holds. '
-        'Estimates nothing.'
-    )
-    parser.add_argument(
-        'bags', nargs='+', type=bag, metavar='BAG', help='MCAP file, rosbag2 directory, or log'
-    )
+    add_bags(parser, bag, 'MCAP file, rosbag2 directory, or log')
     add_remap(parser)
     add_json(parser)
 
@@ -38,18 +40,18 @@ def run(options: argparse.Namespace) -> int:
     found = [info(each) for each in open_sources(options.bags, output, remap=dict(options.remap))]
     for about in found:
         _show(output, about)
-    output.json({'bags': [_document(about) for about in found]})
+    output.json({'bags': [asdict(about) for about in found]})
     return 0
 
 
 def _show(output: Output, about: BagInfo) -> None:
-    output.heading(about.name)
+    output.heading(about.bag)
     for warning in about.warnings:
         output.say(f'Warning: {warning}')
     begin = '-' if about.start_ns is None else display.utc(about.start_ns)
     attached = ', '.join(f'{name} ({size} bytes)' for name, size in about.attachments.items())
     rows = [
-        ('files', ', '.join(str(path) for path in about.paths)),
+        ('files', ', '.join(about.files)),
         ('size', f'{about.size_bytes * 1e-6:.3f} MB, compression {about.compression}'),
         ('begin', begin),
         ('length', display.duration(about.duration_s)),
@@ -60,51 +62,15 @@ def _show(output: Output, about: BagInfo) -> None:
         ('index', 'sound' if about.indexed else 'missing or damaged: reading takes longer'),
     ]
     output.table(Table(('', ''), tuple(rows)))
-    output.table(
-        Table(
-            ('topic', 'type', 'messages', 'rate [Hz]', 'read as'),
-            tuple(
-                (
-                    each.topic.topic,
-                    each.topic.type,
-                    f'{each.topic.messages}',
-                    '-' if each.rate_hz is None else f'{each.rate_hz:.3f}',
-                    'refused: type not accepted'
-                    if each.topic.refused
-                    else each.topic.input or '-',
-                )
-                for each in about.topics
-            ),
+    topics = tuple(
+        (
+            each.topic,
+            each.type,
+            f'{each.messages}',
+            '-' if each.rate_hz is None else f'{each.rate_hz:.3f}',
+            'refused: type not accepted' if each.refused else each.input or '-',
         )
+        for each in about.topics
     )
-    output.say(f'Inputs that are not there: {", ".join(about.missing) or "none"}')
-
-
-def _document(about: BagInfo) -> dict[str, Any]:
-    return {
-        'bag': about.name,
-        'files': [str(path) for path in about.paths],
-        'size_bytes': about.size_bytes,
-        'start_ns': about.start_ns,
-        'end_ns': about.end_ns,
-        'duration_s': about.duration_s,
-        'messages': about.messages,
-        'compression': about.compression,
-        'indexed': about.indexed,
-        'topics': [
-            {
-                'topic': each.topic.topic,
-                'type': each.topic.type,
-                'messages': each.topic.messages,
-                'rate_hz': each.rate_hz,
-                'input': each.topic.input,
-                'refused': each.topic.refused,
-            }
-            for each in about.topics
-        ],
-        'missing_inputs': about.missing,
-        'attachments': about.attachments,
-        'software': about.software,
-        'node': about.node,
-        'warnings': about.warnings,
-    }
+    output.table(Table(('topic', 'type', 'messages', 'rate [Hz]', 'read as'), topics))
+    output.say(f'Inputs that are not there: {", ".join(about.missing_inputs) or "none"}')

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag learn`: an effect that has no name, learnt from several runs of one ship."""
+"""
+Look for one form that explains what several coastdowns of one ship share and the library has
+no name for: a force by speed, time, heading, date or depth, or an error of the log by speed
+or time. It is written as a term with units, which --effects takes, where the evidence of all
+runs is for it, beside something smooth without a formula, and each half of the runs shows it.
+Else nothing is written, and it is said what is known and which run would decide.
+
+Examples
+--------
+shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html
+shipdrag learn clean_1.mcap clean_2.mcap --ship ship.yaml -o new.yaml --json learnt.json
+"""
 
 from __future__ import annotations
 
@@ -7,7 +18,15 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, unused_file
+from shipdrag_ros.cli.arguments import (
+    add_bags,
+    add_json,
+    add_out,
+    add_remap,
+    add_report,
+    add_ship,
+    unused_file,
+)
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
@@ -20,34 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Look for one form that explains what several coastdowns of one ship share and the '
-        'library has no name for: a force by speed, time, heading, date or depth, or an error of '
-        'the log by speed or time. It is written as a term '
-        'with units, which --effects takes, where the evidence of all runs is for it, beside '
-        'something smooth without a formula, and each half of the runs shows it. Else nothing is '
-        'written, and it is said what is known and which run would decide.'
-    )
-    parser.add_argument(
-        'bags',
-        nargs='+',
-        type=windowed_bag,
+    add_bags(
+        parser,
+        windowed_bag,
+        f'bag, or a store of `shipdrag fleet`, of which all bags are taken; {HELP}',
         metavar='BAG_OR_STORE',
-        help=f'bag, or a store of `shipdrag fleet`, of which all bags are taken; {HELP}',
     )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file with a baseline (default: the one attached to the first bag)',
-    )
-    parser.add_argument(
-        '-o',
-        '--out',
-        required=True,
-        type=unused_file('.yaml'),
-        metavar='FILE',
-        help='file of the effect, where one is learnt; an existing one is not overwritten',
+    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
+    add_out(
+        parser,
+        unused_file('.yaml'),
+        'FILE',
+        'file of the effect, where one is learnt; an existing one is not overwritten',
     )
     parser.add_argument(
         '--name',

@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag node`: the onboard node, started without a ROS tool."""
+"""
+The onboard node: estimates live and records.
+
+Examples
+--------
+shipdrag node --ship ship.yaml --out records
+shipdrag node --ship ship.yaml --out records --ros-args -p window_s:=1800.0 -r position:=/gps \
+--params-file parameters.yaml
+"""
 
 from __future__ import annotations
 
@@ -10,10 +18,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.cli.arguments import number
+from shipdrag_ros.cli.arguments import add_ship, number
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.nmea.address import parse_addresses
+from shipdrag_ros.nmea.live import parse_addresses
 from shipdrag_ros.ship import Ship
 
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -24,9 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        '--ship', required=True, type=Path, metavar='FILE', help='ship file (YAML)'
-    )
+    add_ship(parser, 'ship file (YAML)', required=True)
     parser.add_argument(
         '--out',
         required=True,
@@ -80,10 +85,8 @@ def run(options: argparse.Namespace) -> int:
     output = Output()
     for line in overruled(options.ros_args, ship=options.ship, out=options.out):
         output.log(line)
-    try:
-        from shipdrag_ros.node import main
-    except ModuleNotFoundError as error:
-        raise no_ros(error) from error
+    from shipdrag_ros.node import main  # help must not need ROS
+
     output.log(discovery(os.environ, network=options.network))
     return main.run(
         options.ship,
@@ -187,13 +190,3 @@ def _yaml(text: str) -> object:
         return strict_yaml.load(text)
     except ValueError:
         return None
-
-
-def no_ros(error: ModuleNotFoundError) -> ShipdragError:
-    """
-    Say how to install what is missing.
-    """
-    return ShipdragError(
-        f'ROS 2 is not installed here (no module {error.name!r}); run `pip install .[ros]` in '
-        'the source tree, or source the set-up file of a ROS 2 Jazzy installation'
-    )

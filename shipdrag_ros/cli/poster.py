@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag poster`: stopping without engine, one page to print."""
+"""
+Stopping without engine, from the store of `shipdrag fleet`: time and way from speed to speed
+with bands of 90 %, of all runs of each ship. One page to print, beside the wheelhouse poster
+of IMO Resolution A.601(15), Appendix 2.
+
+Examples
+--------
+shipdrag poster store --report poster.html
+shipdrag poster store --json poster.json
+"""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_report
+from shipdrag_ros.cli.arguments import add_json, add_report, add_store
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
@@ -18,14 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Stopping without engine, from the store of `shipdrag fleet`: time and way from speed to '
-        'speed with bands of 90 %, of all runs of each ship. One page to print, beside the '
-        'wheelhouse poster of IMO Resolution A.601(15), Appendix 2.'
-    )
-    parser.add_argument(
-        'store', type=Path, metavar='STORE', help='folder that `shipdrag fleet` has written'
-    )
+    add_store(parser)
     add_report(parser, of='page')
     add_json(parser)
 

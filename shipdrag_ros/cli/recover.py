@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag recover`: save what is whole in a damaged bag."""
+"""
+Save every whole message of a damaged bag into a sound one, and say what was lost. Messages of
+chunks that are cut off or have a wrong checksum, and of unknown topics, go into a bag of
+their own beside it, NAME.quarantine.mcap. The source is not touched.
+
+Examples
+--------
+shipdrag recover damaged.mcap -o saved.mcap
+shipdrag recover damaged.mcap -o again.mcap --json recover.json
+"""
 
 from __future__ import annotations
 
@@ -8,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.bags.recover import Recovery, recover
-from shipdrag_ros.cli.arguments import add_json, bag, new_file
+from shipdrag_ros.cli.arguments import add_json, add_out, bag, new_file
 from shipdrag_ros.cli.check import damage_table
 from shipdrag_ros.cli.output import Output
 
@@ -17,24 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Save every whole message of a damaged bag into a sound one, and say what was lost. '
-        'Messages of chunks that are cut off or have a wrong checksum, and of unknown topics, '
-        'go into a bag of their own beside it, NAME.quarantine.mcap. The source is not touched.'
-    )
     parser.add_argument(
         'source',
         type=bag,
         metavar='SOURCE',
         help='MCAP file, or rosbag2 directory, whose files are joined',
     )
-    parser.add_argument(
-        '-o',
-        '--out',
-        required=True,
-        type=new_file('.mcap'),
-        metavar='BAG',
-        help='MCAP file to make; an existing one is not overwritten',
+    add_out(
+        parser, new_file('.mcap'), 'BAG', 'MCAP file to make; an existing one is not overwritten'
     )
     add_json(parser)
 

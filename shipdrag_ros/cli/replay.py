@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag replay`: the estimates of a bag, without ROS."""
+"""
+Find the coastdowns in bags and estimate r(v) as the node would have. What the node itself
+recorded is compared bit by bit.
+
+Examples
+--------
+shipdrag replay run.mcap --report report.html
+shipdrag replay run.mcap --ship ship.yaml --window 600 1800 --json result.json
+"""
 
 from __future__ import annotations
 
@@ -9,12 +17,13 @@ from pathlib import Path
 
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import (
+    add_bags,
     add_json,
     add_remap,
     add_report,
     add_settings,
     add_stop,
-    number,
+    add_window,
 )
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
@@ -41,25 +50,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Find the coastdowns in bags and estimate r(v) as the node would have. What the node '
-        'itself recorded is compared bit by bit.'
-    )
-    parser.add_argument(
-        'bags',
-        nargs='+',
-        type=windowed_bag,
-        metavar='BAG',
-        help='MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
+    add_bags(
+        parser,
+        windowed_bag,
+        'MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
         f'are joined; {HELP}',
     )
     add_settings(parser)
-    parser.add_argument(
-        '--window',
-        nargs=2,
-        type=number(0.0, unit='s'),
-        metavar=('START', 'END'),
-        help='estimate from this part [s from the start of the bag], without looking for a '
+    add_window(
+        parser,
+        'estimate from this part [s from the start of the bag], without looking for a '
         'coastdown, of each bag without a window of its own; what in it is no coastdown is cut',
     )
     add_stop(parser)

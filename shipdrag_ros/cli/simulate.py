@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag simulate`: a coastdown that is known to the last digit, as a bag."""
+"""
+Sail steadily, stop the engine and let a simulated ship coast; write what log, position,
+heading and shaft sensors read, with the truth attached as truth.yaml.
+
+Examples
+--------
+shipdrag simulate --ship ship.yaml -o calm.mcap --lead-in 1800
+shipdrag simulate --ship ship.yaml -o fouled.mcap --effect fouling=0.3 --effect \
+current=0.4,cross_track_m_s=0.1
+shipdrag simulate --ship ship.yaml -o weed.mcap --effects effects --effect weed=0.0014
+"""
 
 from __future__ import annotations
 
@@ -8,14 +18,13 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, number, whole
+from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked, number, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.library import simulated
 from shipdrag_ros.library.simulated import (
     SPEED_FRACTION,
     SimulationSettings,
     make,
+    moment_ns,
     usual_speed,
     write_bag,
 )
@@ -33,21 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Sail steadily, stop the engine and let a simulated ship coast; write what log, position, '
-        'heading and shaft sensors read, with the truth attached as truth.yaml.'
-    )
-    parser.add_argument(
-        '--ship', required=True, type=Path, metavar='FILE', help='ship file with a baseline (YAML)'
-    )
-    parser.add_argument(
-        '-o',
-        '--out',
-        required=True,
-        type=Path,
-        metavar='BAG',
-        help='MCAP file to make; an existing one is not overwritten',
-    )
+    add_ship(parser, 'ship file with a baseline (YAML)', required=True)
+    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
     parser.add_argument(
         '--speed',
         type=number(0.0, 40.0, unit='m/s', above=True),
@@ -100,7 +96,7 @@ def _add_day(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--start',
-        type=moment_ns,
+        type=checked(moment_ns),
         metavar='DATE',
         help='date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or '
         '2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)',
@@ -201,13 +197,3 @@ def _inputs(text: str) -> tuple[str, ...]:
     if unknown := [name for name in names if name not in known]:
         raise argparse.ArgumentTypeError(f'{unknown}, expected some of {", ".join(known)}')
     return names
-
-
-def moment_ns(text: str) -> int:
-    """
-    Read a date or a time of ISO 8601 [ns since the epoch].
-    """
-    try:
-        return simulated.moment_ns(text)
-    except SimulationError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag simulate-fleet`: months of a few ships, as a folder of bags to try `fleet` on."""
+"""
+Simulate months of a few ships whose hulls foul, by a law and by surprise, and are cleaned,
+with or without a note of it; every run in another load, water, weather and with a log that
+drifts. Writes a folder a ship with ship.yaml, events.csv and the bags, each with its
+BAG.run.yaml, and beside them truth.yaml and truth.csv, which `fleet` does not read. A few
+files are lost, cut off, unreadable, or from a clock without a date.
+
+Examples
+--------
+shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4
+shipdrag simulate-fleet -o weekly --ships 1 --months 0.5 --every 7 --sound
+"""
 
 from __future__ import annotations
 
@@ -16,7 +27,7 @@ import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.cli.arguments import add_json, number, whole
+from shipdrag_ros.cli.arguments import add_json, add_out, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.ship import Ship
@@ -49,16 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Simulate months of a few ships whose hulls foul, by a law and by surprise, and are '
-        'cleaned, with or without a note of it; every run in another load, water, weather and '
-        'with a log that drifts. Writes a folder a ship with ship.yaml, events.csv and the bags, '
-        'each with its BAG.run.yaml, and beside them truth.yaml and truth.csv, which `fleet` does '
-        'not read. A few files are lost, cut off, unreadable, or from a clock without a date.'
-    )
-    parser.add_argument(
-        '-o', '--out', required=True, type=Path, metavar='DIR', help='folder; must be empty or new'
-    )
+    add_out(parser, Path, 'DIR', 'folder; must be empty or new')
     parser.add_argument(
         '--ships', type=whole(1, 1000), default=3, metavar='N', help='how many ships'
     )

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag trend`: added resistance of a fleet against time, and which hull to clean."""
+"""
+Added resistance of each ship against time from the store of `shipdrag fleet`: how fast it
+grows, cleanings and dockings that are known and steps that are not, outliers, when cleaning
+pays (with `economics` in the ship file), and which hull comes first.
+
+Examples
+--------
+shipdrag trend store --json trend.json
+shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'
+"""
 
 from __future__ import annotations
 
@@ -10,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from shipdrag_ros.cli.arguments import add_json, add_report, new_file
+from shipdrag_ros.cli.arguments import add_json, add_report, add_store, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
@@ -30,14 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Added resistance of each ship against time from the store of `shipdrag fleet`: how '
-        'fast it grows, cleanings and dockings that are known and steps that are not, outliers, '
-        'when cleaning pays (with `economics` in the ship file), and which hull comes first.'
-    )
-    parser.add_argument(
-        'store', type=Path, metavar='STORE', help='folder that `shipdrag fleet` has written'
-    )
+    add_store(parser)
     parser.add_argument(
         '--sql',
         metavar='QUERY',

@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag watch`: the page of the bridge, over a running node or over bags."""
+"""
+Serve one page for the bridge: the state and what to do now, speed, r(v) against the clean
+hull, inputs, checklist and verdict. Without a bag it shows the node that runs on this
+network, which may come and go; with bags or logs it plays them. It only reads, but for
+--allow-marks.
+
+Examples
+--------
+shipdrag watch --port 8090 --earlier records
+shipdrag watch run.mcap --speed 20
+"""
 
 from __future__ import annotations
 
@@ -13,8 +23,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_remap, bag, number, whole
-from shipdrag_ros.cli.node import no_ros
+from shipdrag_ros.cli.arguments import add_remap, add_ship, bag, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
@@ -23,7 +32,7 @@ from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:
     from shipdrag_ros.live.app import FleetPages
-    from shipdrag_ros.live.earlier import PastRun
+    from shipdrag_ros.live.outputs import PastRun
     from shipdrag_ros.live.source import PictureFeed
 
 SHORTEST_TOKEN = 16
@@ -34,12 +43,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Serve one page for the bridge: the state and what to do now, speed, r(v) against the '
-        'clean hull, inputs, checklist and verdict. Without a bag it shows the node that runs on '
-        'this network, which may come and go; with bags or logs it plays them. It only reads, '
-        'but for --allow-marks.'
-    )
     parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
     _add_server(parser)
     parser.add_argument(
@@ -49,12 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='X',
         help='seconds of a bag in a second [-]',
     )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file, instead of that of the node or of the bag',
-    )
+    add_ship(parser, 'ship file, instead of that of the node or of the bag')
     parser.add_argument(
         '--earlier',
         type=Path,
@@ -160,16 +158,12 @@ def _source(
 
     if options.bags:
         runs = open_sources(options.bags, output, remap=dict(options.remap))
-        bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
-        try:
+        player = BagSource(runs, ship=ship, speed=options.speed, past=past)
+        with contextlib.closing(player) as bags:
             yield bags, None
-        finally:
-            bags.close()
         return
-    try:
-        from shipdrag_ros.node.spectator import Spectator
-    except ModuleNotFoundError as error:
-        raise no_ros(error) from error
+    from shipdrag_ros.node.spectator import Spectator
+
     node = NodeSource(ship)
     for each in past:
         node.hear(each)
@@ -196,7 +190,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
     """Yield the coastdowns of a folder; what gave none is said."""
-    from shipdrag_ros.live.earlier import recorded_runs
+    from shipdrag_ros.live.outputs import recorded_runs
 
     for found in recorded_runs(folder):
         if isinstance(found, str):

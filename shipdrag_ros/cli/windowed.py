@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from shipdrag_ros.bags import Run, open_runs
-from shipdrag_ros.bags.locate import is_bag
+from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
 

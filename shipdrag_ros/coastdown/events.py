@@ -10,8 +10,7 @@ from enum import Enum
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast.path import PathAhead
-from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.samples import Float64, Int64
 
 BRAKED = (

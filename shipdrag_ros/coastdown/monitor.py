@@ -39,9 +39,8 @@ from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.estimation.doubted import averaged
-from shipdrag_ros.estimation.estimator import WindowEstimator
-from shipdrag_ros.estimation.shield import shielded
+from shipdrag_ros.estimation.choice import averaged
+from shipdrag_ros.estimation.estimators import WindowEstimator, shielded
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Reason
 from shipdrag_ros.ship import Ship

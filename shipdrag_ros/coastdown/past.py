@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, KIND, Channel, Float64, Int64
 
 FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are positions

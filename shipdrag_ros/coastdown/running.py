@@ -22,12 +22,10 @@ from shipdrag_ros.coastdown.regimes.watch import Dated
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.estimation.estimator import WindowEstimator
+from shipdrag_ros.estimation.estimators import WindowEstimator, shielded
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.forecast.foretell import foretell
-from shipdrag_ros.forecast.path import PathAhead
-from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship

@@ -12,7 +12,7 @@ from shipdrag_ros.diagnosis.carried import Carried, carried
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import gap_of, held_out, traces, where
-from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.observation import CoastRun, Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
@@ -21,9 +21,14 @@ from shipdrag_ros.diagnosis.result import (
     SeenRun,
 )
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.diagnosis.speeds import CoastRun
-from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
-from shipdrag_ros.diagnosis.verdict import judge, limits_of, runs_differ
+from shipdrag_ros.diagnosis.verdict import (
+    asked,
+    judge,
+    limits_of,
+    ratio_before_the_stop,
+    runs_differ,
+    waiting,
+)
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG

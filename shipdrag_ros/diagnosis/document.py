@@ -7,8 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, words
-from shipdrag_ros.diagnosis.result import SeenRun, WeighedEarlier, WeighedFact
+from shipdrag_ros.diagnosis import words
+from shipdrag_ros.diagnosis.result import (
+    DiagnosisResult,
+    EffectEstimate,
+    Gap,
+    SeenRun,
+    WeighedEarlier,
+    WeighedFact,
+)
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import find
 

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
+from shipdrag_ros.diagnosis.observation import CoastRun
 from shipdrag_ros.diagnosis.shared_baseline import Factor, Shared, SharedBaseline, factor
-from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
-from shipdrag_ros.inference.rows import bin_means
+from shipdrag_ros.inference.rows import MAD_TO_SD, OUTLIER, bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import GEODETIC, Block, Channel, Float64, Int64
 
@@ -36,7 +35,6 @@ _STRAIGHT = 0.99  # way made good over that of half legs, where there is no head
 _NEAR_S = 10.0  # of a time are the positions that show where the vessel was
 _ZEROS = 0.05  # of the readings of a leg, from where its mean is no speed
 _STOPPED = 0.25  # of the usual speed
-_OUTLIER = 5.0  # robust standard deviations, of values at times
 _UNSTEADY = 0.15  # of the speed, between the halves of a leg
 
 
@@ -298,7 +296,7 @@ class Timed:
         """Return the mean of all, and of each half, without outliers."""
         value = np.asarray(self.value, np.float64)
         away = np.abs(value - np.median(value))
-        keep = away <= _OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
+        keep = away <= OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
         edges = np.array([-np.inf, middle_s, np.inf])
         halves = bin_means(self.time_s[keep], value[keep], edges)[1]
         return float(value[keep].mean()), float(halves[0]), float(halves[-1])
@@ -312,7 +310,7 @@ class Timed:
             line = np.polynomial.polynomial.polyfit(after, np.array([value.real, value.imag]).T, 1)
             place = complex(line[0, 0], line[0, 1])
             away = np.abs(value - place - after * complex(line[1, 0], line[1, 1]))
-            keep = away <= _OUTLIER * np.median(away) + 1e-9
+            keep = away <= OUTLIER * np.median(away) + 1e-9
             after, value = after[keep], value[keep]
         return place
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.inference.learning import learn, of_steady
-from shipdrag_ros.inference.noise import WHITE, Noise, whiten
+from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows
-from shipdrag_ros.inference.settings import noise_of
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 

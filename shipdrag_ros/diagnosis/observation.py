@@ -16,29 +16,48 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from shipdrag_ros.diagnosis.context import Context, Stop
+from shipdrag_ros.diagnosis.context import Context, Stop, stop_time_s
 from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, measured, whitener_of
-from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
-from shipdrag_ros.estimation.steady import LEAST_S, white_sd
+from shipdrag_ros.estimation.steady import BIN_S, white_sd
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
+from shipdrag_ros.inference.learning import LEAST_S
+from shipdrag_ros.inference.rows import CODES, LOG, OUTLIER, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.rows import FIRST_S, GROWTH, LONGEST_PART, LONGEST_S, NEIGHBOURS
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, Ship
 
-_STEADY_BIN_S = 30.0  # in the steady record, where the motion hardly changes
-_FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
-_LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
 _ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as independent
 _LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
-_NEIGHBOURS = 9  # an outlier is found by the median of so many
-_OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
 _KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
+
+
+@dataclass(frozen=True)
+class CoastRun:
+    """
+    A coastdown to be diagnosed.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    window
+        With the steady record before it.
+    facts
+        That a log book knows of this run.
+    ship
+        The ship as she was in this run; None: as in all.
+    """
+
+    name: str
+    window: Window
+    facts: tuple[Fact, ...] = ()
+    ship: Ship | None = None
 
 
 @dataclass(frozen=True)
@@ -223,20 +242,20 @@ def _joined(before: Series, after: Series, since_ns: int) -> Series:
 
 def _edges(lead_in_s: float, end_s: float) -> Float64:
     """Return the edges of the bins, one of them at the stop."""
-    steady = np.arange(lead_in_s, 0.0, -_STEADY_BIN_S)[::-1]
+    steady = np.arange(lead_in_s, 0.0, -BIN_S)[::-1]
     widths: list[float] = []
     total = 0.0
-    longest = max(_LEAST_LONGEST_S, (end_s - lead_in_s) / _BINS)
+    longest = max(LONGEST_S, (end_s - lead_in_s) / LONGEST_PART)
     while total < end_s - lead_in_s:
-        widths.append(min(_FIRST_BIN_S * _BIN_GROWTH ** len(widths), longest))
+        widths.append(min(FIRST_S * GROWTH ** len(widths), longest))
         total += widths[-1]
     return np.concatenate([[-1.0], steady, lead_in_s + np.cumsum(widths)])
 
 
 def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
     """Say what does not stand out from its neighbours."""
-    away = np.abs(value - median_filter(value, _NEIGHBOURS, mode='nearest'))
-    keep: NDArray[np.bool_] = away <= _OUTLIER * max(sd, float(np.median(away)))
+    away = np.abs(value - median_filter(value, NEIGHBOURS, mode='nearest'))
+    keep: NDArray[np.bool_] = away <= OUTLIER * max(sd, float(np.median(away)))
     return keep
 
 

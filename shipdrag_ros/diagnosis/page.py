@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import DiagnosisResult, pictures, tables, words
-from shipdrag_ros.diagnosis.score import Score
+from shipdrag_ros.diagnosis import pictures, tables, words
+from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.diagnosis.tables import Score
 from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, utc
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.pictures import curves_picture, power_picture

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.diagnosis import Compared, RunTrace
+from shipdrag_ros.diagnosis.result import Compared, RunTrace
 from shipdrag_ros.diagnosis.words import Answer, probability
 from shipdrag_ros.display import TRACK_LABELS, speed_unit
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, VERMILION

@@ -22,17 +22,16 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, shown
-from shipdrag_ros.diagnosis.units import asked, waiting
-from shipdrag_ros.diagnosis.verdict import judge
+from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
+from shipdrag_ros.inference.rows import OUTLIER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses
 from shipdrag_ros.simulation.effect import Scope, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
-_OUTLIER = 5.0  # whitened
 _POSSIBLE = 0.01  # probability from which nothing is said against an effect
 _QUARTERS = ('east', 'north', 'west', 'south')
 
@@ -82,7 +81,7 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     """Diagnose legs on which the log turns."""
     model = SailingModel.learnt(legs)
     # legs that no effect and no noise explains
-    outlier = np.abs(model.all_together.white) > _OUTLIER
+    outlier = np.abs(model.all_together.white) > OUTLIER
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)

@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.observation import CoastRun, Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE
-from shipdrag_ros.inference.gaussian import Factored
+from shipdrag_ros.inference.linear import Factored
 from shipdrag_ros.parameter import heavy_tailed
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing, Fitted

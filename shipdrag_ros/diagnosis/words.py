@@ -6,17 +6,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import (
+from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
     Candidate,
     DiagnosisResult,
     EffectEstimate,
-    Verdict,
+    Limit,
+    WeighedEarlier,
 )
-from shipdrag_ros.diagnosis.result import Limit, WeighedEarlier
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
-from shipdrag_ros.inference.decision import NONE, UNKNOWN
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL

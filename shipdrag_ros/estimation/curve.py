@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.motion import Motion
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 SIGNIFICANT = 2.0  # fall or rise of dr/dFr, in its standard deviations
@@ -25,6 +26,101 @@ _MIN_POINTS = 3  # fewer are no curve
 
 
 _RESISTANCE, _SIGMA, _REPEATABLE, _SLOPE, _SLOPE_SIGMA = range(5)  # rows of `_of_motion`
+
+
+@dataclass(frozen=True)
+class Motion:
+    """
+    Speed, acceleration and its rate at m times.
+
+    The errors are rows of weights on k independent unit errors: the
+    covariance of two quantities is the product of their rows.
+
+    Attributes
+    ----------
+    speed, acceleration, jerk : (m,)
+        [m/s], [m/s^2], [m/s^3].
+    speed_error, acceleration_error, jerk_error : (m, k)
+    """
+
+    speed: Float64
+    acceleration: Float64
+    jerk: Float64
+    speed_error: Float64
+    acceleration_error: Float64
+    jerk_error: Float64
+
+    def __getitem__(self, part: slice) -> Motion:
+        return Motion(
+            self.speed[part],
+            self.acceleration[part],
+            self.jerk[part],
+            self.speed_error[part],
+            self.acceleration_error[part],
+            self.jerk_error[part],
+        )
+
+
+@dataclass(frozen=True)
+class PolynomialMotion:
+    """
+    Position or speed as a polynomial of time.
+
+    Attributes
+    ----------
+    scale
+        Of time.
+    basis
+        Polynomials; the first k are used.
+    coefficients : (k,)
+    root : (k, k)
+        A root of the covariance of the coefficients: root root'.
+    speed_at
+        Which derivative of the polynomial is the speed: 0 or 1.
+    """
+
+    scale: TimeScale
+    basis: OrthogonalBasis
+    coefficients: Float64
+    root: Float64
+    speed_at: int
+
+    def fitted(self, time_ns: Int64, *, derivative: int) -> Float64:
+        """
+        Return the polynomial, or a derivative in SI units, at (m,) times.
+        """
+        time = self.scale.normalise(time_ns)
+        order = len(self.coefficients)
+        rows = self.basis.evaluate(time, derivatives=derivative, order=order)[derivative]
+        return _combine(self.coefficients, rows) / self.scale.half_s**derivative
+
+    def motion(self, time: Float64) -> Motion:
+        """
+        Return the motion at (m,) normalised times.
+        """
+        first = self.speed_at
+        order = len(self.coefficients)
+        rows = self.basis.evaluate(time, derivatives=first + 2, order=order)
+        values, errors = [], []
+        for derivative in range(first, first + 3):
+            unit = self.scale.half_s**derivative
+            values.append(_combine(self.coefficients, rows[derivative]) / unit)
+            errors.append(np.einsum('jm,jk->mk', rows[derivative], self.root) / unit)
+        return Motion(*values, *errors)
+
+
+def _combine(coefficients: Float64, rows: Float64) -> Float64:
+    """Sum polynomials, (k,) times (k, m)."""
+    result: Float64 = np.einsum('k,km->m', coefficients, rows)
+    return result
+
+
+def sigma(error: Float64) -> Float64:
+    """
+    Return standard deviations (m,) from rows of weights (m, k).
+    """
+    result: Float64 = np.sqrt(np.einsum('mk,mk->m', error, error))
+    return result
 
 
 @compiled('f8[:, ::1](f8[:], f8[:], f8[:], f8[:, :], f8[:, :], f8[::1], f8)')
@@ -192,26 +288,25 @@ def _inflection(slope: Float64, sigma: Float64) -> int:
     return -1
 
 
-@dataclass(frozen=True)
-class ValidRange:
+class ValidRange(NamedTuple):
     """
-    Where a curve may be used, and what S1 would say of it.
+    Where a curve may be used, and what S1 would say of it, as `Estimate` has it.
 
     Attributes
     ----------
-    froude
+    froude_valid
         [Fr_min, Fr_max].
-    by
+    froude_max_by
         Which rule gave Fr_max.
-    argmax
+    froude_max_argmax
         argmax dr/dFr over the whole branch.
     max_relative_sigma
         max sigma_r / max r over the range, of the repeatable sigma.
     """
 
-    froude: tuple[float, float]
-    by: FroudeMax
-    argmax: float
+    froude_valid: tuple[float, float]
+    froude_max_by: FroudeMax
+    froude_max_argmax: float
     max_relative_sigma: float
 
     @classmethod
@@ -232,10 +327,29 @@ class ValidRange:
     def _up_to(cls, curve: ResistanceCurve, top: float, by: FroudeMax) -> ValidRange:
         inside = slice(0, int(np.searchsorted(curve.froude, top, side='right')))
         return cls(
-            froude=(float(curve.froude[0]), top),
-            by=by,
-            argmax=float(curve.froude[np.argmax(curve.slope)]),
-            max_relative_sigma=float(
-                curve.sigma_repeatable_m_s2[inside].max() / curve.resistance_m_s2[inside].max()
-            ),
+            (float(curve.froude[0]), top),
+            by,
+            float(curve.froude[np.argmax(curve.slope)]),
+            float(curve.sigma_repeatable_m_s2[inside].max() / curve.resistance_m_s2[inside].max()),
         )
+
+
+class AtEnd(NamedTuple):
+    """
+    Speed through water [m/s] and r [m/s^2] at the end of a window, with their sigmas.
+    """
+
+    last_speed_m_s: float
+    last_speed_sigma_m_s: float
+    last_resistance_m_s2: float
+    last_sigma_m_s2: float
+
+    @classmethod
+    def of(cls, motion: Motion, ship: Ship) -> AtEnd:
+        """
+        Return those of the last time of a motion.
+        """
+        end = motion[-1:]
+        r, r_sigma, _ = specific_resistance(end, ship)
+        speed_sigma = sigma(end.speed_error)
+        return cls(float(end.speed[0]), float(speed_sigma[0]), float(r[0]), float(r_sigma[0]))

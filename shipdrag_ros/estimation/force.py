@@ -19,7 +19,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 
-_USUAL = 0.75  # of the speed at the stop
+USUAL_SHARE = 0.75  # of the speed at the stop
 
 
 class ForceCurve(Protocol):
@@ -48,9 +48,8 @@ class Force:
         Ascending [m/s].
     newtons, sigma_n : (m,)
         Resistance and its standard deviation [N].
-    clean_n, clean_sd_n : (m,)
-        The baseline of the ship file, and how well it is known, run-to-run
-        scatter included [N]; NaN where none is stated.
+    clean_n : (m,)
+        The baseline of the ship file [N]; NaN where none is stated.
     over, over_sd : (m,)
         newtons / clean_n - 1 and its standard deviation, in which both curves
         count; NaN where no baseline is stated.
@@ -61,7 +60,6 @@ class Force:
     newtons: Float64
     sigma_n: Float64
     clean_n: Float64
-    clean_sd_n: Float64
     over: Float64
     over_sd: Float64
 
@@ -85,7 +83,7 @@ class Force:
         shared = ship.baseline is not None and ship.baseline.relative_sd_of == 'retardation'
         own = mass * curve.sigma_repeatable_m_s2 if shared else sigma
         spread = np.abs(ratio) * np.hypot(own / newtons, clean_sd / clean)
-        return cls(mass, speed, newtons, sigma, clean, clean_sd, ratio - 1.0, spread)
+        return cls(mass, speed, newtons, sigma, clean, ratio - 1.0, spread)
 
     def near(self, speed_m_s: float) -> int:
         """
@@ -215,7 +213,7 @@ def usual_within(spans_m_s: Float64, ship: Ship | None) -> float:
         service = ship.economics.service_speed_m_s
     if service is not None and low <= service <= high.min():
         return service
-    return _USUAL * float(np.median(high))
+    return USUAL_SHARE * float(np.median(high))
 
 
 def over_text(over: float, sd: float) -> str:

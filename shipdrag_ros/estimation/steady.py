@@ -13,16 +13,14 @@ import math
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD, OUTLIER
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 30.0  # a steady record is condensed to its means over this
 FINE_S = 5.0  # near the stop
-LEAST_S = 300.0  # of record from which a disturbance can be learnt
 _BLOCK_S = 60.0
 _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady record
 _TURNED_RAD = 0.15  # a block on another course does too
-_OUTLIER = 5.0  # robust standard deviations
 
 
 def white_sd(value: Float64) -> float:
@@ -173,7 +171,7 @@ def condense(
     away = np.abs(value - near)
     # of a coarse display most readings are the median itself: that does not show the scatter
     scatter = max(MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
-    keep = away <= _OUTLIER * scatter
+    keep = away <= OUTLIER * scatter
     time_s, value, weight = time_s[keep], value[keep], weight[keep]
     split = len(time_s)
     if fine_s > 0.0:

@@ -21,9 +21,9 @@ FORCE = 'Resistance and effective power; ± is two standard deviations'
 SPECIFIC = 'Specific resistance r in SI; sigma is one standard deviation'
 
 
-def force_table(curve: ForceCurve, ship: Ship, *, count: int = _COUNT) -> Table:
+def force_table(curve: ForceCurve, ship: Ship) -> Table:
     """
-    Show about `count` points of a curve in knots, kN and kW (m/s, N and W of a model).
+    Show about ten points of a curve in knots, kN and kW (m/s, N and W of a model).
 
     Parameters
     ----------
@@ -31,8 +31,6 @@ def force_table(curve: ForceCurve, ship: Ship, *, count: int = _COUNT) -> Table:
         Specific resistance.
     ship
         For the mass, and for the clean hull, of which nothing is shown where it is not stated.
-    count
-        How many points.
     """
     force = Force.of(curve, ship)
     (knot, knots), (newton, newtons), (watt, watts) = (
@@ -44,7 +42,7 @@ def force_table(curve: ForceCurve, ship: Ship, *, count: int = _COUNT) -> Table:
     if clean:
         columns = (*columns, f'clean hull [{newtons}]', 'over the clean hull [%]', '±')
     rows = []
-    for i in _chosen(force.speed_m_s, count):
+    for i in _chosen(force.speed_m_s):
         speed = float(force.speed_m_s[i])
         cells: tuple[str, ...] = (
             f'{speed / knot:.{1 if knot != 1.0 else 3}f}',
@@ -63,20 +61,15 @@ def force_table(curve: ForceCurve, ship: Ship, *, count: int = _COUNT) -> Table:
 
 
 def curve_table(
-    curve: ResistanceCurve,
-    *,
-    count: int = _COUNT,
-    truth: Callable[[Float64], Float64] | None = None,
+    curve: ResistanceCurve, *, truth: Callable[[Float64], Float64] | None = None
 ) -> Table:
     """
-    Show about `count` points of a curve, evenly over its speeds, in m/s and m/s².
+    Show about ten points of a curve, evenly over its speeds, in m/s and m/s².
 
     Parameters
     ----------
     curve
         Its own points are shown; only the truth is interpolated.
-    count
-        How many.
     truth
         From speeds [m/s] to the true r [m/s²], NaN where it is not known; its two
         columns are there only if it is given.
@@ -84,7 +77,7 @@ def curve_table(
     columns: tuple[str, ...] = ('speed [m/s]', 'Fr', 'r [m/s²]', 'sigma [m/s²]')
     if truth is not None:
         columns = (*columns, 'true r [m/s²]', 'error [%]')
-    chosen = _chosen(curve.speed_m_s, count)
+    chosen = _chosen(curve.speed_m_s)
     if not len(chosen):
         return Table(columns, ())
     # as many decimals in every row as the best of them deserves
@@ -113,13 +106,13 @@ def curve_table(
     return Table(columns, tuple(rows))
 
 
-def combined_table(combined: Combined, *, count: int = _COUNT) -> Table:
+def combined_table(combined: Combined) -> Table:
     """
-    Show about `count` points of the r(v) of several coastdowns, in m/s and m/s².
+    Show about ten points of the r(v) of several coastdowns, in m/s and m/s².
     """
     decimals = max(display.decimals_of(float(np.min(combined.sigma_m_s2))), 0)
     rows = []
-    for i in _chosen(combined.speed_m_s, count):
+    for i in _chosen(combined.speed_m_s):
         speed = float(combined.speed_m_s[i])
         figures = (combined.resistance_m_s2, combined.sigma_m_s2, combined.scatter_m_s2)
         rows.append(
@@ -163,11 +156,11 @@ def facts(estimate: Estimate) -> Table:
     return Table(('', ''), tuple(rows))
 
 
-def _chosen(speed_m_s: Float64, count: int) -> Int64:
-    """Return the places of about `count` points, evenly over the speeds."""
+def _chosen(speed_m_s: Float64) -> Int64:
+    """Return the places of about ten points, evenly over the speeds."""
     if not len(speed_m_s):
         return np.empty(0, np.int64)
-    wanted = np.linspace(speed_m_s[0], speed_m_s[-1], count)
+    wanted = np.linspace(speed_m_s[0], speed_m_s[-1], _COUNT)
     return np.unique(np.abs(speed_m_s[:, None] - wanted).argmin(axis=0))
 
 

@@ -13,7 +13,7 @@ import hashlib
 import posixpath
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -23,8 +23,9 @@ from typing import NamedTuple
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
-from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.joined import with_whole_glides
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
@@ -216,10 +217,10 @@ def work(job: BagJob) -> BagResult:
         with _runs(job.sources) as runs:
             return _result(job, runs)
     except (ShipdragError, OSError) as error:
-        return _failed(job, str(error))
+        return failed(job, str(error))
     except Exception as error:  # one bag of thousands; the others go on
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return _failed(
+        return failed(
             job,
             f'a defect of this program, please report it: {type(error).__name__}: {error} '
             f'({Path(place.filename).name}:{place.lineno})',
@@ -366,26 +367,23 @@ def _name(ship: Ship, source: BagToRead) -> str:
     return name
 
 
-def _bag_row(job: BagJob, *, error: str | None = None) -> Row:
+def _bag_row(job: BagJob, error: str | None = None) -> Row:
     return bag_row(job.sources[0].root, job.sources[0].bag, job.content_hash, error=error)
 
 
-def _failed(job: BagJob, why: str) -> BagResult:
-    return BagResult(_bag_row(job, error=why))
+def failed(job: BagJob, why: str) -> BagResult:
+    """
+    Return the row of a bag of which nothing came.
+    """
+    return BagResult(_bag_row(job, why))
 
 
 @contextmanager
 def _runs(sources: Sequence[BagToRead]) -> Iterator[list[Run]]:
     """Open the runs of a bag, whatever it is written in."""
-    with _all_fetched(sources) as paths:
+    with ExitStack() as stack:
+        paths: list[Path] = []
+        for source in sources:
+            files = stack.enter_context(fetched(source))
+            paths += [files[0].parent] if source.folder else files
         yield read_any(paths)
-
-
-@contextmanager
-def _all_fetched(sources: Sequence[BagToRead]) -> Iterator[list[Path]]:
-    if not sources:
-        yield []
-        return
-    with fetched(sources[0]) as files, _all_fetched(sources[1:]) as others:
-        own = [files[0].parent] if sources[0].folder else list(files)
-        yield [*own, *others]

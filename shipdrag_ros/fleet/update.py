@@ -18,11 +18,17 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
-from shipdrag_ros.fleet.events import HullEvent, read_events, write_events
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
-from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, identify, work
+from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, failed, identify, work
 from shipdrag_ros.fleet.rows import BagResult, bag_row, same_time
-from shipdrag_ros.fleet.store import Done, Store, read_coastdowns
+from shipdrag_ros.fleet.store import (
+    Done,
+    HullEvent,
+    Store,
+    read_coastdowns,
+    read_events,
+    write_events,
+)
 from shipdrag_ros.progress import Progress
 from shipdrag_ros.simulation.effects import terms
 
@@ -104,8 +110,9 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     after = store.done()
     bags = {key: after[key] for key in jobs}
     notes = [*found.notes, *_keep_ships(store, jobs, bags, texts), *_at_once(store)]
-    gone = sum((done.root, done.bag) not in names for key, done in before.items())
-    gone -= sum((done.root, done.bag) not in names for key, done in before.items() if key in jobs)
+    gone = sum(
+        (done.root, done.bag) not in names for key, done in before.items() if key not in jobs
+    )
     if gone:
         notes.append(
             f'{gone} bag(s) of the store are not below these folders; their rows stay in it'
@@ -199,23 +206,18 @@ def _do(
     """Do what is to be done, and return the ship file of each, by content hash."""
     texts: dict[str, str] = {}
     for key, found in engine.map(work, jobs):
-        if isinstance(found, Lost):
-            result = _unread(Skipped('', '', found.reason), jobs[key])
-        else:
-            result = found
+        result = failed(jobs[key], found.reason) if isinstance(found, Lost) else found
         store.write(result)
         texts[key] = result.ship_file
         progress('replaying and diagnosing', len(texts), len(jobs))
     return texts
 
 
-def _unread(skipped: Skipped, job: BagJob | None = None) -> BagResult:
+def _unread(skipped: Skipped) -> BagResult:
     """Return the row of a bag that could not be read."""
-    source = None if job is None else job.sources[0]
-    root, bag = (skipped.root, skipped.bag) if source is None else (source.root, source.bag)
+    root, bag, reason = skipped.root, skipped.bag, skipped.reason
     digest = hashlib.sha256(f'unread\0{root}\0{bag}'.encode('utf-8', 'replace')).hexdigest()
-    digest = digest if job is None else job.content_hash
-    return BagResult(bag_row(root, bag, digest, error=skipped.reason))
+    return BagResult(bag_row(root, bag, digest, error=reason))
 
 
 def _keep_ships(

@@ -17,10 +17,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise
+from shipdrag_ros.inference.noise import (
+    HOLD,
+    SIZE,
+    WHITE_OF,
+    GaussMarkovNoise,
+    Noise,
+    NoisePosterior,
+    Settings,
+)
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen, SizePrior, sample, spread_points, values
-from shipdrag_ros.inference.settings import HOLD, SIZE, WHITE_OF, NoisePosterior, Settings
 from shipdrag_ros.samples import Float64
 
 KEPT = 24  # settings

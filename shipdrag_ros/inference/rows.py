@@ -86,3 +86,9 @@ def bin_means(time_s: Float64, value: Float64, edges: Float64) -> tuple[Float64,
     total = np.add.reduceat(value[order], first, axis=0)
     mean = (total.T / count).T
     return np.add.reduceat(time_s[order], first) / count, mean, count
+
+
+MAD_TO_SD = 1.482602218505602
+"""Standard deviation of normal noise over the median of its size."""
+OUTLIER = 5.0
+"""Robust standard deviations, from which a reading is none of what is looked at."""

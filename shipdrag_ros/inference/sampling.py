@@ -17,9 +17,8 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.linear import evidence_of, whitened_products
-from shipdrag_ros.inference.noise import Noise
+from shipdrag_ros.inference.noise import HOLD, SIZE, SOURCES, WHITE_OF, Noise, Settings
 from shipdrag_ros.inference.rows import Rows
-from shipdrag_ros.inference.settings import HOLD, SIZE, SOURCES, WHITE_OF, Settings
 from shipdrag_ros.samples import Float64, Int64
 
 _SHORTEST_S, _LONGEST_S = 2.0, 3600.0

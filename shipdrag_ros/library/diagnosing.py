@@ -10,16 +10,10 @@ from typing import NamedTuple
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
-from shipdrag_ros.diagnosis import (
-    CoastRun,
-    DiagnosisResult,
-    SailingRecord,
-    diagnose,
-    diagnose_sailing,
-)
+from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.joined import with_log_track, with_whole_glides
-from shipdrag_ros.diagnosis.result import SeenRun, WeighedEarlier, WeighedFact
+from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarlier, WeighedFact
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate

@@ -8,19 +8,11 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.diagnosis import (
-    Candidate,
-    Compared,
-    DiagnosisResult,
-    EffectEstimate,
-    Gap,
-    tables,
-    with_effects,
-)
+from shipdrag_ros.diagnosis import tables, with_effects
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
-from shipdrag_ros.diagnosis.earlier_file import read_earlier
+from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, read_earlier
+from shipdrag_ros.diagnosis.result import Candidate, Compared, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import diagnose_runs
@@ -183,7 +175,7 @@ class Diagnosis(Shown):
             HTML file; an existing one is replaced.
         """
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.score import Score
+        from shipdrag_ros.diagnosis.tables import Score
 
         with writing(path) as page:
             write_diagnosis(page, self.found, self.ship, score=Score.published())

@@ -18,6 +18,7 @@ from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Checked, Followed, Passed
 from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.result import Forecast, Milestone
 from shipdrag_ros.library.shown import Shown, drawing
 from shipdrag_ros.replay.coasts import coast_windows
 from shipdrag_ros.replay.playback import ReplayResult
@@ -129,8 +130,6 @@ class Forecasts(Shown):
         matplotlib.axes.Axes
             Of the first glide; time from the stop, speed in knots, of a model ship in m/s.
         """
-        from shipdrag_ros.forecast.pictures import draw_forecast
-
         shown = [each for each in self.made if each.checked is not None]
         if not shown:
             raise EstimationError(' '.join(self._lines()))
@@ -139,7 +138,7 @@ class Forecasts(Shown):
         with drawing(ax) as axis:
             for each in first:
                 assert each.checked is not None
-                draw_forecast(axis, each.checked.forecast, each.stop_ns, unit)
+                _draw(axis, each.checked.forecast, each.stop_ns, unit)
             if first[0].followed is not None:
                 seen = first[0].followed
                 axis.plot(seen.time_s / 60.0, seen.speed_m_s / unit, 'k.', ms=2, label='followed')
@@ -166,15 +165,34 @@ class Forecasts(Shown):
         found: dict[str, Any] = {
             'bag': [each.bag for each, _ in rows],
             'after_s': [each.after_s for each, _ in rows],
-            'speed_m_s': [one.foretold.speed_m_s for _, one in rows],
+            **milestone_columns([one.foretold for _, one in rows]),
         }
-        for name in ('time_s', 'distance_m'):
-            for part in ('median', 'low', 'high'):
-                values = [getattr(getattr(one.foretold, name), part) for _, one in rows]
-                found[f'{name.replace("_", f"_{part}_")}'] = values
         found['time_was_s'] = [one.was_s for _, one in rows]
         found['distance_was_m'] = [one.was_m for _, one in rows]
         return found
+
+
+def _draw(axis: Axes, forecast: Forecast, stop_ns: int, unit_m_s: float) -> None:
+    """Draw the speed to come and its band of 90 %."""
+    made_s = (forecast.made_ns - stop_ns) / SECOND_NS
+    time, speed, low, high, *_ = forecast.in_time().T
+    minutes = (time + made_s) / 60.0
+    (line,) = axis.plot(minutes, speed / unit_m_s, label=f'foretold after {made_s:.0f} s')
+    axis.fill_between(
+        minutes, low / unit_m_s, high / unit_m_s, color=line.get_color(), alpha=0.2, lw=0.0
+    )
+
+
+def milestone_columns(milestones: Sequence[Milestone]) -> dict[str, Any]:
+    """
+    Return speeds, and medians and bands of times and distances, as columns.
+    """
+    found: dict[str, Any] = {'speed_m_s': [each.speed_m_s for each in milestones]}
+    for name in ('time_s', 'distance_m'):
+        for part in ('median', 'low', 'high'):
+            values = [getattr(getattr(each, name), part) for each in milestones]
+            found[name.replace('_', f'_{part}_')] = values
+    return found
 
 
 def _line(each: GlideForecast) -> str:

@@ -19,11 +19,10 @@ from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.sources.formats.csv.declaration import FORMAT as TABLE
-from shipdrag_ros.sources.formats.csv.declaration import read_table
+from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
+from shipdrag_ros.sources.formats.csv.importer import read_table
 from shipdrag_ros.sources.log import ImportResult, Log
-from shipdrag_ros.sources.reading import format_of, job_of
-from shipdrag_ros.sources.run import join, run_of
+from shipdrag_ros.sources.reading import LogRun, format_of, job_of, join
 from shipdrag_ros.sources.table import Cells, LogTable, TableRows, texts_of
 
 NANOSECONDS = 'ns'
@@ -328,7 +327,7 @@ def read_logs(
             continue
         joined, said = join([(each.run.paths[0].name, each.log) for each in group])
         notes += said
-        whole = run_of(joined, [each.run.paths[0] for each in group])
+        whole = LogRun(joined, [each.run.paths[0] for each in group])
         whole.name = ', '.join(each.run.name for each in group)
         runs.append(whole)
     for run in runs:
@@ -371,7 +370,7 @@ def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_P
         options = how.options(path, alone=alone)
         declared = how.format_of(path, options)
         found = declared.read(job_of(declared, path, options), log)
-    run = run_of(log, [path])
+    run = LogRun(log, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]
     dated = getattr(found, 'base_ns', None) is None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.bags.locate import is_bag
+from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import refuse_two_ships

@@ -15,8 +15,7 @@ import numpy as np
 
 from shipdrag_ros import simulation
 from shipdrag_ros.bags import BagWriter, Run
-from shipdrag_ros.bags.locate import BagFiles
-from shipdrag_ros.bags.mcap_file import McapFile
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import Listener, Notes

@@ -17,6 +17,7 @@ from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.result import Forecast, Milestone
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
+from shipdrag_ros.library.forecasts import milestone_columns
 from shipdrag_ros.library.shown import Shown
 from shipdrag_ros.replay import accepted_samples
 from shipdrag_ros.replay.run_result import RunResult
@@ -93,15 +94,7 @@ class IfStopped(Shown):
         return f'if stopped at {utc(self.forecast.made_ns)}'
 
     def _columns(self) -> Mapping[str, Any]:
-        found: dict[str, Any] = {
-            'speed_m_s': [each.speed_m_s for each in self.forecast.milestones]
-        }
-        for name in ('time_s', 'distance_m'):
-            for part in ('median', 'low', 'high'):
-                found[name.replace('_', f'_{part}_')] = [
-                    getattr(getattr(each, name), part) for each in self.forecast.milestones
-                ]
-        return found
+        return milestone_columns(self.forecast.milestones)
 
 
 def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:

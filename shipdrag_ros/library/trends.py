@@ -22,7 +22,7 @@ from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from shipdrag_ros.fleet.events import HullEvent
+    from shipdrag_ros.fleet.store import HullEvent
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,7 +115,7 @@ class Trends(Shown):
         matplotlib.axes.Axes
             Percent over the clean hull.
         """
-        from shipdrag_ros.trend.pictures import draw_added_resistance
+        from shipdrag_ros.trend.page import draw_added_resistance
 
         if ship is None and not self.ships:
             raise FleetError('there is no ship; give coastdowns of one')
@@ -253,9 +253,8 @@ def _ships(
     listener: Listener, store: Path
 ) -> tuple[dict[str, Ship], dict[str, Sequence[HullEvent]]]:
     """Return ship files and events that the store keeps; say which cannot be used."""
-    from shipdrag_ros.fleet.events import read_events
     from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE
-    from shipdrag_ros.fleet.store import ship_texts
+    from shipdrag_ros.fleet.store import read_events, ship_texts
 
     ships: dict[str, Ship] = {}
     events: dict[str, Sequence[HullEvent]] = {}
@@ -291,7 +290,7 @@ def _rows(results: Sequence[Resistance]) -> Iterator[dict[str, Any]]:
 def _events(
     given: Mapping[str, Sequence[tuple[str, str]]],
 ) -> dict[str, Sequence[HullEvent]]:
-    from shipdrag_ros.fleet.events import read_events
+    from shipdrag_ros.fleet.store import read_events
 
     found: dict[str, Sequence[HullEvent]] = {}
     for ship, events in given.items():

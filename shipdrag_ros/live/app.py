@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K."""
+"""
+Routes of the page, who may see it, its stream, the player's buttons, the fleet, Signal K.
+
+Nobody out there can make the page's process grow: too many connections are
+refused; those that owe a request and those that read nothing are closed.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import hmac
+import ipaddress
 import json
+import socket
 import threading
 import time
 from collections import deque
@@ -13,10 +22,11 @@ from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlsplit
 
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request, cookie_parser
 from starlette.responses import (
     FileResponse,
     HTMLResponse,
@@ -28,15 +38,122 @@ from starlette.responses import (
 )
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from shipdrag_ros import __version__
 from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
-from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
 from shipdrag_ros.live.headline import Tone
 from shipdrag_ros.live.source import PictureFeed
+
+COOKIE = 'shipdrag'
+_HEADERS = {
+    'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self' data:; connect-src 'self'; form-action 'self'; base-uri 'none'; "
+    "frame-ancestors 'none'",
+    'X-Content-Type-Options': 'nosniff',
+    'X-Frame-Options': 'DENY',
+    'Referrer-Policy': 'no-referrer',
+    'Cross-Origin-Opener-Policy': 'same-origin',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Permissions-Policy': 'camera=(), geolocation=(), microphone=()',
+}
+_WITHOUT_TOKEN = {'/login', '/style.css', '/login.js'}
+
+
+class Guard:
+    """
+    Lets in whom it may: a middleware around everything.
+
+    Parameters
+    ----------
+    token
+        None: nobody is asked for one.
+    """
+
+    def __init__(self, app: ASGIApp, *, token: str | None) -> None:
+        self._app = app
+        self._token = token
+        self._names = {'localhost', socket.gethostname().lower(), socket.getfqdn().lower()}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope['type'] != 'http':
+            await self._app(scope, receive, send)
+            return
+        refused = self._refused(scope)
+
+        async def send_guarded(message: Message) -> None:
+            if message['type'] == 'http.response.start':
+                headers = MutableHeaders(scope=message)
+                for name, value in _HEADERS.items():
+                    headers.setdefault(name, value)
+                headers.setdefault('Cache-Control', 'no-store')
+            await send(message)
+
+        app: ASGIApp = self._app if refused is None else refused
+        await app(scope, receive, send_guarded)
+
+    def _refused(self, scope: Scope) -> ASGIApp | None:
+        headers = Headers(scope=scope)
+        if not self._is_known(headers.get('host', '')):
+            # a name that leads here is how a page elsewhere would reach this one
+            return PlainTextResponse(
+                'This page answers to its address or the name of its machine only.\n', 421
+            )
+        if scope['method'] not in ('GET', 'HEAD') and not _is_same_origin(headers):
+            return PlainTextResponse('Asked for by another page: refused.\n', 403)
+        if self._token is None or scope['path'] in _WITHOUT_TOKEN or self._knows_token(headers):
+            return None
+        if scope['path'] == '/':
+            return RedirectResponse('/login', 303)
+        return PlainTextResponse('A token is needed: open the page and give it there.\n', 401)
+
+    def _is_known(self, host: str) -> bool:
+        name = _name_of(f'//{host}')
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return name in self._names or name.removesuffix('.local') in self._names
+        return True
+
+    def _knows_token(self, headers: Headers) -> bool:
+        assert self._token is not None
+        given = headers.get('authorization', '').removeprefix('Bearer ')
+        if given and same(given, self._token):
+            return True
+        cookie = cookie_parser(headers.get('cookie', '')).get(COOKIE, '')
+        return same(cookie, pass_of(self._token))
+
+
+def pass_of(token: str) -> str:
+    """
+    Return what a browser keeps instead of the token.
+    """
+    return hmac.new(token.encode(), b'shipdrag watch', hashlib.sha256).hexdigest()
+
+
+def same(given: str, expected: str) -> bool:
+    """
+    Compare in constant time.
+    """
+    return hmac.compare_digest(given.encode(), expected.encode())
+
+
+def _name_of(address: str) -> str:
+    try:
+        return urlsplit(address).hostname or ''
+    except ValueError:  # half a bracket
+        return ''
+
+
+def _is_same_origin(headers: Headers) -> bool:
+    origin = headers.get('origin')
+    if origin is not None:
+        return origin.partition('://')[2] == headers.get('host')
+    return headers.get('sec-fetch-site', 'same-origin') in ('same-origin', 'none')
+
 
 KEPT = 50  # frames: five seconds
 HISTORY = 'rows'  # part of a frame that adds up; all others replace what was

@@ -16,7 +16,6 @@ from typing import Any
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
     Ahead,
     PagePart,
@@ -47,6 +46,7 @@ from shipdrag_ros.live.headline import (
 from shipdrag_ros.live.outputs import (
     Curve,
     Figure,
+    PastRun,
     read_curve,
     read_forecast,
     read_path,

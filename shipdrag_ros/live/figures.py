@@ -19,10 +19,10 @@ from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
-from shipdrag_ros.forecast.path import places
+from shipdrag_ros.forecast.result import places
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
-from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure
+from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure, PastRun
+from shipdrag_ros.node.announcer import ENDED_BY
 from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
 from shipdrag_ros.ship import Ship
 
@@ -30,17 +30,7 @@ _PLACES = 7200  # kept, one a second at most
 _STEP_S = 10  # of the ship's time, between two answers to "if she were stopped now"
 _POSITIONS = [*GEODETIC, *GEODETIC.values()]
 _NOTHING_LEFT = 'she may no longer glide, or nothing is left to foretell'
-_ENDED = {
-    EndedBy.SPEED: 'she is as slow as a coastdown goes',
-    EndedBy.TURN: 'she turned',
-    EndedBy.ENGINE: 'she is driven again',
-    EndedBy.BRAKE: 'something but the water slows her',
-    EndedBy.ASTERN: 'the propeller was reversed',
-    EndedBy.DATA_STOP: 'her speed is no longer read',
-    EndedBy.SILENCE: 'all inputs are silent',
-    EndedBy.RESET: 'the node was reset',
-    EndedBy.RECORD_END: 'the record ends',
-}
+_ENDED_BY = {**ENDED_BY, EndedBy.RECORD_END: 'the record ends'}  # also of a bag that is played
 
 
 class Ahead:
@@ -138,7 +128,7 @@ class Ahead:
         Say why a forecast was withdrawn, once the coastdown has ended.
         """
         if self.forecast is not None and 'withdrawn' in self.forecast:
-            known = {each.value: text for each, text in _ENDED.items()}
+            known = {each.value: text for each, text in _ENDED_BY.items()}
             self.forecast['withdrawn'] = known.get(ended_by, ended_by)
 
     def if_stopped(

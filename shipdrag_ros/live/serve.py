@@ -11,15 +11,26 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 from types import FrameType
 from typing import Any
 
+import h11
 import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.guard import Connection
 from shipdrag_ros.live.signal_k import hello, units
+
+CONNECTIONS = 250
+ASK_S = 15.0  # a connection that asks for nothing is closed after it
+STUCK_S = 30.0  # so is one that reads nothing of what is sent
+_FULL = (
+    b'HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nRetry-After: 10\r\n'
+    b'Connection: close\r\n\r\nToo many viewers; close a page that nobody looks at.\n'
+)
+
 
 _FILES = 4096
 _BACKLOG = 4096
@@ -181,3 +192,82 @@ def _allow_files() -> None:
     wanted = _FILES if hard == resource.RLIM_INFINITY else min(_FILES, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+class Connection(H11Protocol):
+    """
+    A connection that may not wait for ever, one of not too many.
+
+    A request must be whole `ASK_S` after the connection or after the answer before it, however
+    it drips in. Where there are too many, the oldest one that still owes a request gives its
+    place to the next, so that only who asks can hold one.
+    """
+
+    _timer: asyncio.TimerHandle | None = None
+    since_s = 0.0
+
+    def connection_made(self, transport: Any) -> None:
+        """Give it a place, or refuse it where there are too many viewers."""
+        super().connection_made(transport)
+        self.since_s = monotonic()
+        self._expect_request()
+        if len(self.connections) <= CONNECTIONS:
+            return
+        waiting = [each for each in self._others() if each.owes_request]
+        min(waiting, key=lambda each: each.since_s, default=self).leave()
+
+    @property
+    def owes_request(self) -> bool:
+        """Whether no whole request has come since the last answer."""
+        return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+
+    def _others(self) -> Iterator[Connection]:
+        for each in self.connections:
+            if isinstance(each, Connection) and each is not self:
+                yield each
+
+    def leave(self) -> None:
+        """Say that there are too many, and give its place away at once."""
+        self.connections.discard(self)
+        # its request may have come already, and was not read yet: who waits for an answer gets one
+        self.transport.write(_FULL)
+        self.transport.close()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget it."""
+        self._stop_timer()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Take what is asked, unless it was refused."""
+        if not self.transport.is_closing():
+            super().data_received(data)
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request, but not for ever."""
+        super().on_response_complete()
+        self._expect_request()
+
+    def pause_writing(self) -> None:
+        """Wait for a reader who is behind, but not for ever."""
+        super().pause_writing()
+        self._stop_timer()
+        self._timer = self.loop.call_later(STUCK_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Go on: he reads again."""
+        self._expect_request()
+        super().resume_writing()
+
+    def _expect_request(self) -> None:
+        self._stop_timer()
+        self._timer = self.loop.call_later(ASK_S, self._close_if_late)
+
+    def _close_if_late(self) -> None:
+        if self.owes_request:
+            self.transport.abort()
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None

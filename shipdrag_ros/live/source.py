@@ -8,7 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from shipdrag_ros.errors import ShipdragError, reason_of
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
-from shipdrag_ros.live.earlier import PastRun
+from shipdrag_ros.live.outputs import PastRun
 from shipdrag_ros.messages.heard import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.messages.publishing import outputs
-from shipdrag_ros.node.diagnosing import Diagnosing
+from shipdrag_ros.node.background import Diagnosing
 from shipdrag_ros.node.health import InputStates, Standing, state_status
 from shipdrag_ros.node.judging import Counts, InputFacts
 from shipdrag_ros.parameters import Parameters
@@ -184,29 +184,28 @@ class Timeline:
 WAITING = 20_000  # messages heard and not yet looked at; more are dropped and counted
 
 
-class PictureFeed(Protocol):
-    """What feeds the picture."""
+class PictureFeed:
+    """What feeds the picture; one that plays something says how, and may be controlled."""
 
     bridge: Bridge
 
     def advance(self, now_s: float) -> bool:
         """Take what is new at a time [s, steady clock]; True: the picture jumps."""
-        ...
+        raise NotImplementedError
 
     def player(self) -> dict[str, Any] | None:
         """Return how it plays; None where nothing is played."""
-        ...
+        return None
 
     def control(self, action: str, value: float) -> None:
         """Play, pause, set the speed, seek."""
-        ...
+        raise ShipdragError('a running node is watched: there is nothing to play')
 
     def close(self) -> None:
         """End what it has begun."""
-        ...
 
 
-class NodeSource:
+class NodeSource(PictureFeed):
     """
     A node that runs: what a listener in another thread hears.
     """
@@ -236,19 +235,8 @@ class NodeSource:
         restarted, self.bridge.trace.restarted = self.bridge.trace.restarted, False
         return restarted
 
-    def player(self) -> dict[str, Any] | None:
-        """Nothing is played."""
-        return None
 
-    def control(self, action: str, value: float) -> None:
-        """There is nothing to control."""
-        raise ShipdragError('a running node is watched: there is nothing to play')
-
-    def close(self) -> None:
-        """Nothing was begun."""
-
-
-class BagSource:
+class BagSource(PictureFeed):
     """
     Bags that are played, one after the other.
 

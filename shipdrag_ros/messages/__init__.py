@@ -3,24 +3,19 @@
 
 from shipdrag_ros.messages.decoding import Decoded, Unreadable, decode
 from shipdrag_ros.messages.encoding import EncodedMessage, encode, input_type
-from shipdrag_ros.messages.reporting import (
-    EventKind,
-    EventNote,
-    OutputMessage,
-    event_message,
-    read_event,
-    reset_request,
-    silence_mark,
-    stop_mark,
-)
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
     OUTPUT_TOPICS,
     TOPICS,
+    EventKind,
+    EventNote,
     MatchedTopics,
+    OutputMessage,
     OutputTopic,
     Source,
+    event_message,
     match_inputs,
+    read_event,
 )
 from shipdrag_ros.messages.types import MalformedMessage
 
@@ -44,7 +39,4 @@ __all__ = [
     'input_type',
     'match_inputs',
     'read_event',
-    'reset_request',
-    'silence_mark',
-    'stop_mark',
 ]

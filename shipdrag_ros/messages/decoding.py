@@ -231,7 +231,7 @@ class _Reading:
     steps: tuple[Int64, ...]
     columns: Converted | None
     width: int
-    stamped: bool = True
+    stamped: bool
 
 
 def _table(*columns: Float64 | float) -> Float64:
@@ -317,32 +317,19 @@ def _reading(
     channel: Channel,
     type_name: str,
     *fields: str,
+    columns: Converted | None = None,
     older: str | None = None,
 ) -> tuple[Source, _Reading]:
-    """
-    Pair a source with how its two values and two variances are read.
-
-    '' is a field that the type does not have.
-    """
-    ways = [steps(type_name, fields)]
+    """Pair a source with its two values and two variances; `columns` makes them of the fields."""
+    if columns is not None:
+        fields = (*[''] * _COLUMNS, *fields)
+    ways = [steps(type_name, fields)] if fields else []  # joints are read otherwise
     if older is not None:
         ways.append(steps(older, [field for field in fields if field != 'variance']))
-    return Source(channel.input, type_name), _Reading(channel, tuple(ways), None, _COLUMNS)
-
-
-def _joints(channel: Channel) -> tuple[Source, _Reading]:
-    """Pair a source of joints with how it is read."""
-    return Source(channel.input, types.JOINT_STATE), _Reading(channel, (), None, _COLUMNS)
-
-
-def _computed(
-    channel: Channel, type_name: str, columns: Converted, *fields: str
-) -> tuple[Source, _Reading]:
-    """Pair a source with how its fields are read, and with what is made of them."""
-    behind = (*[''] * _COLUMNS, *fields)
-    way = steps(type_name, behind)
-    reading = _Reading(channel, (way,), columns, len(behind), types.is_stamped(type_name))
-    return Source(channel.input, type_name), reading
+    width, stamped = max(len(fields), _COLUMNS), types.is_stamped(type_name)
+    return Source(channel.input, type_name), _Reading(
+        channel, tuple(ways), columns, width, stamped
+    )
 
 
 @cache
@@ -366,15 +353,15 @@ def _each_reading() -> Iterator[tuple[Source, _Reading]]:
     # the twist of an odometry has the place that it has in a TwistWithCovariance
     yield _reading(speed, types.ODOMETRY, linear, '', cells[0])
     both = (linear, 'twist.twist.linear.y', *cells)
-    yield _computed(ground, types.TWIST_WITH_COVARIANCE, _magnitude, *both)
-    yield _computed(ground, types.ODOMETRY, _magnitude, *both)
-    yield _computed(ground, types.TWIST, _magnitude, x, y, '', '', '')
-    yield _computed(ground, types.VELOCITY, _magnitude, *velocity, '', '', '')
+    yield _reading(ground, types.TWIST_WITH_COVARIANCE, *both, columns=_magnitude)
+    yield _reading(ground, types.ODOMETRY, *both, columns=_magnitude)
+    yield _reading(ground, types.TWIST, x, y, '', '', '', columns=_magnitude)
+    yield _reading(ground, types.VELOCITY, *velocity, '', '', '', columns=_magnitude)
     velocity, covariance = ('velocity.x', 'velocity.y'), 'velocity_covar[{}]'.format
     mode = 'velocity_mode'
-    yield _computed(speed, types.DVL, _dvl_water, velocity[0], covariance(0), mode)
+    yield _reading(speed, types.DVL, velocity[0], covariance(0), mode, columns=_dvl_water)
     covariances = map(covariance, (0, 4, 1))
-    yield _computed(ground, types.DVL, _dvl_ground, *velocity, *covariances, mode)
+    yield _reading(ground, types.DVL, *velocity, *covariances, mode, columns=_dvl_ground)
 
     position = Channel.POSITION
     pose = ['pose.pose.position.x', 'pose.pose.position.y']
@@ -386,20 +373,20 @@ def _each_reading() -> Iterator[tuple[Source, _Reading]]:
     # the covariance is in east, north, up
     fix = ['latitude', 'longitude', 'position_covariance[4]', 'position_covariance[0]']
     fix += ['status.status', 'position_covariance_type']
-    yield _computed(Channel.POSITION_GEODETIC, types.NAV_SAT_FIX, _fix, *fix)
+    yield _reading(Channel.POSITION_GEODETIC, types.NAV_SAT_FIX, *fix, columns=_fix)
 
     quaternion = [f'quaternion.{axis}' for axis in 'xyzw']
-    yield _computed(Channel.HEADING, types.QUATERNION, _yaw, *quaternion, '')
+    yield _reading(Channel.HEADING, types.QUATERNION, *quaternion, '', columns=_yaw)
     attitude = [f'pose.orientation.{axis}' for axis in 'xyzw']
-    yield _computed(Channel.HEADING, types.POSE, _yaw, *attitude, '')
+    yield _reading(Channel.HEADING, types.POSE, *attitude, '', columns=_yaw)
     imu = [f'orientation.{axis}' for axis in 'xyzw']
     imu += [f'orientation_covariance[{i}]' for i in (8, 0)]
-    yield _computed(Channel.HEADING, types.IMU, _imu, *imu)
+    yield _reading(Channel.HEADING, types.IMU, *imu, columns=_imu)
 
-    yield _computed(Channel.HEADING, types.FLOAT64, _compass, 'data')
+    yield _reading(Channel.HEADING, types.FLOAT64, 'data', columns=_compass)
 
-    yield _joints(Channel.SHAFT)
-    yield _joints(Channel.RUDDER)
+    yield _reading(Channel.SHAFT, types.JOINT_STATE)
+    yield _reading(Channel.RUDDER, types.JOINT_STATE)
     yield _reading(Channel.WIND_APPARENT, types.TWIST, x, y)
     depth = ('range', '', 'variance')
     yield _reading(Channel.DEPTH, types.RANGE, *depth, older=types.RANGE_BEFORE_IRON)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from math import cos, inf, nan, sin
 from types import MappingProxyType
@@ -45,8 +44,7 @@ _MARKS: dict[str, tuple[str, tuple[float, ...]]] = {
 }
 
 
-@dataclass(frozen=True)
-class EncodedMessage:
+class EncodedMessage(NamedTuple):
     """An input message, ready to be written or published."""
 
     topic: str

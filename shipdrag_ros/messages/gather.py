@@ -20,37 +20,11 @@ from shipdrag_ros.messages import types
 from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64, UInt8
 
-_BYTES = {
-    'bool': 1,
-    'int8': 1,
-    'uint8': 1,
-    'int16': 2,
-    'uint16': 2,
-    'int32': 4,
-    'uint32': 4,
-    'float32': 4,
-    'float64': 8,
-}
-
-
-class Step(IntEnum):
-    """One step through the bytes, with its two operands."""
-
-    SECTION = 0  # alignment and size of what has a fixed size
-    FLOAT64 = 1  # offset in the section, column
-    FLOAT32 = 2
-    UINT8 = 3
-    INT8 = 4
-    STRING = 5
-    UNSTAMPED = 6  # the first, of a type without a header
-
-
-_TAKEN = {
-    'float64': Step.FLOAT64,
-    'float32': Step.FLOAT32,
-    'uint8': Step.UINT8,
-    'int8': Step.INT8,
-}
+# steps through the bytes, each with two operands: of a section, which has a fixed size, its
+# alignment and its size; of a number its place in the section and its column. A type without a
+# header begins with the last one.
+_SECTION, _FLOAT64, _FLOAT32, _UINT8, _INT8, _STRING, _UNSTAMPED = range(7)
+_TAKEN = {'float64': _FLOAT64, 'float32': _FLOAT32, 'uint8': _UINT8, 'int8': _INT8}
 
 
 def steps(type_name: str, fields: Sequence[str]) -> Int64:
@@ -68,12 +42,12 @@ def steps(type_name: str, fields: Sequence[str]) -> Int64:
     Returns
     -------
     (k, 3) int64
-        A `Step` and its operands a row.
+        A step and its operands a row.
     """
     column = {field: number for number, field in enumerate(fields) if field}
     listed: list[list[int]] = []
     if not types.is_stamped(type_name):
-        listed.append([Step.UNSTAMPED, 0, 0])
+        listed.append([_UNSTAMPED, 0, 0])
     section: list[int] = []  # the row of the one that is open
     for leaf in types.leaves(type_name):
         if leaf.path.startswith('header.'):
@@ -82,11 +56,11 @@ def steps(type_name: str, fields: Sequence[str]) -> Int64:
             raise ValueError(f'{type_name}: {leaf.path} is a sequence, which has no fixed place')
         if leaf.kind == 'string':
             section = []
-            listed.append([Step.STRING, 0, 0])
+            listed.append([_STRING, 0, 0])
             continue
-        size = _BYTES[leaf.kind]
+        size = np.dtype(leaf.kind).itemsize
         if not section or size > section[1]:
-            section = [Step.SECTION, size, 0]
+            section = [_SECTION, size, 0]
             listed.append(section)
         first = -(-section[2] // size) * size
         section[2] = first + size * leaf.length
@@ -110,12 +84,6 @@ class GatherResult(IntEnum):
 
 _READ = int(GatherResult.READ)
 _MALFORMED = int(GatherResult.MALFORMED)
-_SECTION = int(Step.SECTION)
-_FLOAT64 = int(Step.FLOAT64)
-_FLOAT32 = int(Step.FLOAT32)
-_UINT8 = int(Step.UINT8)
-_STRING = int(Step.STRING)
-_UNSTAMPED = int(Step.UNSTAMPED)
 COLUMNS = 4
 _VARIANCES = 2  # from this column on
 BODY = ENCAPSULATION_BYTES

@@ -70,13 +70,11 @@ class Status:
     values: Mapping[str, str]
 
     @classmethod
-    def of(
-        cls, part: str, level: int, message: str, values: Mapping[str, object], *, node: str = ''
-    ) -> Status:
+    def of(cls, part: str, level: int, message: str, values: Mapping[str, object]) -> Status:
         """
         Make a status of values of any kind.
         """
-        return cls(node, part, int(level), message, {k: _text(v) for k, v in values.items()})
+        return cls('', part, int(level), message, {k: _text(v) for k, v in values.items()})
 
     @property
     def input(self) -> str:

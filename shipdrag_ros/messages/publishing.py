@@ -24,16 +24,8 @@ from shipdrag_ros.coastdown.events import (
     WholeGlide,
 )
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast.path import PathAhead
-from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.forecast.result import Forecast, PathAhead
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.reporting import (
-    EventKind,
-    EventNote,
-    OutputMessage,
-    event_message,
-    output_message,
-)
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
     FORECAST,
@@ -41,7 +33,12 @@ from shipdrag_ros.messages.topics import (
     RESISTANCE,
     RESISTANCE_CURVE,
     SPEED,
+    EventKind,
+    EventNote,
+    OutputMessage,
     OutputTopic,
+    event_message,
+    output_message,
 )
 from shipdrag_ros.samples import Float64
 

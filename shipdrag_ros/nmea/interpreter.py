@@ -1,25 +1,150 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Lines heard live to messages of the inputs, as a driver would send them.
+Lines received live to messages of the inputs, as a driver would send them and when.
 
 A value is stamped with the time at which its line was read: the clocks of a log
 and of a GNSS receiver are not the node's. Lines that waited, as their own times show,
 are stamped that much earlier. Each input is fed by one source, so
 that two instruments of different place or scale are never mixed.
+
+Few sentences state their time. The others have that of the last one that did;
+where an input speaks several times before the next, its samples are spread
+evenly until then. Where the logger noted when it received each line, the time
+since is measured instead, on its clock.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
-from shipdrag_ros.nmea.clock import Stamped, WireClock
-from shipdrag_ros.nmea.reading import START, SentenceReader, SentenceSource, best
+from shipdrag_ros.nmea.reading import (
+    DAY_NS,
+    START,
+    Sentence,
+    SentenceReader,
+    SentenceSource,
+    SentenceTime,
+    best,
+)
 from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
+
+BEHIND_NS = SECOND_NS
+"""A line that comes later than others by more waited somewhere: it is of a backlog."""
+_MEMORY_NS = 60 * SECOND_NS  # of the least delay; a clock that was set is known after it
+
+
+class Stamped(NamedTuple):
+    """A sentence, when it was measured by the clock of its receipt, and its receipt [ns]."""
+
+    sentence: Sentence
+    stamp_ns: int
+    read_ns: int
+
+
+class WireClock:
+    """
+    Knows a backlog on a wire: lines whose own times are further back than those of others.
+
+    A line that flows is stamped with its receipt: what it states holds the delay of its
+    source, and the difference of two clocks. The least difference between receipt and stated
+    time, of the last minute or two, is that of a line that flows; what exceeds it has waited,
+    after a stall of TCP for instance. Most lines state no time. Behind a silence in which
+    one that does was due, and as long as the wire has not caught up, they are held until the
+    next that does, and are spread evenly until then.
+    """
+
+    def __init__(self) -> None:
+        self._receivers: dict[str, _Receiver] = {}
+        self._held: list[tuple[Sentence, int]] = []
+        self._read_ns = 0
+        self._stamp_ns = 0
+        self._due_ns = 0  # the next that states a time
+        self._waited = False
+        self._timed = False
+
+    def stamped(self, sentence: Sentence, read_ns: int) -> list[Stamped]:
+        """
+        Return the sentences whose time is known now, in the order of their receipt.
+
+        Parameters
+        ----------
+        sentence
+            The next one.
+        read_ns
+            When its line was read [ns since the epoch].
+        """
+        silent = read_ns - self._read_ns > BEHIND_NS and read_ns > self._due_ns
+        self._read_ns = read_ns
+        moment = sentence.time
+        if isinstance(moment, SentenceTime) and moment.trusted:
+            receiver = self._receivers.setdefault(sentence.talker, _Receiver())
+            behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
+            self._due_ns = read_ns + receiver.every_ns
+            return self._timed_by(behind_ns, sentence)
+        if not (self._timed and (self._held or self._waited or silent)):
+            self._stamp_ns = read_ns
+            return [Stamped(sentence, read_ns, read_ns)]
+        self._held.append((sentence, read_ns))
+        if 0 <= read_ns - self._held[0][1] <= BEHIND_NS:
+            return []
+        self._timed = self._waited = False  # nobody states a time any more
+        return self._released(0, read_ns)
+
+    def _timed_by(self, behind_ns: int, sentence: Sentence) -> list[Stamped]:
+        before, read_ns = self._waited, self._read_ns
+        # a backlog ends where its lines have caught up
+        self._waited = behind_ns > (BEHIND_NS // 10 if before else BEHIND_NS)
+        self._timed = True
+        stamp_ns = read_ns - behind_ns if self._waited else read_ns
+        step_ns = 0
+        if before or self._waited:
+            step_ns = max(stamp_ns - self._stamp_ns, 0) // (len(self._held) + 1)
+        return [*self._released(step_ns, stamp_ns), Stamped(sentence, stamp_ns, read_ns)]
+
+    def _released(self, step_ns: int, stamp_ns: int) -> list[Stamped]:
+        """Return what was held, so far apart since the last stamp; 0: each by its receipt."""
+        held, self._held = self._held, []
+        since_ns, self._stamp_ns = self._stamp_ns, stamp_ns
+        return [
+            Stamped(sentence, since_ns + number * step_ns if step_ns else read_ns, read_ns)
+            for number, (sentence, read_ns) in enumerate(held, 1)
+        ]
+
+
+class _Receiver:
+    """The clock of one talker beside that of the receipt; the day does not count."""
+
+    def __init__(self) -> None:
+        self.every_ns = DAY_NS  # between the last two times that it stated
+        self._least_ns: list[int] = []  # of this minute, then of the one before
+        self._since_ns = 0
+        self._stated_ns = -1
+        self._behind_ns = 0
+
+    def behind_ns(self, stated_ns: int, read_ns: int) -> int:
+        """Return how long a line that states a time of day has waited [ns]."""
+        if stated_ns == self._stated_ns:  # of the same fix, or of a clock that stands still
+            return self._behind_ns
+        if self._least_ns:
+            self.every_ns = abs(_within_a_day(stated_ns - self._stated_ns))
+        self._stated_ns = stated_ns
+        difference_ns = read_ns - stated_ns
+        if not self._least_ns or not 0 <= read_ns - self._since_ns <= _MEMORY_NS:
+            self._least_ns, self._since_ns = [difference_ns, *self._least_ns[:1]], read_ns
+        self._least_ns[0] += min(_within_a_day(difference_ns - self._least_ns[0]), 0)
+        self._behind_ns = max(_within_a_day(difference_ns - each) for each in self._least_ns)
+        return max(self._behind_ns, 0)
+
+
+def _within_a_day(difference_ns: int) -> int:
+    return (difference_ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2
+
 
 TOPIC = 'nmea'
 """Where lines are recorded as they came."""

@@ -25,7 +25,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
-from shipdrag_ros.node.compiling import Compiling
+from shipdrag_ros.node.background import Compiling
 from shipdrag_ros.node.health import InputState
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 
@@ -38,7 +38,7 @@ _LOOK = (
     '; if the engine was stopped there, `shipdrag diagnose BAG` of the recording holds all of it '
     'against the model'
 )
-_ENDED_BY = {
+ENDED_BY = {
     EndedBy.SPEED: 'the minimum speed is reached',
     EndedBy.TURN: 'the ship turned',
     EndedBy.ENGINE: 'the engine drives again, or the speed settled',
@@ -82,7 +82,7 @@ def line_of(event: Event) -> LogLine | None:
 
 def _ended(event: EndedCoastdown) -> LogLine:
     seconds = (event.end_ns - event.start_ns) * _NS
-    why = f'{event.ended_by.value}: {_ENDED_BY[event.ended_by]}'
+    why = f'{event.ended_by.value}: {ENDED_BY[event.ended_by]}'
     if event.withdrawn:
         return LogLine(f'a coastdown is refused after {duration(seconds)}: {event.failure}', True)
     text = f'a coastdown has ended after {duration(seconds)} ({why})'

@@ -21,7 +21,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import conditions
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.messages.heard import ERROR, OF_CONDITIONS, OK, WARN, Status
-from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
+from shipdrag_ros.node.background import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.judging import Finding, InputFacts, Recently, behind_others, judge
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import ALL_MOTION

@@ -158,6 +158,12 @@ TRIES = 5
 SHARE_HZ = 1000  # of one input, as of one source of NMEA; a flood takes no time from the others
 _SECOND_NS = 1_000_000_000
 _OFFSETS = 32  # readings whose clock offset is kept
+# who joins late still gets the last message
+LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 PATIENCE_S = 10.0  # a type that is subscribed has so long to show that it is sound
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
 

@@ -83,7 +83,7 @@ with uncollected():
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from shipdrag_ros.node.compiling import leave_if_compiling
+    from shipdrag_ros.node.background import leave_if_compiling
     from shipdrag_ros.node.node import CoastdownNode
 
 

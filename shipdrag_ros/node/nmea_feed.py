@@ -22,11 +22,10 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from shipdrag_ros.messages import Source, decode
+from shipdrag_ros.messages import EventKind, Source, decode
 from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN, Status
-from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
-from shipdrag_ros.nmea.live import LiveNmea, SourceCounts
+from shipdrag_ros.nmea.live import Address, LiveNmea, SourceCounts, parse_addresses
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S
@@ -184,7 +183,7 @@ class NmeaFeed:
         if before and session is not None:
             text = f'{name}: now from {who}, no longer from {before}, which sends less'
             self._node.get_logger().warning(text)
-            session.note_source(text, now_ns)
+            session.note(EventKind.SOURCE, text, now_ns)
         return used
 
     def silence(self) -> str:

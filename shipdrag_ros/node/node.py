@@ -18,7 +18,7 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -26,12 +26,18 @@ from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError, ShipFileError
-from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
+from shipdrag_ros.messages import (
+    OUTPUT_TOPICS,
+    TOPICS,
+    EventKind,
+    OutputMessage,
+    OutputTopic,
+    Source,
+)
 from shipdrag_ros.messages.heard import ERROR, Health, Status
-from shipdrag_ros.messages.reporting import diagnosis_message
+from shipdrag_ros.messages.topics import diagnosis_message
 from shipdrag_ros.node.announcer import Announcer
-from shipdrag_ros.node.compiling import Compiling
-from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
+from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.health import (
     InputState,
     InputStates,
@@ -43,7 +49,7 @@ from shipdrag_ros.node.health import (
     recording_status,
     state_status,
 )
-from shipdrag_ros.node.inputs import InputTopic, Mailbox, message_class
+from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder
@@ -60,9 +66,6 @@ LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 TURNS = 25  # of the mailbox before a tick, after a pause
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
-RELIABLE = ReliabilityPolicy.RELIABLE
-# who joins late still gets the last message
-LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class CoastdownNode(LifecycleNode):
@@ -247,7 +250,7 @@ class CoastdownNode(LifecycleNode):
         )
         if self._settings.record:
             self._recorder.start()
-        self._session.note_lifecycle('active', self._now_ns())
+        self._session.note(EventKind.LIFECYCLE, 'active', self._now_ns())
         recording = self._recorder.status()
         self.get_logger().info(f'active; {recording.text}; {recording.kept}')
         self._announcer.status(recording_status(recording))
@@ -255,7 +258,7 @@ class CoastdownNode(LifecycleNode):
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
             session, self._session = self._session, None
-            session.note_lifecycle(why, self._now_ns())
+            session.note(EventKind.LIFECYCLE, why, self._now_ns())
             session.finish()
             left = f'; {session.waiting} messages are for a replay' if session.waiting else ''
             self.get_logger().info(f'{why}; {session.recorder.status().text}{left}')
@@ -291,7 +294,11 @@ class CoastdownNode(LifecycleNode):
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        qos = LATCHED if topic.latched else QoSProfile(depth=10, reliability=RELIABLE)
+        qos = (
+            LATCHED
+            if topic.latched
+            else QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        )
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
@@ -404,7 +411,7 @@ class CoastdownNode(LifecycleNode):
             text = state.finding.text
             if (not state.fresh or state.finding.level >= ERROR) and topic.rebind(text):
                 said = f'{topic.name}: now {topic.type}; before: {text}'
-                self._session.note_source(said, now_ns)
+                self._session.note(EventKind.SOURCE, said, now_ns)
 
     @property
     def _shown_topics(self) -> list[InputTopic]:

@@ -34,20 +34,6 @@ SEGMENT_BYTES = 64 * 1024  # packed at once: a millisecond or two
 LIMIT_BYTES = 128 * 1024 * 1024
 
 
-class RawMessage(NamedTuple):
-    """
-    A message as received.
-
-    `type` is a ROS type name; `stamp_ns` is the arrival where the message was not understood.
-    """
-
-    input: str
-    type: str
-    data: bytes
-    receive_ns: int
-    stamp_ns: int
-
-
 class _Segment(NamedTuple):
     newest_ns: int
     packed: bytes
@@ -74,20 +60,20 @@ class RawRing:
         self._keep_ns = keep_ns
         self._limit_bytes = limit_bytes
         self._segments: deque[_Segment] = deque()
-        self._open: list[RawMessage] = []
+        self._open: list[EncodedMessage] = []
         self._open_bytes = 0
         self._packed_bytes = 0
         self.cut = False
 
-    def add(self, message: RawMessage) -> None:
+    def add(self, message: EncodedMessage) -> None:
         """
         Take the newest message.
         """
         self._open.append(message)
-        self._open_bytes += len(message.data)
+        self._open_bytes += len(message.payload)
         if self._open_bytes >= SEGMENT_BYTES:
             self._pack()
-            self._forget(message.receive_ns)
+            self._forget(message.log_ns)
 
     def clear(self) -> None:
         """
@@ -98,14 +84,14 @@ class RawRing:
         self._open_bytes = self._packed_bytes = 0
         self.cut = False
 
-    def __iter__(self) -> Iterator[RawMessage]:
+    def __iter__(self) -> Iterator[EncodedMessage]:
         """Give the messages of this moment, whatever is added while they are read."""
         return _unpack(tuple(self._segments), tuple(self._open))
 
     def _pack(self) -> None:
         plain = [tuple(message) for message in self._open]
         packed = zlib.compress(pickle.dumps(plain, protocol=5), level=1)
-        self._segments.append(_Segment(self._open[-1].receive_ns, packed))
+        self._segments.append(_Segment(self._open[-1].log_ns, packed))
         self._packed_bytes += len(packed)
         self._open.clear()
         self._open_bytes = 0
@@ -119,9 +105,11 @@ class RawRing:
             self._packed_bytes -= len(self._segments.popleft().packed)
 
 
-def _unpack(segments: Iterable[_Segment], behind: Iterable[RawMessage]) -> Iterator[RawMessage]:
+def _unpack(
+    segments: Iterable[_Segment], behind: Iterable[EncodedMessage]
+) -> Iterator[EncodedMessage]:
     for segment in segments:
-        yield from map(RawMessage._make, pickle.loads(zlib.decompress(segment.packed)))
+        yield from map(EncodedMessage._make, pickle.loads(zlib.decompress(segment.packed)))
     yield from behind
 
 
@@ -354,27 +342,20 @@ class Recorder:
         """
         self._ring.clear()
 
-    def input(self, message: RawMessage) -> None:
+    def input(self, message: EncodedMessage) -> None:
         """
-        Take a message as received.
+        Take a message as received, on a topic of the namespace.
         """
-        self._ring.add(message)
+        named = message._replace(topic=f'{self._namespace}/{message.topic}')
+        self._ring.add(named)
         if self._recording is not None:
-            self._recording.put(self._encoded(message))
+            self._recording.put(named)
 
     def request(self, message: OutputMessage, receive_ns: int) -> None:
         """
         Take a message of the node that a replay obeys, as it does an input.
         """
-        self._ring.add(
-            RawMessage(
-                message.topic.removeprefix(f'{self._namespace}/'),
-                message.type,
-                message.payload,
-                receive_ns,
-                message.stamp_ns,
-            )
-        )
+        self._ring.add(_caused(message, receive_ns))
         self.output(message, receive_ns)
 
     def output(self, message: OutputMessage, receive_ns: int) -> None:
@@ -382,12 +363,7 @@ class Recorder:
         Take a message of the node, caused by what arrived at `receive_ns`.
         """
         if self._recording is not None:
-            self._recording.put(
-                EncodedMessage(
-                    message.topic, message.type, message.payload, receive_ns, message.stamp_ns
-                ),
-                begins=False,
-            )
+            self._recording.put(_caused(message, receive_ns), begins=False)
 
     def removed(self) -> list[Removed]:
         """
@@ -417,13 +393,13 @@ class Recorder:
             stem=f'coastdown_{stamp}',
             attachments=self._attachments,
             limits=self._limits,
-            earlier=map(self._encoded, self._ring),
+            earlier=iter(self._ring),
             at_once=False,
         )
         return self._recording
 
-    def _encoded(self, message: RawMessage) -> EncodedMessage:
-        topic = f'{self._namespace}/{message.input}'
-        return EncodedMessage(
-            topic, message.type, message.data, message.receive_ns, message.stamp_ns
-        )
+
+def _caused(message: OutputMessage, receive_ns: int) -> EncodedMessage:
+    return EncodedMessage(
+        message.topic, message.type, message.payload, receive_ns, message.stamp_ns
+    )

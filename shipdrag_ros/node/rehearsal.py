@@ -27,6 +27,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import DEFAULT_NODE, encode, input_type
 from shipdrag_ros.messages.heard import health_of
 from shipdrag_ros.messages.topics import RESISTANCE, SPEED
+from shipdrag_ros.messages.types import stamp_ns
 from shipdrag_ros.node.inputs import message_class
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
@@ -46,16 +47,11 @@ class Player:
         Owner of the publishers.
     executor
         Spun while waiting, so that the owner hears the answers.
-    namespace
-        Of the topics, '' or `/ship`.
     """
 
-    def __init__(
-        self, node: Node, executor: SingleThreadedExecutor, *, namespace: str = ''
-    ) -> None:
+    def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
         self._node = node
         self._executor = executor
-        self._namespace = namespace
         self._topics: dict[str, Publisher] = {}
         self._clock: Publisher | None = None
 
@@ -70,14 +66,14 @@ class Player:
         """
         for code in np.unique(block.channel).tolist():
             channel = Channel(code)
-            self._publisher(f'{self._namespace}/{channel.input}', input_type(channel))
+            self._publisher(f'/{channel.input}', input_type(channel))
         self._wait_for_listeners(timeout_s)
 
     def publish(self, block: Block) -> None:
         """
         Publish samples at once, in the order of the block.
         """
-        for message in encode(block, namespace=self._namespace):
+        for message in encode(block):
             self._publisher(message.topic, message.type).publish(message.payload)
 
     def set_clock(self, time_ns: int) -> None:
@@ -258,13 +254,13 @@ class Rehearsal:
             self._ready = state.values['lifecycle'] == 'active' and not compiling
 
     def _hear_speed(self, message: Any) -> None:
-        self._speeds[_stamp_ns(message)] = message.twist.twist.linear.x
-        self._join(_stamp_ns(message))
+        self._speeds[stamp_ns(message)] = message.twist.twist.linear.x
+        self._join(stamp_ns(message))
 
     def _hear_resistance(self, message: Any) -> None:
         variance = message.accel.covariance[0]
-        self._resistances[_stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
-        self._join(_stamp_ns(message))
+        self._resistances[stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
+        self._join(stamp_ns(message))
 
     def _join(self, stamp_ns: int) -> None:
         """Report a moment once both of its figures are there, whichever came first."""
@@ -273,8 +269,3 @@ class Rehearsal:
         resistance, sigma = self._resistances.pop(stamp_ns)
         self.estimates += 1
         self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)

@@ -24,19 +24,17 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
+    EncodedMessage,
     EventKind,
     EventNote,
     OutputMessage,
     Source,
     decode,
     event_message,
-    reset_request,
-    silence_mark,
-    stop_mark,
     types,
 )
 from shipdrag_ros.messages.publishing import outputs
-from shipdrag_ros.node.recorder import RawMessage, Recorder
+from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
@@ -128,7 +126,7 @@ class Session:
         """
         arrival_ns = self.watch_clock(now_ns)
         # also what will be rejected: the bag holds what came, not what was liked
-        keep = partial(RawMessage, source.input, source.type, payload, arrival_ns)
+        keep = partial(EncodedMessage, source.input, source.type, payload, arrival_ns)
         waits = bool(self._waiting) or not self._ready()
         if waits:  # nothing compiled may be called
             self.recorder.input(keep(types.stated_stamp_ns(source.type, payload, arrival_ns)))
@@ -169,7 +167,9 @@ class Session:
         Record one message that feeds no input by itself.
         """
         arrival_ns = self.watch_clock(now_ns)
-        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, arrival_ns))
+        self.recorder.input(
+            EncodedMessage(source.input, source.type, payload, arrival_ns, arrival_ns)
+        )
 
     def watch_clock(self, now_ns: int) -> int:
         """
@@ -193,7 +193,7 @@ class Session:
         arrival_ns = self.watch_clock(now_ns)
         if self.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
             return
-        self._obey_in_replay(silence_mark(arrival_ns, reason, node=self._node), arrival_ns)
+        self._obey_in_replay(self._event(EventKind.SILENCE, reason), arrival_ns)
         self._in_turn(lambda: self._report(self.monitor.fall_silent()))
 
     def engine_stopped(self, now_ns: int) -> tuple[bool, str]:
@@ -206,7 +206,8 @@ class Session:
             Whether it is weighed, and what comes of it.
         """
         arrival_ns = self.watch_clock(now_ns)
-        self._obey_in_replay(stop_mark(arrival_ns, node=self._node), arrival_ns)
+        stopped = self._event(EventKind.ENGINE_STOPPED, 'the engine was stopped')
+        self._obey_in_replay(stopped, arrival_ns)
         if self._waiting or not self._ready():
             self._in_turn(partial(self.monitor.engine_stopped, arrival_ns))
             return True, 'recorded; it is weighed once compiled code is there'
@@ -235,12 +236,12 @@ class Session:
             self._reset(reason)
         self._note(EventKind.CLOCK_JUMP, reason)
 
-    def note_lifecycle(self, text: str, now_ns: int) -> None:
+    def note(self, kind: EventKind, text: str, now_ns: int) -> None:
         """
-        Publish and record a change of the node's own state.
+        Publish and record what happened to the node itself or to what it receives.
         """
         self.watch_clock(now_ns)
-        self._note(EventKind.LIFECYCLE, text)
+        self._note(kind, text)
 
     def note_removed(self, now_ns: int, warn: Callable[[str], object]) -> None:
         """
@@ -250,20 +251,6 @@ class Session:
         for part in self.recorder.removed():
             warn(part.text)
             self._note(EventKind.FILES, part.text)
-
-    def note_lost(self, text: str, now_ns: int) -> None:
-        """
-        Publish and record that messages were lost on their way here.
-        """
-        self.watch_clock(now_ns)
-        self._note(EventKind.MESSAGE_LOST, text)
-
-    def note_source(self, text: str, now_ns: int) -> None:
-        """
-        Publish and record that an input is fed by another source from now on.
-        """
-        self.watch_clock(now_ns)
-        self._note(EventKind.SOURCE, text)
 
     def note_diagnosis(self, message: OutputMessage, now_ns: int) -> None:
         """
@@ -291,7 +278,7 @@ class Session:
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too
         arrival_ns = self._arrival_ns
-        self._send(reset_request(arrival_ns, reason, node=self._node))
+        self._send(self._event(EventKind.RESET_REQUEST, reason))
         self.recorder.forget()
 
         def use() -> None:
@@ -307,7 +294,11 @@ class Session:
             self.recorder.request(mark, arrival_ns)
 
     def _note(self, kind: EventKind, text: str) -> None:
-        self._send(event_message(EventNote(kind, self._arrival_ns, text, {}), node=self._node))
+        self._send(self._event(kind, text))
+
+    def _event(self, kind: EventKind, text: str) -> OutputMessage:
+        """Encode what happens at the arrival of the last message."""
+        return event_message(EventNote(kind, self._arrival_ns, text), node=self._node)
 
     def _report(self, events: list[Event]) -> None:
         for event in events:

@@ -28,8 +28,8 @@ from shipdrag_ros.fields import (
     whole_number,
 )
 from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.nmea.address import FORMS as NMEA_FORMS
-from shipdrag_ros.nmea.address import parse_addresses
+from shipdrag_ros.nmea.live import FORMS as NMEA_FORMS
+from shipdrag_ros.nmea.live import parse_addresses
 from shipdrag_ros.parameters import Parameters
 
 ParameterValue = bool | int | float | str | list[float]

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -26,18 +26,13 @@ from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Sourc
 from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
 from shipdrag_ros.messages.heard import read_health as decode_health
 from shipdrag_ros.messages.topics import RESISTANCE_CURVE
-from shipdrag_ros.node.inputs import is_installed, message_class
+from shipdrag_ros.node.inputs import LATCHED, is_installed, message_class
 
 LOOK_S = 1.0
 SAID_S = 10.0  # a message that cannot be shown is said so often at most
 ANSWER_S = 5.0  # that a mark waits for the node
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
 _RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-_LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 _READINGS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
@@ -156,7 +151,7 @@ class Spectator:
                 message_class(topic.type),
                 topic.under(node),
                 lambda payload, name=topic.name: self._hear(NodeMessage(name, payload)),
-                _LATCHED if topic.latched else _RELIABLE,
+                LATCHED if topic.latched else _RELIABLE,
                 raw=True,
             )
             for topic in OUTPUT_TOPICS
@@ -166,7 +161,7 @@ class Spectator:
                 String,
                 f'{node}/ship',
                 lambda message: self._hear(ShipFile(message.data)),
-                _LATCHED,
+                LATCHED,
             )
         )
 

@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 
 from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.coastdown.events import State
+from shipdrag_ros.messages import EventKind
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.judging import convention_doubt
@@ -160,7 +161,7 @@ class Watching:
             if topic.lost > self._lost[topic.name]:
                 more, self._lost[topic.name] = topic.lost - self._lost[topic.name], topic.lost
                 text = f'{more} messages were sent and not heard, {topic.lost} so far'
-                session.note_lost(f'{topic.name}: {text}', now_ns)
+                session.note(EventKind.MESSAGE_LOST, f'{topic.name}: {text}', now_ns)
 
     def watch_clock(self, session: Session, now_ns: int) -> None:
         """

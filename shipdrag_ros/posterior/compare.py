@@ -18,16 +18,21 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from shipdrag_ros.inference import decision
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis
-from shipdrag_ros.inference.gaussian import products_of
+from shipdrag_ros.inference.decision import (
+    NONE,
+    UNKNOWN,
+    Names,
+    Sensitivity,
+    SizePosterior,
+    WeighedHypothesis,
+    named_from,
+)
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
-from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
-from shipdrag_ros.inference.linear import Families, solve, whitened_products
-from shipdrag_ros.inference.noise import whiten
+from shipdrag_ros.inference.linear import Families, products_of, solve, whitened_products
+from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.inference.sampling import Seen
-from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of

@@ -16,19 +16,18 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.inference.gaussian import substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.linear import (
     Families,
     of_family,
     solve,
+    substitute,
     whitened_products,
 )
-from shipdrag_ros.inference.noise import Noise
+from shipdrag_ros.inference.noise import Noise, NoisePosterior, Settings
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.inference.sampling import Seen
-from shipdrag_ros.inference.settings import NoisePosterior, Settings
 from shipdrag_ros.posterior.motion import damping_of, predict
 from shipdrag_ros.posterior.problem import Family, RunModel
 from shipdrag_ros.posterior.start import along_readings

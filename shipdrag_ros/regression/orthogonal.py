@@ -71,15 +71,14 @@ class TimeScale:
 @dataclass(frozen=True)
 class OrthogonalBasis:
     """
-    Polynomials h_0 .. h_{order-1}, orthogonal under weights on given times.
+    Polynomials h_0 .. h_{order-1}, orthogonal on given times.
 
     Attributes
     ----------
     columns : (order, n)
         h_j at the sample times.
-    weight : (n,)
     squared_norm : (order,)
-        sum w h_j^2.
+        sum h_j^2.
     alpha, beta : (order,)
         Of the step from h_j to h_{j+1}; the last is not used.
     correction : (order, order)
@@ -91,13 +90,12 @@ class OrthogonalBasis:
     -----
     Forsythe's recurrence on [-1, 1] as Hayes uses it (S1; Seber, Linear
     Regression Analysis): h_0 = 1, h_{j+1} = (t - alpha_j) h_j - beta_j h_{j-1},
-    alpha_j = sum w t h_j^2 / sum w h_j^2, beta_j = sum w h_j^2 / sum w h_{j-1}^2.
+    alpha_j = sum t h_j^2 / sum h_j^2, beta_j = sum h_j^2 / sum h_{j-1}^2.
     Sums are numpy's own, pairwise, not those of BLAS, which depend on the
     number of threads in the last bit.
     """
 
     columns: Float64
-    weight: Float64
     squared_norm: Float64
     alpha: Float64
     beta: Float64
@@ -105,7 +103,7 @@ class OrthogonalBasis:
     reorthogonalised: int
 
     @classmethod
-    def on(cls, time: Float64, order: int, *, weight: Float64 | None = None) -> OrthogonalBasis:
+    def on(cls, time: Float64, order: int) -> OrthogonalBasis:
         """
         Build up to `order` polynomials on the times given.
 
@@ -118,13 +116,11 @@ class OrthogonalBasis:
             Normalised times in [-1, 1], in any order, repeats allowed.
         order
             How many polynomials, at least 1.
-        weight : (n,), optional
-            Weights > 0; all 1 where not given.
 
         Returns
         -------
         OrthogonalBasis
-            Of polynomials that are orthonormal on the times, under the weights.
+            Of polynomials that are orthogonal on the times.
 
         Raises
         ------
@@ -139,7 +135,7 @@ class OrthogonalBasis:
         Examples
         --------
         >>> import numpy as np
-        >>> from shipdrag_ros.regression import OrthogonalBasis
+        >>> from shipdrag_ros.regression.orthogonal import OrthogonalBasis
         >>> time = np.linspace(-1.0, 1.0, 50)
         >>> basis = OrthogonalBasis.on(time, 3)
         >>> coefficients, _ = basis.fit(time**2)
@@ -148,7 +144,6 @@ class OrthogonalBasis:
         """
         if order < 1 or len(time) == 0:
             raise ValueError(f'{order} polynomials on {len(time)} times, expected 1 or more each')
-        w = np.ones(len(time)) if weight is None else np.asarray(weight, np.float64)
         order = min(order, len(np.unique(time)))
         columns = np.empty((order, len(time)))
         squared_norm = np.empty(order)
@@ -156,26 +151,25 @@ class OrthogonalBasis:
         correction = np.zeros((order, order))
         reorthogonalised = 0
         columns[0] = 1.0
-        weighted_square = w  # w h_j^2
-        squared_norm[0] = w.sum()
+        square = columns[0]  # h_j^2
+        squared_norm[0] = len(time)
         done = 1
         while done < order:
             j = done - 1
             h, before, norms = columns[j], columns[:done], squared_norm[:done]
-            alpha[j] = (weighted_square * time).sum() / norms[j]
+            alpha[j] = (square * time).sum() / norms[j]
             new = (time - alpha[j]) * h
             if j > 0:
                 beta[j] = norms[j] / norms[j - 1]
                 new -= beta[j] * columns[j - 1]
-            weighted = w * new
-            overlap = np.einsum('ij,j->i', before, weighted) / norms
-            weighted_square = weighted * new
-            new_norm = weighted_square.sum()
+            overlap = np.einsum('ij,j->i', before, new) / norms
+            square = new * new
+            new_norm = square.sum()
             # cosines, written without a division by a norm that may be 0
             if (overlap * overlap * norms).max() > ORTHOGONALITY_LOST**2 * new_norm:
                 new -= np.einsum('i,ij->j', overlap, before)
-                weighted_square = w * new * new
-                new_norm = weighted_square.sum()
+                square = new * new
+                new_norm = square.sum()
                 correction[done, :done] = overlap
                 reorthogonalised += 1
             # |(t - alpha) h_j|^2 = |h_{j+1}|^2 + beta |h_j|^2
@@ -186,7 +180,6 @@ class OrthogonalBasis:
             done += 1
         return cls(
             columns[:done],
-            w,
             squared_norm[:done],
             alpha[:done],
             beta[:done],
@@ -246,7 +239,7 @@ class OrthogonalBasis:
         coefficients : (order,)
             The first k of them are the fit of order k.
         sse : (order,)
-            Weighted sum of squared residuals of orders 1, 2, ..
+            Sum of squared residuals of orders 1, 2, ..
 
         Notes
         -----
@@ -256,8 +249,8 @@ class OrthogonalBasis:
         residual = values.copy()
         coefficients, sse = np.empty(self.order), np.empty(self.order)
         for j, column in enumerate(self.columns):
-            p = (self.weight * column * residual).sum() / self.squared_norm[j]
+            p = (column * residual).sum() / self.squared_norm[j]
             residual -= p * column
             coefficients[j] = p
-            sse[j] = (self.weight * residual * residual).sum()
+            sse[j] = (residual * residual).sum()
         return coefficients, sse

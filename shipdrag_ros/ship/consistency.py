@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from shipdrag_ros.ship.added_mass import MerchantAddedMass, n_r_polynomial
 from shipdrag_ros.ship.baseline import CoefficientBaseline, TableBaseline
+from shipdrag_ros.ship.sections import MerchantAddedMass, n_r_polynomial
 
 SLENDERNESS = (2.0, 15.0)  # L / V^(1/3): car to racing shell
 SLENDERNESS_MERCHANT = (4.0, 8.0)  # outside it the merchant n_r is meaningless

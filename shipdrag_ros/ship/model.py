@@ -29,7 +29,6 @@ from shipdrag_ros.fields import (
     text_of,
 )
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r_polynomial
 from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
 from shipdrag_ros.ship.consistency import (
     SLENDERNESS_MERCHANT_TRUSTED,
@@ -39,12 +38,16 @@ from shipdrag_ros.ship.consistency import (
 from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.sections import (
     GRAVITY_M_S2,
+    AddedMass,
     Air,
     Economics,
+    MerchantAddedMass,
     Propeller,
     Propulsion,
     StatedEffect,
     Water,
+    added_mass,
+    n_r_polynomial,
 )
 from shipdrag_ros.ship.term import LearntTerm, learnt_terms
 

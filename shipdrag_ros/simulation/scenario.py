@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import isfinite
 
@@ -135,7 +136,7 @@ class Turn:
         """After the lead-in."""
         return self.start_s + self.duration_s
 
-    @property
+    @cached_property
     def corners_s(self) -> tuple[float, float, float, float]:
         """Where its edges begin and end, after the lead-in."""
         half = 0.5 * self.edge_s
@@ -321,7 +322,8 @@ class Scenario:
         time = np.asarray(time_s, np.float64)
         yaw = np.full_like(time, self.heading_rad)
         for turn in self.turns:
-            yaw += turn.turned_rad(time - self.lead_in_s)
+            if turn.rate_rad_s:  # a force that goes by the time is many turns without one
+                yaw += turn.turned_rad(time - self.lead_in_s)
         return yaw
 
     def rudder(self, time_s: ArrayLike) -> Float64:

@@ -190,8 +190,9 @@ def legs_of(
         per_s = 2.0 * (late - early) / length
         share = early - 0.25 * length * per_s
         area_1_m = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg
-        legs['yaw_rate_rad_s'] += turn.rate_rad_s * share
-        legs['yaw_rate_rad_s2'] += turn.rate_rad_s * per_s
+        if turn.rate_rad_s:
+            legs['yaw_rate_rad_s'] += turn.rate_rad_s * share
+            legs['yaw_rate_rad_s2'] += turn.rate_rad_s * per_s
         legs['turning_1_m'] += area_1_m * share
         legs['turning_1_m_s'] += area_1_m * per_s
     return legs

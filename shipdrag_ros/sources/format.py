@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from functools import cached_property
-from math import isfinite
+from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -112,23 +112,21 @@ def positive(text: str) -> float:
     ImportDataError
         If it is none.
     """
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not (isfinite(value) and value > 0.0):
-        raise ImportDataError(f'{text!r}, expected a number above 0')
-    return value
+    return _number(text, 'a number above 0', lambda value: 0.0 < value < inf)
 
 
 def _depth_m(text: str) -> float:
+    return _number(text, 'a depth from 0 to 100 [m]', lambda value: 0.0 <= value < 100.0)
+
+
+def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
     try:
-        depth_m = float(text)
+        value = float(text)
     except ValueError:
-        depth_m = -1.0
-    if not 0.0 <= depth_m < 100.0:
-        raise ImportDataError(f'{text!r}, expected a depth from 0 to 100 [m]')
-    return depth_m
+        value = nan
+    if not fits(value):
+        raise ImportDataError(f'{text!r}, expected {expected}')
+    return value
 
 
 DATE = Option(
@@ -205,7 +203,7 @@ class Format(NamedTuple):
 
     name: str
     kind: str
-    about: str
+    about: str | None
     score: Callable[[Head], float]
     read: Callable[[Job, Log], ImportResult]
     options: tuple[Option, ...] = ()

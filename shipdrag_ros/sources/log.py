@@ -172,13 +172,7 @@ class Log:
         for block in self.blocks:
             bag.write_samples(block)
         for message in self.messages() if self.messages is not None else ():
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+            bag.put(message)
 
 
 def key_of(channel: Channel) -> tuple[str, str]:
@@ -290,6 +284,8 @@ class ImportResult:
 
     counted: ClassVar = ('messages', ' of their input')
     """What `backward` and `repeated` count."""
+    unused: ClassVar = 'Not used'
+    """What `not_used` lists."""
 
     @property
     def size(self) -> str:
@@ -334,11 +330,8 @@ class ImportResult:
             f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'
             for name, counts in self.not_taken.items()
         ]
-        return lines + rejected_words(self.rejected) + self._not_used()
-
-    def _not_used(self) -> list[str]:
-        """Say what states no input."""
-        return [f'Not used: {most_of(self.not_used)}'] if self.not_used else []
+        unused = [f'{self.unused}: {most_of(self.not_used)}'] if self.not_used else []
+        return lines + rejected_words(self.rejected) + unused
 
 
 def most_of(counts: Mapping[str, int] | Sequence[str]) -> str:

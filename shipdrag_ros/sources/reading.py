@@ -1,20 +1,343 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Any file as runs: a bag, a log or a table."""
+"""
+Any file as runs: a bag, a log or a table, read as a bag of it would be.
+
+Its samples are encoded and decoded again, some at a time, as those of a bag are,
+so that both give the same to the last bit and a `--remap` means the same. Several
+files of one ship are one run; a ship is nowhere twice at one time: logs that say so are
+of two, and refused.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
-from shipdrag_ros.bags.locate import is_bag
+from shipdrag_ros.bags.contents import Contents, FileChannel
+from shipdrag_ros.bags.mcap_file import BagFiles, is_bag
+from shipdrag_ros.bags.message_index import Messages
+from shipdrag_ros.bags.run import BATCH
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.messages.encoding import encode_batch
+from shipdrag_ros.samples import (
+    ABSURD_SPEED_M_S,
+    SECOND_NS,
+    Block,
+    Channel,
+    Float64,
+    Int64,
+    concatenate,
+    in_arrival_order,
+)
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Job, best_of, head_of
-from shipdrag_ros.sources.log import ImportResult
-from shipdrag_ros.sources.run import read_joined, run_of
+from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of, new_bag
+
+_APART_M = (
+    2000.0  # more than a ship is long, and more than clocks make of it that disagree a little
+)
+_METRES_PER_DEGREE = 1852.0 * 60.0
+
+
+class LogTrack:
+    """
+    Where the ship of a log was, at most once a second.
+
+    Parameters
+    ----------
+    name
+        Of the log.
+    block
+        Its samples.
+    """
+
+    def __init__(self, name: str, block: Block) -> None:
+        self.name = name
+        chosen = block[block.channel == Channel.POSITION_GEODETIC]
+        seconds, first = np.unique(chosen.stamp_ns // SECOND_NS, return_index=True)
+        self.time_ns: Int64 = seconds * SECOND_NS
+        self.degrees: Float64 = chosen.value[first]
+
+    def away_m(self, other: LogTrack) -> tuple[Float64, Int64]:
+        """
+        Return how far the other is from here when she is there, less the way between.
+
+        Parameters
+        ----------
+        other
+            With a place at least.
+
+        Returns
+        -------
+        distances, times
+            [m], beyond what a ship can sail from the nearest time of this log; [ns].
+        """
+        after = np.searchsorted(self.time_ns, other.time_ns).clip(1, len(self.time_ns) - 1)
+        before_ns = other.time_ns - self.time_ns[after - 1]
+        after_ns = self.time_ns[after] - other.time_ns
+        near = np.where(np.abs(before_ns) <= np.abs(after_ns), after - 1, after)
+        north = other.degrees[:, 0] - self.degrees[near, 0]
+        east = (other.degrees[:, 1] - self.degrees[near, 1] + 180.0) % 360.0 - 180.0
+        east *= np.cos(np.radians(other.degrees[:, 0]))
+        apart_m = np.hypot(north, east) * _METRES_PER_DEGREE
+        between_s = np.abs(other.time_ns - self.time_ns[near]) / SECOND_NS
+        return apart_m - ABSURD_SPEED_M_S * between_s, other.time_ns
+
+
+def refuse_two_ships(ways: Sequence[LogTrack]) -> None:
+    """
+    Refuse logs that hold a ship at two places at one time.
+
+    Raises
+    ------
+    ImportDataError
+        If half of the common fixes of two logs are further apart than a ship is long.
+
+    Notes
+    -----
+    Positions in metres have origins of their own and are not held against each other.
+    """
+    known = [way for way in ways if len(way.time_ns) > 1]
+    for number, one in enumerate(known):
+        for other in known[:number]:
+            away_m, times = other.away_m(one)
+            if np.median(away_m) > _APART_M:
+                at = utc(int(times[len(times) // 2]))
+                raise ImportDataError(
+                    f'{other.name!r} and {one.name!r} are {np.median(away_m) / 1000.0:.0f} km '
+                    f'apart about {at}: they are of two ships, or one clock is wrong. Read each '
+                    'by itself'
+                )
+
+
+@dataclass(frozen=True)
+class Joined:
+    """
+    What became of the files.
+
+    Attributes
+    ----------
+    log
+        What they hold together.
+    results
+        Of each file.
+    notes
+        What was left out when they were put together, a sentence each.
+    """
+
+    log: Log
+    results: list[ImportResult]
+    notes: list[str]
+
+
+def read_joined(parts: Sequence[tuple[Format, Job]]) -> Joined:
+    """
+    Read the measurements of files as one log.
+
+    Parameters
+    ----------
+    parts
+        Format and job of each file.
+
+    Raises
+    ------
+    ImportDataError
+        If nothing in one of them can be used, or they hold a ship at two places at a time.
+
+    Notes
+    -----
+    Of an input that two files hold for the same time, the first file's is taken:
+    two instruments are never mixed.
+    """
+    logs = [Log() for _ in parts]
+    results = [declared.read(job, log) for (declared, job), log in zip(parts, logs, strict=True)]
+    joined, notes = join([(job.source.name, log) for (_, job), log in zip(parts, logs)])
+    return Joined(joined, results, notes)
+
+
+def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[str]]:
+    """
+    Put logs together; what is left out is said.
+
+    Parameters
+    ----------
+    logs
+        With the name of each.
+
+    Raises
+    ------
+    ImportDataError
+        If they hold a ship at two places at a time.
+    """
+    if len(logs) == 1:
+        return logs[0][1], []
+    blocks = [_block(log) for _, log in logs]
+    names = [name for name, _ in logs]
+    refuse_two_ships([LogTrack(*each) for each in zip(names, blocks, strict=True)])
+    taken, notes = _taken(blocks, names)
+    whole = in_arrival_order(taken)
+    joined = Log()
+    about = {name: log.attachments.get(ATTACHMENT, '') for name, log in logs}
+    joined.attach(ATTACHMENT, strict_yaml.dump({'sources': about}))
+    joined.write_samples(whole)
+    return joined, notes
+
+
+def _block(log: Log) -> Block:
+    """Return all samples of a log; messages as their topics say."""
+    if log.messages is None:
+        return concatenate(log.blocks)
+    return concatenate([item for item in LogRun(log, []).inputs() if isinstance(item, Block)])
+
+
+def _taken(blocks: Sequence[Block], names: Sequence[str]) -> tuple[list[Block], list[str]]:
+    """Leave out of each block the spans that earlier ones give of the same input, and say so."""
+    covered: dict[str, list[tuple[int, int]]] = {}
+    left, notes = [], []
+    for block, name in zip(blocks, names, strict=True):
+        keep = np.ones(len(block), np.bool_)
+        own: list[tuple[str, tuple[int, int]]] = []
+        lost = set()
+        for number in np.unique(block.channel):
+            of_channel = block.channel == number
+            stamps = block.stamp_ns[of_channel]
+            name_of = Channel(number).input
+            own.append((name_of, (int(stamps.min()), int(stamps.max()))))
+            for start, end in covered.get(name_of, []):
+                if start <= stamps.max() and stamps.min() <= end:
+                    lost.add(name_of)
+                keep[of_channel & (block.stamp_ns >= start) & (block.stamp_ns <= end)] = False
+        left.append(block[keep])
+        if lost:
+            notes.append(
+                f'{name}: {", ".join(sorted(lost))} not taken for the time that an earlier file '
+                'gives it too.'
+            )
+        for name_of, span in own:
+            covered.setdefault(name_of, []).append(span)
+    return left, notes
+
+
+class LogPart:
+    """
+    A log where a run expects a file of a bag.
+
+    Parameters
+    ----------
+    log
+    path
+        What it is called.
+
+    Attributes
+    ----------
+    contents
+        Its channels, how many messages each has, and attachments.
+    span_ns
+        First and last time of arrival [ns]; None without messages.
+    indexed
+        Whether its messages are known without reading it to its end.
+    """
+
+    indexed = True
+
+    def __init__(self, log: Log, path: Path) -> None:
+        self.path = path
+        self.span_ns = log.span_ns
+        self._log = log
+        self.contents = Contents()
+        self._number = {key: number for number, key in enumerate(log.counts)}
+        for (topic, kind), number in self._number.items():
+            self.contents.channels[number] = FileChannel(topic, kind, 'cdr')
+            self.contents.counts[number] = log.counts[topic, kind]
+        for name, text in log.attachments.items():
+            self.contents.attachments[name] = text.encode()
+
+    def messages(
+        self, channels: Collection[int], *, start_ns: int = 0, end_ns: int = sys.maxsize
+    ) -> Iterator[Messages]:
+        """
+        Yield messages in order of arrival, some at a time.
+
+        Parameters
+        ----------
+        channels
+            Numbers of those to read.
+        start_ns, end_ns
+            First and last time of arrival to read [ns].
+        """
+        for found in self._all():
+            wanted = np.isin(found.channel, list(channels))
+            wanted &= (found.log_ns >= start_ns) & (found.log_ns <= end_ns)
+            if wanted.any():
+                yield found if wanted.all() else found[wanted]
+
+    def _all(self) -> Iterator[Messages]:
+        for block in self._log.blocks:
+            for first in range(0, len(block), BATCH):
+                yield self._encoded(block[first : first + BATCH])
+        stored = iter(()) if self._log.messages is None else self._log.messages()
+        for some in iter(lambda: tuple(islice(stored, BATCH)), ()):
+            ends = np.fromiter(accumulate((len(one.payload) for one in some), initial=0), np.int64)
+            yield Messages(
+                np.frombuffer(b''.join(one.payload for one in some), np.uint8),
+                np.array([one.log_ns for one in some], np.int64),
+                np.zeros(len(some), np.int64),
+                np.array([self._number[one.topic, one.type] for one in some], np.uint16),
+                ends[:-1],
+                ends[1:],
+            )
+
+    def _encoded(self, block: Block) -> Messages:
+        number = np.zeros(len(Channel), np.uint16)
+        for code in np.unique(block.channel).tolist():
+            number[code] = self._number[key_of(Channel(code))]
+        batch = encode_batch(block)
+        nowhere = np.zeros(len(block), np.int64)
+        return Messages(
+            batch.data, block.receive_ns, nowhere, number[block.channel], batch.start, batch.end
+        )
+
+
+class LogRun(Run):
+    """A run whose samples stood in logs or tables; `paths` are these."""
+
+    def __init__(
+        self, log: Log, sources: Sequence[Path], remap: Mapping[str, str] | None = None
+    ) -> None:
+        name = ', '.join(map(str, sources))
+        part = LogPart(log, Path(name))
+        super().__init__(BagFiles(name, tuple(sources)), [part], remap=remap)  # type: ignore[list-item]
+        self._sources = tuple(sources)
+        self._log = log
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files that it was made of."""
+        return self._sources
+
+    def save(self, out: Path) -> None:
+        """
+        Write the run as a bag.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        own = self._log.attachments
+        with new_bag(
+            out, {k: text for k, text in self.attachments.items() if k not in own}
+        ) as bag:
+            self._log.copy_to(bag)
 
 
 @dataclass(frozen=True)
@@ -47,8 +370,6 @@ def read_any(
     paths: Iterable[Path],
     *,
     remap: Mapping[str, str] | None = None,
-    joined: bool = False,
-    options: Mapping[str, Any] | None = None,
     show: Callable[[Understanding], None] | None = None,
 ) -> list[Run]:
     """
@@ -60,19 +381,13 @@ def read_any(
         MCAP files, rosbag2 directories, logs and tables.
     remap
         Recorded topic -> input.
-    joined
-        Whether all logs and tables are one run, as files of one instrument each
-        are; otherwise each is a run of its own.
-    options
-        Values by `format.Option.key`, such as `{'speed_unit': 'kn'}`; a format
-        takes those that it knows.
     show
         Called with what was understood of each log.
 
     Returns
     -------
     list of Run
-        First those of the bags, then those of the logs, in the order given.
+        First those of the bags, then those of the logs, each by itself, in the order given.
 
     Raises
     ------
@@ -102,33 +417,24 @@ def read_any(
     for path in map(Path, paths):
         (bags if is_bag(path) else logs).append(path)
     runs = open_runs(bags, remap=remap) if bags else []
-    groups = [logs] if joined and logs else [[path] for path in logs]
-    return runs + [_imported(group, remap, options or {}, show) for group in groups]
+    return runs + [_imported(path, remap, show) for path in logs]
 
 
 def _imported(
-    sources: Sequence[Path],
-    remap: Mapping[str, str] | None,
-    options: Mapping[str, Any],
-    show: Callable[[Understanding], None] | None,
+    path: Path, remap: Mapping[str, str] | None, show: Callable[[Understanding], None] | None
 ) -> Run:
-    parts = [
-        (each, job_of(each, source, options))
-        for source in sources
-        for each in [format_of(source, options)]
-    ]
+    declared, log = format_of(path, {}), Log()
     try:
-        found = read_joined(parts)
+        result = declared.read(Job(path), log)
     except ImportDataError as error:
         if '--' not in str(error):
             raise
         raise ImportDataError(
             f'{error} (make a bag of it with `shipdrag import`, which takes these options)'
         ) from error
-    for (declared, job), result in zip(parts, found.results, strict=True):
-        if show is not None:
-            show(Understanding(job.source, declared.kind, result))
-    return run_of(found.log, sources, remap)
+    if show is not None:
+        show(Understanding(path, declared.kind, result))
+    return LogRun(log, [path], remap)
 
 
 def format_of(source: Path, options: Mapping[str, Any]) -> Format:

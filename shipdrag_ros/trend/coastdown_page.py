@@ -27,7 +27,7 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.report.document import page_text
 from shipdrag_ros.simulation.effects import find
-from shipdrag_ros.trend import pictures
+from shipdrag_ros.trend.page import coastdown_curve
 from shipdrag_ros.trend.series import CoastdownRow
 
 _LINES = 12
@@ -175,7 +175,7 @@ def _curve(row: CoastdownRow) -> list[Section]:
     return [
         Section(
             'What she needed',
-            pictures=(pictures.coastdown_curve(row, known, _mass_kg(row)),),
+            pictures=(coastdown_curve(row, known, _mass_kg(row)),),
             tables=((caption, table),),
         )
     ]

@@ -231,7 +231,7 @@ class HullState:
         weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
         covariance = self._basis + _wander(runs.years, runs.years, *sizes)
         covariance[np.diag_indices(len(runs))] += self._noise[number] / weight
-        # hundreds of runs: LAPACK's; `inference.gaussian` is for the few unknowns of a fit
+        # hundreds of runs: LAPACK's; `inference.linear` is for the few unknowns of a fit
         factor, failed = lapack.dpotrf(covariance, lower=True)
         assert not failed, 'noise is never 0'
         half, _ = lapack.dpotri(factor, lower=True)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.display import day
+from shipdrag_ros.estimation.force import USUAL_SHARE
 from shipdrag_ros.fleet.rows import same_time
 from shipdrag_ros.samples import Float64
 
-SPEED_SHARE = 0.75  # of the speed at the stop: inside what nearly every run covers
 FIRST_MONTHS_NS = 90 * 86_400_000_000_000
 YEAR_NS = 365.25 * 86_400e9
 _ALONE_NS = YEAR_NS
@@ -148,7 +148,7 @@ def _reference_speed(
         if share >= _MOST_SHARED:
             return service, ()
     stops = [row['speed_at_stop_m_s'] for row in rows if row['speed_at_stop_m_s']]
-    wished = SPEED_SHARE * float(np.median(stops)) if stops else float(np.median(high))
+    wished = USUAL_SHARE * float(np.median(stops)) if stops else float(np.median(high))
     places = np.unique(np.concatenate([low, high, [wished]]))
     covered = np.array([np.sum((low <= place) & (place <= high)) for place in places])
     best = places[covered == covered.max()]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.display import day
-from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.fleet.store import HullEvent
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship

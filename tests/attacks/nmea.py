@@ -13,9 +13,8 @@ from pathlib import Path
 
 from pynmeagps.nmeahelpers import calc_checksum
 
-from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.nmea.interpreter import Interpreter
-from shipdrag_ros.nmea.live import WAITING_LINES, LiveNmea
+from shipdrag_ros.nmea.live import WAITING_LINES, LiveNmea, parse_addresses
 from tests.attacks.attack import Attack, check
 
 GOOD = '$HEHDT,90.0,T*18'

@@ -34,9 +34,7 @@ def test_a_bag_of_an_earlier_version_is_read_and_replayed(
     (run,) = open_runs([path])
     about = info(run)
     assert (about.software, about.warnings, about.indexed) == (version, (), True)
-    inputs = {
-        topic.topic.input: topic.topic.messages for topic in about.topics if topic.topic.input
-    }
+    inputs = {topic.input: topic.messages for topic in about.topics if topic.input}
     assert inputs == dict.fromkeys(('heading', 'position', 'shaft', 'speed_through_water'), 316)
     assert main(['replay', str(path)]) == 0
     said = ' '.join(capsys.readouterr().out.split())

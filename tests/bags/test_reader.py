@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from shipdrag_ros.bags import BagWriter, Compression, ResetMark, Run, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode, reset_request, types
+from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
 from shipdrag_ros.samples import Block, Channel, concatenate
 
 WriteBag = Callable[..., Path]
@@ -267,7 +267,9 @@ def test_resets_are_read_at_their_place(
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for i, message in enumerate(encode(block[:20])):
             if i in (5, 12):
-                mark = reset_request(message.log_ns, f'reason {i}')
+                mark = event_message(
+                    EventNote(EventKind.RESET_REQUEST, message.log_ns, f'reason {i}')
+                )
                 bag.write(mark.topic, mark.type, mark.payload, log_ns=message.log_ns, publish_ns=0)
             bag.write(
                 message.topic,
@@ -293,7 +295,7 @@ def test_resets_are_read_at_their_place(
 def test_outputs_of_two_nodes_are_told_and_not_mixed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for node in ('/a', '/b'):
-            mark = reset_request(5, 'x', node=node)
+            mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'), node=node)
             bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
     (run,) = open_runs([tmp_path / 'a.mcap'])
     assert run.node is None

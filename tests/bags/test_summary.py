@@ -17,7 +17,7 @@ from shipdrag_ros.bags import BagWriter, Compression, open_runs
 from shipdrag_ros.bags.contents import contents_of
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.run import info
-from shipdrag_ros.messages import reset_request
+from shipdrag_ros.messages import EventKind, EventNote, event_message
 from shipdrag_ros.samples import Block, Channel
 
 
@@ -35,9 +35,9 @@ def test_a_bag(write_bag: Callable[..., Path], compression: Compression) -> None
     assert told.indexed
     (topic,) = told.topics
     assert topic.rate_hz == pytest.approx(10.0)
-    assert (topic.topic.topic, topic.topic.input) == ('/shaft', 'shaft')
-    assert 'shaft' not in told.missing
-    assert len(told.missing) == 7
+    assert (topic.topic, topic.input) == ('/shaft', 'shaft')
+    assert 'shaft' not in told.missing_inputs
+    assert len(told.missing_inputs) == 7
     assert told.software == __version__
     assert told.node is None
     assert told.warnings == ()
@@ -46,7 +46,7 @@ def test_a_bag(write_bag: Callable[..., Path], compression: Compression) -> None
 def test_attachments_outputs_and_damage(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         bag.attach('ship.yaml', 'é')
-        mark = reset_request(5, 'x')
+        mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'))
         bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
     content = (tmp_path / 'a.mcap').read_bytes()
     (tmp_path / 'a.mcap').write_bytes(content[:-20])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A ship to sail with."""
+"""Bags of a ship that coasts, and of one that sails on."""
 
 from __future__ import annotations
 
@@ -8,13 +8,6 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import main
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(scope='session')
-def ship_file() -> Path:
-    return ROOT / 'config' / 'vitus_bering.yaml'
 
 
 @pytest.fixture(scope='session')

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.cli import doctor, doctor_run, main
+from shipdrag_ros.cli import demo, doctor, main
 from shipdrag_ros.cli.doctor import CheckState, findings
 
 
@@ -85,7 +85,7 @@ def test_a_node_that_fails_is_told_with_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip('rclpy')
-    monkeypatch.setattr(doctor_run, '_NODE', ('steady_s:=nonsense',))
+    monkeypatch.setattr(demo, 'TRIAL_SETTINGS', ('steady_s:=nonsense',))
     assert main(['doctor', '--run', '--out', str(tmp_path), '--json']) == 1
     found = json.loads(capsys.readouterr().out)
     assert found['works'] is False

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.fleet.events import read_events
 from shipdrag_ros.fleet.find import find
+from shipdrag_ros.fleet.store import read_events
 from shipdrag_ros.ship import RunSheet, Ship
 
 

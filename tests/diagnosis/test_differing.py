@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose, words
+from shipdrag_ros.diagnosis import CoastRun, diagnose, words
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from shipdrag_ros.diagnosis.earlier_file import read_earlier
+from shipdrag_ros.diagnosis.earlier import read_earlier
 from shipdrag_ros.errors import DiagnosisError
 
 FOULED = {'name': 'fouling', 'parameters': {'friction_factor': {'value': 0.3, 'sd': 0.04}}}

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact, stated_facts
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation

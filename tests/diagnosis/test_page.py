@@ -11,23 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import (
-    Advice,
-    Candidate,
-    CoastRun,
-    DiagnosisResult,
-    EffectEstimate,
-    Verdict,
-    diagnose,
-    pictures,
-)
+from shipdrag_ros.diagnosis import CoastRun, diagnose, pictures
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.page import write_diagnosis
-from shipdrag_ros.diagnosis.result import WeighedFact
-from shipdrag_ros.diagnosis.score import Score
-from shipdrag_ros.diagnosis.units import waiting
+from shipdrag_ros.diagnosis.result import (
+    Advice,
+    Candidate,
+    DiagnosisResult,
+    EffectEstimate,
+    WeighedFact,
+)
+from shipdrag_ros.diagnosis.tables import Score
+from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Fact, Ship

@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import DiagnosisResult, SailingRecord, Verdict, diagnose_sailing
+from shipdrag_ros.diagnosis import SailingRecord, diagnose_sailing
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 

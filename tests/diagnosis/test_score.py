@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from shipdrag_ros.diagnosis.score import Score
+from shipdrag_ros.diagnosis.tables import Score
 
 SUMMARY = {
     'seed': 7,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.speeds import stop_time_s
+from shipdrag_ros.diagnosis.context import stop_time_s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate

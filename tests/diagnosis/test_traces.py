@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship

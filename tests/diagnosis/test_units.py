@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis.units import asked
+from shipdrag_ros.diagnosis.verdict import asked
 
 
 @pytest.mark.parametrize(

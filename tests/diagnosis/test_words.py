@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Where
 from shipdrag_ros.diagnosis.words import answers, place, probability, sentence
-from shipdrag_ros.inference.decision import NONE, UNKNOWN
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})

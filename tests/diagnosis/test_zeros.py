@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import SailingRecord, Verdict, diagnose_sailing
+from shipdrag_ros.diagnosis import SailingRecord, diagnose_sailing
 from shipdrag_ros.diagnosis.zeros import stands_still
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 

@@ -10,12 +10,12 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import (
+    Motion,
     ValidRange,
     froude_max,
     resistance_curve,
     specific_resistance,
 )
-from shipdrag_ros.estimation.motion import Motion
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 
@@ -182,13 +182,15 @@ def test_valid_range_and_its_w() -> None:
         curve(FROUDE, FROUDE + 0.5 * HUMP, 0.1), resistance_m_s2=r, sigma_repeatable_m_s2=sigma
     )
     cut, whole = ValidRange.of_polynomial(hump), ValidRange.of_branch(hump)
-    assert cut.froude == (0.05, froude_max(hump)[0])
-    assert cut.by is FroudeMax.INFLECTION
-    assert whole.froude == (0.05, 0.25)
-    assert whole.by is FroudeMax.BRANCH_TOP
-    assert cut.argmax == whole.argmax == FROUDE[np.argmax(FROUDE + 0.5 * HUMP)]
+    assert cut.froude_valid == (0.05, froude_max(hump)[0])
+    assert cut.froude_max_by is FroudeMax.INFLECTION
+    assert whole.froude_valid == (0.05, 0.25)
+    assert whole.froude_max_by is FroudeMax.BRANCH_TOP
+    assert (
+        cut.froude_max_argmax == whole.froude_max_argmax == FROUDE[np.argmax(FROUDE + 0.5 * HUMP)]
+    )
     # the wide band above the cut is not in the first one
     np.testing.assert_allclose(
-        cut.max_relative_sigma, 1e-6 / r[cut.froude[1] >= FROUDE].max(), rtol=1e-14
+        cut.max_relative_sigma, 1e-6 / r[cut.froude_valid[1] >= FROUDE].max(), rtol=1e-14
     )
     np.testing.assert_allclose(whole.max_relative_sigma, 1.0 / r.max(), rtol=1e-14)

@@ -11,7 +11,7 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
-from shipdrag_ros.estimation.doubted import averaged
+from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.accuracy.several_instruments import Case, readings, score
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.estimation.doubted import averaged
+from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship

@@ -11,8 +11,8 @@ import pytest
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, NoEstimate, Update
 from shipdrag_ros.errors import EstimationError, ShipFileError
+from shipdrag_ros.estimation.estimators import shielded
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship

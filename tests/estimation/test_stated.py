@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.record import stated_weight
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.stated import stated_weight
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.fleet.events import HullEvent, read_events, write_events
+from shipdrag_ros.fleet.store import HullEvent, read_events, write_events
 
 DAY_NS = 86_400_000_000_000
 

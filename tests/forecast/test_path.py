@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.forecast.foretell import foretell
-from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import PathAhead
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Channel
 from shipdrag_ros.ship import Ship

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.gaussian import Factored, cholesky, products_of, substitute
+from shipdrag_ros.inference.linear import Factored, cholesky, products_of, substitute
 
 
 @pytest.mark.parametrize('n', [1, 128, 129, 1000])

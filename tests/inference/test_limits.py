@@ -9,8 +9,16 @@ import numpy as np
 import pytest
 from scipy.stats import halfnorm, norm
 
-from shipdrag_ros.inference.decision import NONE, WeighedHypothesis, decide, probabilities
-from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from, quantile
+from shipdrag_ros.inference.decision import (
+    NONE,
+    Sensitivity,
+    SizePosterior,
+    WeighedHypothesis,
+    decide,
+    named_from,
+    probabilities,
+    quantile,
+)
 from shipdrag_ros.parameter import half_normal, log_normal, normal
 
 

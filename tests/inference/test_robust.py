@@ -4,7 +4,7 @@
 import pytest
 from scipy.stats import norm
 
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 
 
 def test_the_median_of_normal_noise_gives_its_standard_deviation() -> None:

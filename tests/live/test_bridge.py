@@ -22,7 +22,6 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.bridge import Bridge, SpeedNow
-from shipdrag_ros.live.earlier import recorded_runs
 from shipdrag_ros.live.figures import Ahead
 from shipdrag_ros.live.headline import (
     Check,
@@ -35,7 +34,7 @@ from shipdrag_ros.live.headline import (
     shaft_check,
     wind_check,
 )
-from shipdrag_ros.live.outputs import ComingPath
+from shipdrag_ros.live.outputs import ComingPath, recorded_runs
 from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
 from shipdrag_ros.messages import EventKind, EventNote, event_message
 from shipdrag_ros.messages.heard import (

@@ -13,9 +13,8 @@ from typing import Any
 import httpx
 import pytest
 
-from shipdrag_ros.live import guard
-from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.guard import COOKIE, pass_of
+from shipdrag_ros.live import serve
+from shipdrag_ros.live.app import COOKIE, LivePage, pass_of
 from shipdrag_ros.live.source import NodeSource
 
 TOKEN = 'a token that nobody guesses'
@@ -132,8 +131,8 @@ POST = b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000\r\n\r\n
 def test_who_never_asks_holds_no_place(
     serving: Any, monkeypatch: pytest.MonkeyPatch, beginning: bytes, drips: bool
 ) -> None:
-    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
-    monkeypatch.setattr(guard, 'ASK_S', 1.5)
+    monkeypatch.setattr(serve, 'CONNECTIONS', 5)
+    monkeypatch.setattr(serve, 'ASK_S', 1.5)
     with serving(LivePage(NodeSource(), token=TOKEN)) as url:
         address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
         opened = [socket.create_connection(address) for _ in range(20)]
@@ -161,7 +160,7 @@ def closed(connection: socket.socket, *, drips: bool) -> bool:
 
 
 def test_more_viewers_than_places_are_told(serving: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
+    monkeypatch.setattr(serve, 'CONNECTIONS', 5)
     with serving(LivePage(NodeSource())) as url:
         address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
         viewers = []
@@ -183,7 +182,7 @@ def test_many_who_come_at_once_are_all_answered(
     serving: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their requests are there before the first of them is read."""
-    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
+    monkeypatch.setattr(serve, 'CONNECTIONS', 5)
     with serving(LivePage(NodeSource())) as url:
         address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
         viewers = [socket.create_connection(address, timeout=60.0) for _ in range(60)]
@@ -199,7 +198,7 @@ def test_many_who_come_at_once_are_all_answered(
 def test_a_reader_who_reads_nothing_is_let_go(
     serving: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(guard, 'STUCK_S', 0.5)
+    monkeypatch.setattr(serve, 'STUCK_S', 0.5)
     source = NodeSource()
     page = LivePage(source)
     with serving(page) as url:

@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.result import Advice
+from shipdrag_ros.diagnosis.result import Advice, Candidate, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import json_text
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.live.bridge import Bridge, verdict_part
 from shipdrag_ros.messages.heard import OK, WARN, Health, NodeMessage, Status
-from shipdrag_ros.messages.reporting import diagnosis_message
-from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
+from shipdrag_ros.messages.topics import diagnosis_message
+from shipdrag_ros.node.background import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.health import diagnosis_status
 from shipdrag_ros.parameter import Parameter
 

@@ -21,14 +21,13 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.forecast.foretell import foretell
-from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import PathAhead
 from shipdrag_ros.messages import (
     EventKind,
     EventNote,
     MalformedMessage,
     event_message,
     read_event,
-    reset_request,
 )
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.ship import Ship
@@ -215,7 +214,7 @@ def test_events_read_back(event: Any, kind: EventKind, stamp_ns: int) -> None:
 
 
 def test_a_reset_asked_for_is_not_taken_for_one_done() -> None:
-    asked = read_event(reset_request(11, 'service').payload)
+    asked = read_event(event_message(EventNote(EventKind.RESET_REQUEST, 11, 'service')).payload)
     (done,) = (read_event(m.payload) for m in outputs(Reset(11, 'service')))
     assert asked.kind is EventKind.RESET_REQUEST
     assert done.kind is EventKind.RESET

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.nmea.address import Address, Way, parse_addresses
+from shipdrag_ros.nmea.live import Address, Way, parse_addresses
 
 
 def test_each_form() -> None:

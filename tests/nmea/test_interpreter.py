@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.messages import Source, decode
-from shipdrag_ros.nmea.clock import BEHIND_NS
-from shipdrag_ros.nmea.interpreter import SETTLE_NS, SILENT_NS, Interpreter, raw_message
+from shipdrag_ros.nmea.interpreter import BEHIND_NS, SETTLE_NS, SILENT_NS, Interpreter, raw_message
 from shipdrag_ros.nmea.sentences import Mounting
 from shipdrag_ros.samples import Channel
 

@@ -16,8 +16,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.nmea import live
-from shipdrag_ros.nmea.address import parse_addresses
-from shipdrag_ros.nmea.live import LiveNmea, SourceCounts
+from shipdrag_ros.nmea.live import LiveNmea, SourceCounts, parse_addresses
 
 WITHIN_S = 120.0
 TEXT = '$HEHDT,90.0,T*18'

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import gc
+import os
 import resource
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +15,8 @@ from typing import Any
 import pytest
 import yaml
 
+from tests.node import forked
+
 START_S = 400.0  # the first start of a machine compiles the kernels
 ANSWER_S = 200.0  # of a machine that has much else to do
 READY = 'ready to estimate'
@@ -23,17 +24,18 @@ READY = 'ready to estimate'
 
 class NodeProcess:
     """
-    `coastdown_node` as a user starts it.
+    `coastdown_node` in a process of its own.
+
+    `tests/cli/test_node_verb.py` and `tests/peers` start it as a user does.
     """
 
-    def __init__(self, directory: Path, arguments: list[str]) -> None:
+    def __init__(self, directory: Path, arguments: list[str], *, fresh: bool = False) -> None:
         self._log = directory / 'node.log'
-        with self._log.open('w') as log:
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', 'shipdrag_ros.node.main', *arguments],
-                stdout=log,
-                stderr=subprocess.STDOUT,
-            )
+        self._log.touch()
+        given = (str(self._log), dict(os.environ), arguments)
+        context = forked.FRESH if fresh else forked.SERVER
+        self._process = context.Process(target=forked.run, args=given)
+        self._process.start()
 
     @property
     def log(self) -> str:
@@ -42,7 +44,7 @@ class NodeProcess:
     def wait_for_log(self, text: str) -> None:
         end = time.monotonic() + START_S
         while text not in self.log:
-            assert self._process.poll() is None, self.log
+            assert self._process.is_alive(), self.log
             assert time.monotonic() < end, f'no {text!r} in\n{self.log}'
             time.sleep(0.05)
 
@@ -55,43 +57,53 @@ class NodeProcess:
             assert time.monotonic() < end, f'no recording in {directory}'
             time.sleep(0.05)
 
-    def wait(self) -> int:
-        return self._process.wait(timeout=START_S)
+    def wait(self, within_s: float = START_S) -> int:
+        """
+        Return the exit status.
+        """
+        self._process.join(within_s)
+        assert self._process.exitcode is not None, self.log
+        return self._process.exitcode
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:
         """
         Ask for the end and return the exit status.
         """
-        self._process.send_signal(number)
-        return self._process.wait(timeout=ANSWER_S)
+        self._signal(number)
+        return self.wait(ANSWER_S)
 
     def fill_disk(self, full_bytes: int | None) -> None:
         """
         Let no file grow beyond a size, as a full disk would; None: as before.
         """
+        assert self._process.pid is not None
         _, hard = resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE)
         soft = hard if full_bytes is None else full_bytes
         resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (soft, hard))
+
+    def _signal(self, number: signal.Signals) -> None:
+        assert self._process.pid is not None
+        os.kill(self._process.pid, number)
 
     def pause(self) -> None:
         """
         Let it stand still.
         """
-        self._process.send_signal(signal.SIGSTOP)
+        self._signal(signal.SIGSTOP)
 
     def go_on(self) -> None:
         """
         Let it run again.
         """
-        self._process.send_signal(signal.SIGCONT)
+        self._signal(signal.SIGCONT)
 
     def kill(self) -> None:
         """
         End it at once, with no chance to close anything.
         """
-        if self._process.poll() is None:
+        if self._process.is_alive():
             self._process.kill()
-            self._process.wait()
+            self._process.join()
 
 
 class Peer:
@@ -263,13 +275,14 @@ StartNode = Callable[..., NodeProcess]
 
 @pytest.fixture
 def start_node(tmp_path: Path, ship_file: Path) -> Iterator[StartNode]:
-    """A function that starts a node with parameters and waits until it is up."""
+    """A function that starts a node, forked or fresh, and waits until it is up."""
     started: list[NodeProcess] = []
 
     def start(
         *arguments: str,
         up: str | None = 'ready to estimate',
         ship: bool = True,
+        fresh: bool = False,
         **parameters: object,
     ) -> NodeProcess:
         directory = tmp_path / f'node{len(started)}'
@@ -279,7 +292,8 @@ def start_node(tmp_path: Path, ship_file: Path) -> Iterator[StartNode]:
             given = {'ship_file': str(ship_file), **given}
         file = directory / 'parameters.yaml'
         file.write_text(yaml.safe_dump({'/**': {'ros__parameters': given}}))
-        node = NodeProcess(directory, ['--ros-args', '--params-file', str(file), *arguments])
+        line = ['--ros-args', '--params-file', str(file), *arguments]
+        node = NodeProcess(directory, line, fresh=fresh)
         started.append(node)
         if up is not None:
             node.wait_for_log(up)

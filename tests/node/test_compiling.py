@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from shipdrag_ros.node import compiling as compiling_module
-from shipdrag_ros.node.compiling import NAME, Compiling, leave_if_compiling
+from shipdrag_ros.node import background as compiling_module
+from shipdrag_ros.node.background import COMPILER, Compiling, leave_if_compiling
 from shipdrag_ros.parameters import Parameters
 
 
@@ -20,7 +20,7 @@ def test_compiling_is_never_waited_for_and_ends(monkeypatch: pytest.MonkeyPatch)
     assert compiling.seconds == 0.0
     compiling.begin()
     compiling.begin()  # once only
-    running = [thread for thread in threading.enumerate() if thread.name == NAME]
+    running = [thread for thread in threading.enumerate() if thread.name == COMPILER]
     assert [thread.daemon for thread in running] == [True]  # or the process could not end
     assert not compiling.done()
     go_on.set()

@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import types
-from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState, DiagnosisStatus
+from shipdrag_ros.node.background import Diagnosing, DiagnosisState, DiagnosisStatus
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import Block, Channel

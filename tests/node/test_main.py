@@ -185,7 +185,7 @@ def test_a_start_without_compiled_code_hears_records_and_ends_when_asked(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv('SHIPDRAG_CACHE_DIR', str(tmp_path / 'nothing compiled'))
-    node = start_node(up='active;')
+    node = start_node(up='active;', fresh=True)
     publisher = peer.advertise('/speed_through_water', 'geometry_msgs/msg/TwistStamped')
     peer.wait_for_listener(publisher)
     sent = [b'\x00\x01\x00\x00' + bytes([k, 0, 0, 101]) + bytes(60) for k in range(5)]

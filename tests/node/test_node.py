@@ -88,7 +88,12 @@ def test_inputs_are_recorded_by_their_own_name(
 ) -> None:
     from sensor_msgs.msg import Range
 
-    node = start_node('-r', 'depth:=/sounder/depth', '-r', '__ns:=/ship')
+    remapped = ('depth:=/sounder/depth', 'speed_through_water_2:=/log2/sped', '__ns:=/ship')
+    node = start_node(*(word for each in remapped for word in ('-r', each)))
+    # a further log that is remapped to where nobody publishes is spoken of
+    status = diagnostics.wait_for('input speed_through_water_2', 'no')
+    assert '/log2/sped' in {item.value for item in status.values}
+    assert diagnostics.of('input speed_through_water_3') is None
     publisher = peer.advertise('/sounder/depth', 'sensor_msgs/msg/Range')
     peer.wait_for_listener(publisher)
     diagnostics.wait_for('input depth', '1', value='publishers')
@@ -98,9 +103,11 @@ def test_inputs_are_recorded_by_their_own_name(
     assert topics_in(the_bag(tmp_path))['/ship/depth'] == 1
 
 
-def test_a_further_log_is_spoken_of_where_somebody_publishes_it(
+def test_a_further_log_is_spoken_of_where_somebody_publishes_it_and_a_heading_in_degrees_counts(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
+    from std_msgs.msg import Float64
+
     node = start_node()
     diagnostics.wait_for('input depth', 'no')
     assert diagnostics.of('input speed_through_water_2') is None
@@ -110,17 +117,22 @@ def test_a_further_log_is_spoken_of_where_somebody_publishes_it(
         publisher.publish(message.payload)
     diagnostics.wait_for('input speed_through_water_2', '5', value='used')
     assert diagnostics.of('input speed_through_water_3') is None
-    node.stop()
+
+    publisher = peer.advertise('/heading', 'std_msgs/msg/Float64')
+    peer.wait_for_listener(publisher)
+    for degrees in (90.0, 91.0, 92.0):
+        publisher.publish(Float64(data=degrees))
+        peer.spin_for(0.05)
+    status = diagnostics.wait_for('input heading', '3', value='used')
+    assert status.level == b'\x00'
+    assert status.message == 'receiving; its type holds no time: it counts from its arrival'
+    values = {item.key: item.value for item in status.values}
+    assert values['type'] == 'std_msgs/msg/Float64'
+    assert values['clock offset [s]'] == 'none'
+    assert node.stop() == 0
     assert topics_in(the_bag(tmp_path))['/speed_through_water_2'] == 5
-
-
-def test_a_further_log_that_is_remapped_to_where_nobody_publishes_is_spoken_of(
-    start_node: Any, diagnostics: Any
-) -> None:
-    start_node('-r', 'speed_through_water_2:=/log2/sped', '-r', '__ns:=/ship')
-    status = diagnostics.wait_for('input speed_through_water_2', 'no')
-    assert '/log2/sped' in {item.value for item in status.values}
-    assert diagnostics.of('input speed_through_water_3') is None
+    (run,) = open_runs([the_bag(tmp_path)])
+    assert replay(run).inputs['heading'].used == 3
 
 
 def test_hears_a_publisher_of_any_quality_of_service(
@@ -170,28 +182,6 @@ def test_reports_why_an_input_is_silent(start_node: Any, peer: Any, diagnostics:
     finally:
         other.close()
     assert 'also published as geometry_msgs/msg/TwistStamped' in status.message
-
-
-def test_a_heading_in_degrees_counts_from_its_arrival(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
-    from std_msgs.msg import Float64
-
-    node = start_node()
-    publisher = peer.advertise('/heading', 'std_msgs/msg/Float64')
-    peer.wait_for_listener(publisher)
-    for degrees in (90.0, 91.0, 92.0):
-        publisher.publish(Float64(data=degrees))
-        peer.spin_for(0.05)
-    status = diagnostics.wait_for('input heading', '3', value='used')
-    assert status.level == b'\x00'
-    assert status.message == 'receiving; its type holds no time: it counts from its arrival'
-    values = {item.key: item.value for item in status.values}
-    assert values['type'] == 'std_msgs/msg/Float64'
-    assert values['clock offset [s]'] == 'none'
-    assert node.stop() == 0
-    (run,) = open_runs([the_bag(tmp_path)])
-    assert replay(run).inputs['heading'].used == 3
 
 
 def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(

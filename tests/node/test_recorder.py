@@ -19,13 +19,18 @@ from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import EventKind, EventNote, OutputMessage, event_message
+from shipdrag_ros.messages import (
+    EncodedMessage,
+    EventKind,
+    EventNote,
+    OutputMessage,
+    event_message,
+)
 from shipdrag_ros.messages.heard import WARN
 from shipdrag_ros.node.health import recording_status
 from shipdrag_ros.node.recorder import (
     DEFAULT_LIMITS,
     EVERYTHING,
-    RawMessage,
     Recorder,
     RecordingState,
 )
@@ -51,8 +56,8 @@ def recorder(
     )
 
 
-def received(arrival_ns: int) -> RawMessage:
-    return RawMessage('depth', 'sensor_msgs/msg/Range', b'as received', arrival_ns, 5)
+def received(arrival_ns: int) -> EncodedMessage:
+    return EncodedMessage('depth', 'sensor_msgs/msg/Range', b'as received', arrival_ns, 5)
 
 
 def sent(stamp_ns: int) -> OutputMessage:

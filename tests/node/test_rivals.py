@@ -178,45 +178,35 @@ def test_a_flood_on_one_input_delays_no_other(
     assert flooded_s.max() < 2.0 + 10.0 * before_s.max()
 
 
-def test_a_node_of_the_same_name_is_said(start_node: Any, peer: Any, diagnostics: Any) -> None:
-    start_node()
+def test_odd_requests_are_refused_and_a_node_of_the_same_name_is_said(
+    start_node: Any, peer: Any, diagnostics: Any
+) -> None:
+    from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+    from rclpy.parameter import Parameter as Value
+
+    def asked(verb: str, service: Any, **content: Any) -> Any:
+        request = service.Request(**content)
+        answer = peer.call(f'/coastdown_node/{verb}_parameters', request, service)
+        assert peer.state() == 'active'
+        return answer
+
+    node = start_node()
+    # a giant is refused: not one of 300 000 is looked up
+    assert len(asked('get', GetParameters, names=['window_s'] * 300_000).values) == 0
+    found = asked('describe', DescribeParameters, names=['window_s'] * 300_000)
+    assert len(found.descriptors) == 0
+    many = [Value('window_s', value=900.0).to_parameter_msg()] * 30_000
+    found = asked('set', SetParameters, parameters=many)
+    assert len(found.results) == 1000
+    assert 'more than 1000 entries' in found.results[0].reason
+    # control characters do not reach the terminal
+    assert not peer.change_state('\x1b]0;owned\x07')
+    node.wait_for_log('transition refused')
+    assert '\x1b]' not in node.log
+    assert '\x07' not in node.log
     namesake = type(peer)('coastdown_node')
     try:
         status = diagnostics.wait_for('state', '2 nodes have the name of this one')
         assert status.level >= b'\x01'
     finally:
         namesake.close()
-
-
-def test_control_characters_of_a_peer_do_not_reach_the_terminal(
-    start_node: Any, peer: Any
-) -> None:
-    node = start_node()
-    assert not peer.change_state('\x1b]0;owned\x07')
-    node.wait_for_log('transition refused')
-    assert '\x1b]' not in node.log
-    assert '\x07' not in node.log
-
-
-@pytest.mark.parametrize('kind', ['SetParameters', 'GetParameters', 'DescribeParameters'])
-def test_a_giant_request_is_refused_and_others_are_answered(
-    start_node: Any, peer: Any, kind: str
-) -> None:
-    import rcl_interfaces.srv as services
-    from rclpy.parameter import Parameter as Value
-
-    start_node()
-    service = getattr(services, kind)
-    request = service.Request()
-    if kind == 'SetParameters':
-        request.parameters = [Value('window_s', value=900.0).to_parameter_msg()] * 30_000
-    else:
-        request.names = ['window_s'] * 300_000
-    words = {'SetParameters': 'set', 'GetParameters': 'get', 'DescribeParameters': 'describe'}
-    answer = peer.call(f'/coastdown_node/{words[kind]}_parameters', request, service)
-    if kind == 'SetParameters':
-        assert len(answer.results) == 1000
-        assert 'more than 1000 entries' in answer.results[0].reason
-    else:  # refused: not one of 300 000 was looked up
-        assert len(getattr(answer, 'values', getattr(answer, 'descriptors', None))) == 0
-    assert peer.state() == 'active'

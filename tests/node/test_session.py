@@ -172,7 +172,7 @@ def test_what_is_not_understood_is_recorded_too(desk: Desk) -> None:
 
 
 def test_every_output_is_recorded_as_published(desk: Desk) -> None:
-    desk.session.note_lifecycle('active', START_NS)
+    desk.session.note(EventKind.LIFECYCLE, 'active', START_NS)
     desk.session.reset('asked for', START_NS)
     desk.feed(speeds([0]))
     (bag,) = desk.bags()
@@ -181,7 +181,7 @@ def test_every_output_is_recorded_as_published(desk: Desk) -> None:
 
 
 def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
-    desk.session.note_lifecycle('active', 0)
+    desk.session.note(EventKind.LIFECYCLE, 'active', 0)
     assert desk.kinds() == [EventKind.LIFECYCLE]
     desk.feed(speeds([0]))
     (bag,) = desk.bags()

@@ -8,11 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.gaussian import products_of
-from shipdrag_ros.inference.linear import Families, of_family, whitened_products
-from shipdrag_ros.inference.noise import WHITE, Noise, whiten
+from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
+from shipdrag_ros.inference.noise import WHITE, Noise, Settings, whiten
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.inference.settings import Settings
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict

@@ -14,11 +14,13 @@ from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Event
 from shipdrag_ros.messages import (
     EncodedMessage,
+    EventKind,
+    EventNote,
     OutputMessage,
     Source,
     decode,
     encode,
-    reset_request,
+    event_message,
 )
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
@@ -81,7 +83,9 @@ class Live:
         self.report(self.monitor.update(block), message.log_ns)
 
     def reset(self, now_ns: int) -> None:
-        self.write_output(reset_request(now_ns, 'service'), now_ns)
+        self.write_output(
+            event_message(EventNote(EventKind.RESET_REQUEST, now_ns, 'service')), now_ns
+        )
         self.report(self.monitor.reset(now_ns, 'service'), now_ns)
 
     def stop(self, now_ns: int, *, finish: bool = True) -> None:

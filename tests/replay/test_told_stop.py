@@ -15,7 +15,7 @@ from shipdrag_ros.bags import StopMark, open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import Event
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode, stop_mark
+from shipdrag_ros.messages import EventKind, EventNote, encode, event_message
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
@@ -103,7 +103,8 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
     for message in messages[:at]:
         session.receive(message)
     now_ns = messages[at - 1].log_ns
-    session.write_output(stop_mark(now_ns), now_ns)
+    told = EventNote(EventKind.ENGINE_STOPPED, now_ns, 'the engine was stopped')
+    session.write_output(event_message(told), now_ns)
     assert session.monitor.engine_stopped(now_ns) == ''
     for message in messages[at:]:
         session.receive(message)

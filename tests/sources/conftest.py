@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A ship to sail with."""
+"""A log made a bag."""
 
 from __future__ import annotations
 
@@ -7,16 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from shipdrag_ros.sources.log import Log, new_bag
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(scope='session')
-def ship_file() -> Path:
-    return ROOT / 'config' / 'vitus_bering.yaml'
 
 
 def into_bag(read: Callable[..., Any], source: Path, out: Path, *args: Any, **options: Any) -> Any:

@@ -13,12 +13,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import best_of, head_of
-from shipdrag_ros.sources.reading import Understanding, read_any
+from shipdrag_ros.sources.reading import (
+    LogRun,
+    Understanding,
+    format_of,
+    job_of,
+    read_any,
+    read_joined,
+)
 from tests.sources import log_samples as made
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,7 +61,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def block_of(*paths: Path, **options: object) -> Block:
     """Read the samples of logs as one run."""
-    (run,) = read_any(paths, joined=True, options=options)
+    if is_bag(paths[0]):
+        (run,) = read_any(paths)
+        return concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    chosen = [(format_of(path, options), path) for path in paths]
+    found = read_joined([(each, job_of(each, path, options)) for each, path in chosen])
+    run = LogRun(found.log, paths)
     return concatenate([part for part in run.inputs() if isinstance(part, Block)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import DataError, ImportDataError
-from shipdrag_ros.sources.numbers import read_numbers
+from shipdrag_ros.sources.table import read_numbers
 
 
 @pytest.mark.parametrize('mark', [',', ';', '\t'])

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.fleet.store import HullEvent
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import export, fleet_trends, words
-from shipdrag_ros.trend.pictures import draw_added_resistance
+from shipdrag_ros.trend.page import draw_added_resistance
 
 START_NS = 1_700_000_000_000_000_000
 DAY_NS = 86_400_000_000_000

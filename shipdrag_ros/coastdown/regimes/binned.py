@@ -27,7 +27,7 @@ from shipdrag_ros.coastdown.regimes.state import (
 )
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
+from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import FURTHER, MOTION_INPUTS, SECOND_NS, Float64
 

@@ -1,13 +1,354 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator of the one posterior (docs/model.md), live and final."""
+"""
+The estimator of the one posterior (docs/model.md), live and final.
 
-from shipdrag_ros.estimation.estimator import Estimator
-from shipdrag_ros.estimation.one import NAME, estimate, estimate_live
+An adapter: a window becomes rows and a prior of the stop, the posterior becomes an estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import AtEnd, ValidRange
+from shipdrag_ros.estimation.estimators import Estimator
+from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.run_down import RunDown
+from shipdrag_ros.estimation.steady import block_medians
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import motion
+from shipdrag_ros.posterior.laplace import RunPosterior, infer
+from shipdrag_ros.posterior.problem import RunModel, StopPrior
+from shipdrag_ros.posterior.readout import ReadOut, read
+from shipdrag_ros.posterior.rows import condense
+from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+NAME = 'one'
+_CURVE_POINTS = 129
+_WIND_POINTS = 25
+
+
+_LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
+_ABOVE = 1.05  # of the highest median: she was hardly faster
+_BLOCKS, _BLOCKS_OF_SPEED = 12, 48  # whose medians outliers do not reach
+
+
+@dataclass(frozen=True)
+class InitialGuess:
+    """
+    Purely quadratic drag.
+
+    Attributes
+    ----------
+    speed_m_s
+        At time 0.
+    quadratic_1_m
+        r / v^2.
+    lowest
+        Speed at the end over that at the start.
+    seen : (2, b)
+        Times and median speeds of parts of the record.
+    """
+
+    speed_m_s: float
+    quadratic_1_m: float
+    lowest: float
+    seen: Float64
+
+    @classmethod
+    def of(cls, coast: Rows, n_r: float) -> InitialGuess:
+        """
+        Fit a line through 1/v.
+
+        Raises
+        ------
+        EstimationError
+            If the ship does not slow down.
+        """
+        code = min(np.unique(coast.kind).tolist(), key=lambda code: (code % KIND_COUNT, code))
+        kind, chosen = code % KIND_COUNT, coast.kind == code
+        time_s, value = coast.time_s[chosen], coast.value[chosen]
+        blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
+        count = min(blocks, len(time_s) // 4)
+        edges = np.linspace(0.0, len(time_s), count + 1).astype(np.int64)
+        when, speed = block_medians(time_s, edges), block_medians(value, edges)
+        if kind == POSITION:
+            speed = np.diff(speed) / np.diff(when)
+            when = 0.5 * (when[1:] + when[:-1])
+        top = float(speed.max())
+        if not top > 0.0:
+            raise EstimationError(
+                f'the speed in the window is {top:.3g} m/s at most: give a window that lies in '
+                'a coastdown'
+            )
+        inverse = 1.0 / np.maximum(speed, 0.05 * top)
+        # 1/v = 1/v0 + c t / (1 + n_r); relative errors of v count alike
+        weight = 1.0 / inverse**2
+        mean_t, mean = np.average(when, weights=weight), np.average(inverse, weights=weight)
+        t = when - mean_t
+        slope = float((weight * t * (inverse - mean)).sum() / (weight * t * t).sum())
+        if not slope * float(np.ptp(time_s)) > _LEAST_LOSS * mean:
+            raise EstimationError(
+                f'no deceleration in {np.ptp(time_s):.4g} s: give a longer window, or one after '
+                'the engine stop'
+            )
+        first = mean - slope * mean_t
+        v0 = min(1.0 / first, _ABOVE * top) if first > 0.0 else _ABOVE * top
+        return cls(
+            float(v0),
+            slope * (1.0 + n_r),
+            float(np.clip(speed[-1] / v0, 0.05, 0.9)),
+            np.stack([when, speed]),
+        )
+
+
+def estimate(
+    window: Window, ship: Ship, parameters: Parameters, *, quick: bool = False
+) -> Estimate:
+    """
+    Estimate r(v) from one window.
+
+    Parameters
+    ----------
+    window
+        Accepted samples, with the steady record `before` it.
+    ship
+        For the law of the hull, n_r and the run-down of the thrust.
+    parameters
+        `froude_min` and the known standard deviations are used.
+    quick
+        Whether times of the noise are the usual ones, and its sizes averaged over fewer settings.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    Source: docs/model.md.
+    """
+    run_down = RunDown.of(window, ship)
+    record = RunRows.of(window, run_down, parameters)
+    guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
+    halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
+    white = record.variance(record.coast, record.coast_weight)
+    coast, variance = condense(record.coast, white, guess.speed_m_s, halved_s, quick=quick)
+    steady = record.steady
+    weather = _weather(window, run_down, guess.seen)
+    problem = RunModel.of(
+        Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
+        np.concatenate([record.steady_variance(), variance]),
+        len(steady.time_s),
+        ship,
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
+        speed_m_s=guess.speed_m_s,
+        low_m_s=guess.lowest * guess.speed_m_s,
+        weather=weather,
+    )
+    found = infer(problem, guess.seen, quick=quick)
+    reference = weather.reference(ship)
+    notes = (*record.notes, *run_down.notes, *_notes(found, record))
+    return _result(found, record, window, ship, parameters, reference, notes)
+
+
+def _weather(window: Window, run_down: RunDown, seen: Float64) -> Weather:
+    """Return wind and depth as they are measured in a window."""
+    depth = window.depth.value
+    depth_m = float(np.median(depth)) if len(depth) >= LEAST_STAMPS else None
+    air = window.wind_apparent
+    if len(air) < LEAST_STAMPS:
+        return Weather(None, depth_m)
+    time_s = (air.time_ns - run_down.stop_ns) * 1e-9
+    against = np.stack([-air.value[:, 0] - np.interp(time_s, *seen), air.value[:, 1]])
+    # a wind that changes evenly in time, at the speeds that she has meanwhile
+    about = float(time_s.mean())
+    even = np.stack([np.ones(len(time_s)), (time_s - about) / max(float(np.ptp(time_s)), 1e-9)])
+    fitted = np.linalg.solve(even @ even.T, even @ against.T)
+    when = np.linspace(0.0, float(time_s[-1]), _WIND_POINTS)
+    changed = np.stack([np.ones(_WIND_POINTS), (when - about) / float(np.ptp(time_s))])
+    head, cross = (changed.T @ fitted).T[:, ::-1]
+    speed = np.maximum.accumulate(np.interp(when, *seen)[::-1])
+    return Weather(MeasuredWind(speed, head, cross), depth_m)
+
+
+def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
+    """Yield what else the figure rests on."""
+    problem, k = found.problem, found.problem.coefficients
+    chances = ', '.join(
+        f'{name} {found.chance(name):.2g}'
+        for name in dict.fromkeys(each.name for each in problem.families)
+    )
+    yield f'averaged over what the hull may differ by: {chances}'
+    sd = np.sqrt(np.diag(found.covariance))
+    logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
+    for name, code in logs.items() if len(record.stamps) > 1 else ():
+        at = k + motion.own(code) + motion.SCALE
+        which = 'log' if len(logs) == 1 else f'log {name}'
+        yield _log_scale_note(float(found.mean[at]), float(sd[at]), which)
+    if not logs:
+        yield (
+            f'a current is part of the speed: one of ± {2.0 * sd[k + motion.CURRENT]:.2g} m/s '
+            '(two standard deviations) is in the band'
+        )
+    if not found.noise.learnt:
+        yield (
+            'the record is too short to learn slow disturbances from: the band holds usual ones'
+        )
+        return
+    slow = found.noise.slow
+    sizes = [f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s']
+    if slow.log_m_s:
+        sizes.append(f'the speed readings by {slow.log_m_s:.2g} m/s over {slow.log_s:.0f} s')
+    if slow.place_m:
+        sizes.append(f'positions by {slow.place_m:.2g} m over {slow.place_s:.0f} s')
+    if slow.water_m_s:
+        sizes.append(f'the water by {slow.water_m_s:.2g} m/s over {slow.water_s:.0f} s')
+    yield (
+        f'slow disturbances learnt, averaged over {len(found.noise.settings.weight)} settings: '
+        f'about {", ".join(sizes)}'
+    )
+
+
+def _log_scale_note(scale: float, sd: float, which: str) -> str:
+    """Say by how much a log is off, and that the band holds it."""
+    return (
+        f'the {which} reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
+        'deviations): taken out, and in the band'
+    )
+
+
+def _result(
+    found: RunPosterior,
+    record: RunRows,
+    window: Window,
+    ship: Ship,
+    parameters: Parameters,
+    reference: Reference,
+    notes: tuple[str, ...],
+) -> Estimate:
+    problem, k = found.problem, found.problem.coefficients
+    coast = record.coast
+    table, speed = motion.predict(problem.forces, found.mean, problem.grid_s, coast)
+    last = float(speed[-1])
+    low = max(last, float(ship.speed(parameters.froude_min)))
+    high = float(found.mean[k + motion.SPEED])
+    if not high > low * 1.02:
+        raise EstimationError(
+            f'the fitted speed falls from {high:.4g} to {low:.4g} m/s only, above froude_min '
+            f'{parameters.froude_min:g}: give a window that lies in a coastdown, or a smaller '
+            'froude_min'
+        )
+    grid = np.linspace(low, high, _CURVE_POINTS)
+    part = read(found, grid, calm=False)
+    use = _slowing(part)
+    conditions = _curve(part, use, ship)
+    part = read(found, grid, calm=True)
+    calm = _curve(part, use, ship)
+    curve = conditions if reference.unknown else calm
+    stamps = np.concatenate(list(record.stamps.values()))
+    tracks = {}
+    for name, times in record.stamps.items():
+        chosen = coast.kind == CODES[name]
+        measured = coast.value[chosen]
+        tracks[name] = Track(times, measured, measured - table[0, chosen])
+    over_ground = any(CODES[name] % KIND_COUNT != LOG for name in record.stamps)
+    current = k + motion.CURRENT
+    return Estimate(
+        NAME,
+        **ValidRange.of_branch(curve)._asdict(),
+        **_at_end(found, coast, last, calm=not reference.unknown)._asdict(),
+        calm=calm,
+        conditions=conditions,
+        reference=reference,
+        sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
+        start_ns=int(stamps.min()),
+        end_ns=int(stamps.max()),
+        order=None,
+        orders=(),
+        samples={name: len(times) for name, times in record.stamps.items()},
+        noise_sd=dict(record.white_sd),
+        tracks=tracks,
+        current_m_s=float(found.mean[current]) if over_ground else None,
+        current_sigma_m_s=float(np.sqrt(found.covariance[current, current]))
+        if over_ground
+        else None,
+        notes=(*window.notes, *ship.warnings, *notes),
+    )
+
+
+def _slowing(part: ReadOut) -> slice:
+    """Return where the force slows the ship."""
+    grid = part.speed_m_s
+    driving = np.flatnonzero(part.resistance_m_s2 <= 0.0)
+    use = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
+    if len(grid[use]) < 3:
+        raise EstimationError(
+            f'the fitted force nowhere slows the ship from {grid[-1]:.4g} to {grid[0]:.4g} m/s: '
+            'give a window in which she coasts'
+        )
+    return use
+
+
+def _of_n_r(part: ReadOut, ship: Ship) -> Float64:
+    """Return what n_r adds to sigma."""
+    found = part.parts_m_s2['n_r']
+    if found.any():
+        return found
+    # where the file states retardations, n_r is no unknown of the motion
+    inertia = 1.0 + ship.n_r(part.speed_m_s)
+    return np.abs(part.resistance_m_s2) / inertia * ship.added_mass.sd
+
+
+def _parts(part: ReadOut, ship: Ship) -> dict[str, Float64]:
+    return part.parts_m_s2 | {'n_r': _of_n_r(part, ship)}
+
+
+def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
+    """Return r(v) over a part of the speeds."""
+    per_froude = float(ship.speed(1.0))
+    return ResistanceCurve(
+        part.speed_m_s[use].copy(),
+        part.resistance_m_s2[use],
+        np.hypot(part.repeatable_m_s2, _of_n_r(part, ship))[use],
+        part.repeatable_m_s2[use],
+        ship.froude(part.speed_m_s[use]),
+        per_froude * part.slope_1_s[use],
+        per_froude * part.slope_sigma_1_s[use],
+    )
+
+
+def _at_end(found: RunPosterior, coast: Rows, last: float, *, calm: bool) -> AtEnd:
+    """Return speed and r at the end of the window."""
+    problem, k = found.problem, found.problem.coefficients
+    at_end = read(found, np.array([last]), calm=calm)
+    row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
+    now = found.mean.copy()
+    now[k + motion.SCALE :] = 0.0  # the speed itself, not the log
+    by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
+    by[1 + k + motion.SCALE :] = 0.0
+    speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    return AtEnd(
+        last,
+        speed_sd,
+        float(at_end.resistance_m_s2[0]),
+        float(at_end.sigma_m_s2[0]),
+    )
+
 
 ESTIMATOR = Estimator(
     name=NAME,
     meaning='one posterior of hull, thrust, instruments and noise',
     estimate=estimate,
-    live=estimate_live,
+    live=partial(estimate, quick=True),
     learns_noise=True,
 )

@@ -8,21 +8,20 @@ random numbers, no clock, and sums that do not depend on the number of threads.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.assemble import AtEnd, assembled
-from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
+from shipdrag_ros.estimation.curve import AtEnd, ValidRange, resistance_curve
 from shipdrag_ros.estimation.distance import along_track
+from shipdrag_ros.estimation.estimators import Estimator
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
     ScalarInput,
     Solution,
     solve_joint,
-    solve_position,
-    solve_speed,
+    solve_one,
 )
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
@@ -50,20 +49,6 @@ PROBLEMS = {
 }
 
 
-@dataclass(frozen=True)
-class _Offered:
-    """What the window offers, and which problem it is for."""
-
-    estimator: str
-    speed: ScalarInput | None
-    position: ScalarInput | None
-    notes: tuple[str, ...]
-
-    @property
-    def used(self) -> tuple[ScalarInput, ...]:
-        return tuple(data for data in (self.speed, self.position) if data is not None)
-
-
 def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     """
     Estimate r(v) from one window.
@@ -89,55 +74,56 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     repeatable sigma, which is S1's.
     """
     window = window.one_of_each()
-    inputs = _inputs(window, parameters)
-    solution = _solve(inputs)
-    _check_deceleration(inputs, solution)
-    motion = solution.fit.motion(_GRID)
+    inputs, notes = _inputs(window, parameters)
+    solution = solve_joint(*inputs) if len(inputs) > 1 else solve_one(*inputs)
+    fit = solution.fit
+    _check_deceleration(parameters.estimator, solution)
+    motion = fit.motion(_GRID)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
-    valid = ValidRange.of_polynomial(curve)
-    scale = solution.fit.scale
-    return assembled(
-        inputs.estimator,
-        valid,
-        AtEnd.of(motion, ship),
+    return Estimate(
+        parameters.estimator,
+        **ValidRange.of_polynomial(curve)._asdict(),
+        **AtEnd.of(motion, ship)._asdict(),
         calm=curve,
         conditions=curve,
-        start_ns=scale.first_ns,
-        end_ns=scale.first_ns + scale.span_ns,
+        start_ns=fit.scale.first_ns,
+        end_ns=fit.scale.first_ns + fit.scale.span_ns,
         order=solution.order,
         orders=solution.trials,
-        samples={data.name: len(data.value) for data in inputs.used},
+        samples={data.name: len(data.value) for data in inputs},
         noise_sd=solution.noise_sd,
-        tracks=_tracks(inputs, solution),
+        tracks={
+            data.name: Track(
+                data.time_ns,
+                data.value,
+                fit.fitted(data.time_ns, derivative=0 if data.is_place else fit.speed_at),
+            )
+            for data in inputs
+        },
         reorthogonalised=solution.reorthogonalised,
-        notes=(*window.notes, *inputs.notes, *solution.notes, *ship.warnings),
+        notes=(*window.notes, *notes, *solution.notes, *ship.warnings),
     )
 
 
-def _inputs(window: Window, parameters: Parameters) -> _Offered:
-    """Decide which inputs are used, and for which problem."""
-    name, speed = 'speed_through_water', window.speed_through_water
-    notes: list[str] = []
-    if len(speed) < PROBLEMS['s1_speed'].stamps <= len(window.speed_over_ground):
-        name, speed = 'speed_over_ground', window.speed_over_ground
-    position = window.position
-    estimator = parameters.estimator
-    problem = PROBLEMS[estimator]
-    if problem.speed:
-        _check(name, speed, problem.stamps, estimator)
-    if problem.position:
-        _check('position', position, problem.stamps, estimator)
-    if problem.speed and name == 'speed_over_ground':
-        notes.append(
+def _inputs(
+    window: Window, parameters: Parameters
+) -> tuple[tuple[ScalarInput, ...], tuple[str, ...]]:
+    """Return the inputs that are used, the speed first, and what is to be said of them."""
+    problem = PROBLEMS[parameters.estimator]
+    speed = 'speed_through_water'
+    notes: tuple[str, ...] = ()
+    enough = PROBLEMS['s1_speed'].stamps
+    if len(window.speed_through_water) < enough <= len(window.speed_over_ground):
+        speed = 'speed_over_ground'
+    names = [speed] * problem.speed + ['position'] * problem.position
+    for name in names:
+        _check(name, window.series(name), problem.stamps, parameters.estimator)
+    if 'speed_over_ground' in names:
+        notes = (
             'speed over ground was used as the speed, there is none through water: '
-            'a current is part of it'
+            'a current is part of it',
         )
-    return _Offered(
-        estimator,
-        _speed(name, speed, parameters) if problem.speed else None,
-        _distance(position, parameters) if problem.position else None,
-        tuple(notes),
-    )
+    return tuple(_scalar(name, window.series(name), parameters) for name in names), notes
 
 
 def _check(name: str, series: Series, enough: int, estimator: str) -> None:
@@ -152,53 +138,55 @@ def _check(name: str, series: Series, enough: int, estimator: str) -> None:
         raise EstimationError(f'{name}: {bad} value(s) are not finite: give accepted samples only')
 
 
-def _speed(name: str, series: Series, parameters: Parameters) -> ScalarInput:
-    scale, basis = _polynomials(series, parameters)
-    sigma_m_s = parameters.speed_sigma_m_s
-    return ScalarInput(name, series.time_ns, series.value, sigma_m_s, scale, basis)
-
-
-def _distance(series: Series, parameters: Parameters) -> ScalarInput:
-    scale, basis = _polynomials(series, parameters)
-    distance = along_track(scale.normalise(series.time_ns), series.value)
-    sigma_m = parameters.position_sigma_m
-    return ScalarInput('position', series.time_ns, distance, sigma_m, scale, basis)
-
-
-def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, OrthogonalBasis]:
+def _scalar(name: str, series: Series, parameters: Parameters) -> ScalarInput:
     scale = TimeScale.of(series.time_ns)
-    return scale, OrthogonalBasis.on(scale.normalise(series.time_ns), parameters.order_max)
+    time = scale.normalise(series.time_ns)
+    basis = OrthogonalBasis.on(time, parameters.order_max)
+    if name != 'position':
+        sigma_m_s = parameters.speed_sigma_m_s
+        return ScalarInput(name, series.time_ns, series.value, sigma_m_s, scale, basis)
+    distance = along_track(time, series.value)
+    return ScalarInput(name, series.time_ns, distance, parameters.position_sigma_m, scale, basis)
 
 
-def _solve(inputs: _Offered) -> Solution:
-    if inputs.speed is None:
-        assert inputs.position is not None
-        return solve_position(inputs.position)
-    if inputs.position is None:
-        return solve_speed(inputs.speed)
-    return solve_joint(inputs.speed, inputs.position)
-
-
-def _check_deceleration(inputs: _Offered, solution: Solution) -> None:
-    needed = PROBLEMS[inputs.estimator].order
+def _check_deceleration(estimator: str, solution: Solution) -> None:
+    needed = PROBLEMS[estimator].order
     if solution.order < needed:
         noise = ', '.join(f'{name} {value:.3g}' for name, value in solution.noise_sd.items())
         raise EstimationError(
             f'no deceleration above the noise (sd {noise}) in '
             f'{solution.fit.scale.span_ns * 1e-9:.4g} s: {solution.order} coefficient(s) explain '
-            f'the samples, {inputs.estimator} needs {needed}; give a longer window, or one after '
+            f'the samples, {estimator} needs {needed}; give a longer window, or one after '
             'the engine stop'
         )
 
 
-def _tracks(inputs: _Offered, solution: Solution) -> dict[str, Track]:
-    fit = solution.fit
-    result = {}
-    if inputs.speed is not None:
-        data = inputs.speed
-        fitted = fit.fitted(data.time_ns, derivative=fit.speed_at)
-        result[data.name] = Track(data.time_ns, data.value, fitted)
-    if inputs.position is not None:
-        data = inputs.position
-        result[data.name] = Track(data.time_ns, data.value, fit.fitted(data.time_ns, derivative=0))
-    return result
+_CAVEAT = (
+    'The band holds the noise of the sensors and the uncertainty of the added mass, not the error '
+    'of the polynomial itself: towards the highest speeds, where the run-down of the engine lies, '
+    'the true error can be several times larger.'
+)
+
+
+def published(name: str, meaning: str) -> Estimator:
+    """
+    Return one of the published problems as an estimator.
+
+    Parameters
+    ----------
+    name
+        A key of `PROBLEMS`.
+    meaning
+        What it is, for a report.
+    """
+
+    def of_problem(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+        return estimate(window, ship, replace(parameters, estimator=name))
+
+    return Estimator(
+        name=name,
+        meaning=meaning,
+        estimate=of_problem,
+        constant_order=PROBLEMS[name].order,
+        caveat=_CAVEAT,
+    )

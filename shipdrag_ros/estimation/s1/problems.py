@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.estimation.motion import PolynomialMotion
+from shipdrag_ros.estimation.curve import PolynomialMotion
 from shipdrag_ros.estimation.result import OrderTrial
 from shipdrag_ros.regression.least_squares import inverse, triangle
 from shipdrag_ros.regression.order import OrderTable, fit_orders, rounding
@@ -47,6 +47,11 @@ class ScalarInput:
     scale: TimeScale
     basis: OrthogonalBasis
 
+    @property
+    def is_place(self) -> bool:
+        """Whether it is a distance."""
+        return self.name == 'position'
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -77,29 +82,14 @@ class Solution:
     notes: tuple[str, ...]
 
 
-def solve_speed(speed: ScalarInput) -> Solution:
+def solve_one(data: ScalarInput) -> Solution:
     """
-    Fit the speed alone.
+    Fit the speed alone, or the position alone, whose derivative is the speed.
 
     Notes
     -----
-    S1 (6, 9, 11).
+    S1 (5, 6, 9, 11).
     """
-    return _solve_one(speed, speed_at=0)
-
-
-def solve_position(position: ScalarInput) -> Solution:
-    """
-    Fit the position alone; the speed is its derivative.
-
-    Notes
-    -----
-    S1 (5, 9, 11).
-    """
-    return _solve_one(position, speed_at=1)
-
-
-def _solve_one(data: ScalarInput, *, speed_at: int) -> Solution:
     basis = data.basis
     coefficients, table = fit_orders(basis, data.value)
     known = data.known_sigma**2
@@ -108,9 +98,9 @@ def _solve_one(data: ScalarInput, *, speed_at: int) -> Solution:
     variance = known if trusted else float(table.variance[row])
     root = np.diag(np.sqrt(variance / basis.squared_norm[:order]))
     unused = np.full(len(table.sse), np.nan)
-    speed, position = (unused, table.variance) if speed_at else (table.variance, unused)
+    speed, position = (unused, table.variance) if data.is_place else (table.variance, unused)
     return Solution(
-        PolynomialMotion(data.scale, basis, coefficients[:order], root, speed_at),
+        PolynomialMotion(data.scale, basis, coefficients[:order], root, int(data.is_place)),
         order,
         _trials(table, speed, position),
         {data.name: math.sqrt(table.variance[row])},
@@ -133,7 +123,7 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     input is its sum of squares over n_i less the trace of its part of the hat
     matrix.
     """
-    alone = solve_position(position), solve_speed(speed)
+    alone = solve_one(position), solve_one(speed)
     inputs = (position, speed)
     sigmas = np.array(
         [

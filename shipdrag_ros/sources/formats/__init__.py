@@ -33,7 +33,7 @@ def points() -> tuple[EntryPoint, ...]:
     """
     own = []
     for module in iter_modules(__path__):
-        place = f'{__name__}.{module.name}{".declaration" if module.ispkg else ""}'
+        place = f'{__name__}.{module.name}{".importer" if module.ispkg else ""}'
         own.append(EntryPoint(module.name, f'{place}:FORMAT', GROUP))
     taken = {point.name for point in own}
     return (*own, *(point for point in entry_points(group=GROUP) if point.name not in taken))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dataflash logs (.bin) of ArduPilot vessels, read by pymavlink, an extra."""
+"""
+GPS, POS, ATT, ESC and RPM: position, speed over ground, heading, revolutions. Needs
+pymavlink: pip install 'shipdrag_ros[logs]'.
+"""
 
 from __future__ import annotations
 
@@ -98,8 +101,7 @@ def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, 
 FORMAT = Format(
     name='ardupilot',
     kind='a log of ArduPilot (.bin)',
-    about='GPS, POS, ATT, ESC and RPM: position, speed over ground, heading, revolutions. Needs '
-    "pymavlink: pip install 'shipdrag_ros[logs]'.",
+    about=__doc__,
     score=_score,
     read=_open,
 )

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Tracks of GPX: positions, and speeds where they are stated.
-
-The parser is expat's, which fetches nothing; a declaration of an entity ends
-the reading, so that none can be expanded.
+The points of tracks with their times, and their speeds [m/s]; ways and routes have no times
+and are counted.
 """
+
+# The parser is expat's, which fetches nothing; a declaration of an entity ends the reading, so
+# that none can be expanded.
 
 from __future__ import annotations
 
@@ -127,8 +128,7 @@ def _is_coordinate(text: str, largest: float) -> bool:
 FORMAT = Format(
     name='gpx',
     kind='a GPX track',
-    about='The points of tracks with their times, and their speeds [m/s]; ways and routes have no '
-    'times and are counted.',
+    about=__doc__,
     score=_score,
     read=_open,
 )

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Bags of ROS 1 (.bag) and of rosbag2 in sqlite3 storage (.db3), copied message by message.
-
-The topics keep their names, so that `--remap` of replay means the same as with
-any bag; messages of ROS 1 become CDR.
+Messages of the types that carry inputs are copied under their topics, those of ROS 1 as CDR;
+a folder of rosbag2 is given as a whole. Other bags (MCAP) need no import.
 """
+
+# The topics keep their names, so that `--remap` of replay means the same as with any bag;
+# messages of ROS 1 become CDR.
 
 from __future__ import annotations
 
@@ -16,6 +17,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 from urllib.parse import quote
 
 import lz4.frame
@@ -58,6 +60,7 @@ class CopyResult(ImportResult):
 
     kind: str
     inputs: Mapping[str, str]
+    unused: ClassVar = 'Of types that carry no input'
 
     @property
     def size(self) -> str:
@@ -73,10 +76,6 @@ class CopyResult(ImportResult):
             ('topic', 'input', 'messages'),
             tuple((topic, carried.get(topic, '-'), f'{n}') for topic, n in self.written.items()),
         )
-
-    def _not_used(self) -> list[str]:
-        found = most_of(self.not_used)
-        return [f'Of types that carry no input: {found}'] if self.not_used else []
 
 
 def _score(head: Head) -> float:
@@ -230,8 +229,7 @@ def _one_sqlite(file: Path, tally: Tally) -> Iterator[EncodedMessage]:
 FORMAT = Format(
     name='rosbag',
     kind='a bag of ROS 1 or of rosbag2 in sqlite3',
-    about='Messages of the types that carry inputs are copied under their topics, those of ROS 1 '
-    'as CDR; a folder of rosbag2 is given as a whole. Other bags (MCAP) need no import.',
+    about=__doc__,
     score=_score,
     read=_open,
     by_head=False,

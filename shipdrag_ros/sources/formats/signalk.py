@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs of Signal K: deltas, one in a line, as the server's data log and others write them."""
+"""
+Deltas, one in a line: speedThroughWater, speedOverGround, position, heading, rudder, apparent
+wind, depth below the surface; of the own vessel, each input from one source. Revolutions are
+those of the engine and are taken with --gear.
+"""
 
 from __future__ import annotations
 
@@ -178,9 +182,7 @@ def _is_number(value: Any) -> TypeGuard[float]:
 FORMAT = Format(
     name='signalk',
     kind='a log of Signal K',
-    about='Deltas, one in a line: speedThroughWater, speedOverGround, position, heading, rudder, '
-    'apparent wind, depth below the surface; of the own vessel, each input from one source. '
-    'Revolutions are those of the engine and are taken with --gear.',
+    about=__doc__,
     score=_score,
     read=_open,
     options=(GEAR,),

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ULog of PX4 vessels, read by pyulog, an extra."""
+"""
+GNSS position and speed, position of the estimator, heading, revolutions of motors. Needs
+pyulog: pip install 'shipdrag_ros[logs]'.
+"""
 
 from __future__ import annotations
 
@@ -122,8 +125,7 @@ def _values(name: str, columns: dict[str, Any]) -> Iterator[tuple[Channel, Float
 FORMAT = Format(
     name='ulog',
     kind='an ULog (PX4)',
-    about='GNSS position and speed, position of the estimator, heading, revolutions of motors. '
-    "Needs pyulog: pip install 'shipdrag_ros[logs]'.",
+    about=__doc__,
     score=_score,
     read=_open,
 )

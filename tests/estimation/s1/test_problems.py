@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipdrag_ros.estimation.motion import sigma
+from shipdrag_ros.estimation.curve import sigma
 from shipdrag_ros.estimation.s1.problems import (
     ScalarInput,
     Solution,
     solve_joint,
-    solve_position,
-    solve_speed,
+    solve_one,
 )
-from shipdrag_ros.regression import OrthogonalBasis, TimeScale
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 
 START_NS = 1_700_000_000_123_456_789
 
@@ -110,7 +109,7 @@ def test_joint_against_rational_arithmetic(same: bool) -> None:
 def test_speeds_improve_every_coefficient_but_the_first() -> None:
     rng = np.random.default_rng(2)
     speed, position = pair(50, rng, order=9, known=True)
-    joint, alone = solve_joint(speed, position), solve_position(position)
+    joint, alone = solve_joint(speed, position), solve_one(position)
     assert joint.order == alone.order == 4
     # with the same stamps the polynomials are the same
     np.testing.assert_allclose(
@@ -128,8 +127,8 @@ def test_derivatives_and_fitted_values_hang_together() -> None:
     speed, position = pair(60, np.random.default_rng(3), order=8)
     h = 1e-4
     for solution in (
-        solve_speed(speed),
-        solve_position(position),
+        solve_one(speed),
+        solve_one(position),
         solve_joint(speed, position),
     ):
         fit = solution.fit
@@ -155,7 +154,7 @@ def test_derivatives_and_fitted_values_hang_together() -> None:
 def test_order_table_of_the_joint_problem_by_plain_least_squares() -> None:
     speed, position = pair(40, np.random.default_rng(4), order=7, same=False)
     solution = solve_joint(speed, position)
-    alone = solve_position(position), solve_speed(speed)
+    alone = solve_one(position), solve_one(speed)
     sigmas = alone[0].noise_sd['position'], alone[1].noise_sd['speed']
     scale = solution.fit.scale
     x_rows = np.polynomial.chebyshev.chebvander(scale.normalise(position.time_ns), 6)
@@ -190,10 +189,10 @@ def test_known_sigma_gives_order_and_band() -> None:
     speed, _ = pair(200, np.random.default_rng(5), order=10)
     known_speed, known_position = pair(200, np.random.default_rng(5), order=10, known=True)
     # the covariance is then that of the stated noise, not of the residuals
-    alone = solve_speed(known_speed)
+    alone = solve_one(known_speed)
     size = np.sqrt(known_speed.basis.squared_norm[: alone.order])
     np.testing.assert_allclose(sigma(alone.fit.root) * size, 0.05, rtol=1e-14)
-    estimated = solve_speed(speed)
+    estimated = solve_one(speed)
     np.testing.assert_allclose(
         sigma(estimated.fit.root) * size, estimated.noise_sd['speed'], rtol=1e-14
     )
@@ -209,8 +208,8 @@ def test_wrong_sigma_is_said(stated: float, expected: str) -> None:
     rng = np.random.default_rng(6)
     time_ns = stamps(300)
     value = cubic(time_ns, derivative=1) + 0.05 * rng.normal(size=300)
-    right = solve_speed(measured('speed', time_ns, value, order=10, sigma=0.05))
-    wrong = solve_speed(measured('speed', time_ns, value, order=10, sigma=stated))
+    right = solve_one(measured('speed', time_ns, value, order=10, sigma=0.05))
+    wrong = solve_one(measured('speed', time_ns, value, order=10, sigma=stated))
     assert right.notes == ()
     assert len(wrong.notes) == 1
     assert expected in wrong.notes[0]
@@ -225,7 +224,7 @@ def test_data_without_noise() -> None:
     speed = measured('speed', time_ns, cubic(time_ns, derivative=1), order=20)
     position = measured('position', time_ns, cubic(time_ns), order=20)
     expected = cubic(time_ns, derivative=2)
-    for solution in (solve_speed(speed), solve_position(position), solve_joint(speed, position)):
+    for solution in (solve_one(speed), solve_one(position), solve_joint(speed, position)):
         assert solution.order == 3 + solution.fit.speed_at
         motion = solution.fit.motion(solution.fit.scale.normalise(time_ns))
         np.testing.assert_allclose(motion.acceleration, expected, rtol=0.0, atol=1e-10)
@@ -249,7 +248,7 @@ def test_few_positions_among_many_speeds() -> None:
 
 def solutions(rng: np.random.Generator) -> tuple[Solution, ...]:
     speed, position = pair(60, rng, order=10)
-    return solve_speed(speed), solve_position(position), solve_joint(speed, position)
+    return solve_one(speed), solve_one(position), solve_joint(speed, position)
 
 
 def test_band_covers_where_the_truth_is_a_polynomial() -> None:

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from datetime import UTC, tzinfo
 from decimal import Decimal
 from enum import Enum
+from importlib import resources
 from math import pi
 
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import FURTHER, GEODETIC, PITCHES, SHAFTS, Channel, kind_of
 
@@ -252,93 +254,19 @@ def _split_unit(text: str, units: Mapping[str, object] | set[str]) -> tuple[str,
     )
 
 
-ROLES: Mapping[str, tuple[str, ...]] = {
-    'stw': (
-        'stw',
-        'speed through water',
-        'speed through the water',
-        'water speed',
-        'boatspeed',
-        'boat speed',
-        'bsp',
-        'bspd',
-        'log speed',
-        'speed log',
-        'speed water',
-    ),
-    'sog': (
-        'sog',
-        'speed over ground',
-        'speed over the ground',
-        'ground speed',
-        'groundspeed',
-        'ext sog',
-        'gps sog',
-        'gps speed',
-        'gnss speed',
-    ),
-    'lat': ('lat', 'latitude', 'latitudine', 'latitud', 'gps lat', 'gps latitude', 'breite'),
-    'lon': (
-        *('lon', 'long', 'lng', 'longitude', 'longitudine', 'longitud', 'gps lon'),
-        *('gps longitude', 'gps long', 'laenge', 'länge'),
-    ),
-    'x': ('x', 'pos x', 'x pos', 'position x', 'easting', 'east', 'pos e', 'pos east'),
-    'y': ('y', 'pos y', 'y pos', 'position y', 'northing', 'north', 'pos n', 'pos north'),
-    'heading': (
-        *('hdg', 'hdt', 'heading', 'true heading', 'heading true', 'hdg true', 'gyro'),
-        *('gyro heading', 'heading gyro'),
-    ),
-    'shaft': (
-        *('shaft', 'shaft speed', 'shaft rpm', 'shaft revs', 'propeller', 'propeller speed'),
-        *('propeller rpm', 'prop', 'prop rpm', 'screw'),
-    ),
-    'rudder': ('rudder', 'rudder angle'),
-    'aws': ('aws', 'aw speed', 'apparent wind speed'),
-    'awa': ('awa', 'aw angle', 'apparent wind angle'),
-    'depth': ('depth', 'water depth', 'depth below surface', 'depht'),
-    'east': ('ve', 'v e', 'vel e', 'v east', 'vel east', 'velocity east', 'east velocity'),
-    'north': ('vn', 'v n', 'vel n', 'v north', 'vel north', 'velocity north', 'north velocity'),
-    'time': (
-        *('t', 'time', 'timestamp', 'datetime', 'date time', 'utc', 'date time utc', 'time utc'),
-        *('unix', 'unix time', 'epoch', 'elapsed', 'elapsed time', 'seconds', 'utc time'),
-        *('zeit', 'uhrzeit', 'hora'),
-    ),
-    'date': ('date', 'day', 'date utc', 'utc date', 'datum', 'fecha'),
-}
-"""By role, the names of its columns: in lower case, without a unit."""
-
+_NAMES = strict_yaml.load(
+    (resources.files('shipdrag_ros') / 'data' / 'columns.yaml').read_text(encoding='utf-8')
+)
 UNITS: Mapping[str, str] = {
-    **dict.fromkeys(('m/s', 'mps', 'm s', 'ms-1', 'm.s-1', 'm/sec', 'm per s'), 'm/s'),
-    **dict.fromkeys(('kn', 'kt', 'kts', 'knot', 'knots'), 'kn'),
-    **dict.fromkeys(('km/h', 'kmh', 'kph', 'km h'), 'km/h'),
-    **dict.fromkeys(('ft/s', 'fps'), 'ft/s'),
-    'mph': 'mph',
-    **dict.fromkeys(('rad', 'radians'), 'rad'),
-    **dict.fromkeys(('deg', '°', 'degree', 'degrees', 'grad'), 'deg'),
-    **dict.fromkeys(('rpm', '1/min', 'min-1', 'r/min', 'u/min'), 'rpm'),
-    **dict.fromkeys(('rps', 'rev/s', '1/s', 's-1', 'hz'), 'rev/s'),
-    **dict.fromkeys(('rad/s', 'rad s', 'radps', 'rads'), 'rad/s'),
-    **dict.fromkeys(('m', 'metre', 'metres', 'meter', 'meters'), 'm'),
-    'km': 'km',
-    **dict.fromkeys(('ft', 'feet'), 'ft'),
-    **dict.fromkeys(('nm', 'nmi'), 'nmi'),
-    **dict.fromkeys(('s', 'sec', 'seconds'), 's'),
-    **dict.fromkeys(('ms', 'msec'), 'ms'),
-    'us': 'us',
-    'ns': 'ns',
+    name: unit for unit, names in _NAMES['units'].items() for name in names
 }
 """How units are written in names of columns, and how `--map` takes them."""
 
-OTHER_UNITS = frozenset(
-    (
-        *('%', 'percent', 'min', 'minutes', 'h', 'hr', 'hours', 'd', 'days', 'mrad', 'mil', 'gon'),
-        *('cm/s', 'mm/s', 'm/min', 'deg/s', '°/s', 'cm', 'mm', 'fm', 'fathoms'),
-    )
-)
+OTHER_UNITS = frozenset(_NAMES['other_units'])
 """Units in brackets or below a name that `--map` does not take: none is guessed for these."""
 
 _BRACKETS = re.compile(r'[\[(]([^\[\]()]*)[\])]')
-_ROLE_OF = {name: role for role, names in ROLES.items() for name in names}
+_ROLE_OF = {name: role for role, names in _NAMES['roles'].items() for name in names}
 
 
 def role_and_unit(name: str, below: str = '') -> tuple[str, str]:

@@ -460,16 +460,20 @@ class _Guesser:
         if not self._speed('sog', 'speed_over_ground'):
             self._components()
         self._heading()
-        self._rudder()
+        self._alone('rudder', 'deg')
         self._wind()
-        for name, unit in (('shaft', 'rpm'), ('depth', 'm')):
-            column = self._one(name)
-            if column is None:
-                continue
-            try:
-                self._take(name, [column], [column.unit])
-            except ImportDataError:  # of none, or of another quantity
-                self._ask(name, [column], [unit])
+        self._alone('shaft', 'rpm')
+        self._alone('depth', 'm')
+
+    def _alone(self, name: str, likely: str) -> None:
+        column = self._one(name)
+        if column is None:
+            return
+        unit = self._angle_unit(column) if name == 'rudder' else column.unit
+        try:
+            self._take(name, [column], [unit])
+        except ImportDataError:  # of none, or of another quantity
+            self._ask(name, [column], [likely])
 
     def _position(self, time_s: Float64 | None) -> None:
         latitude, longitude = self._one('lat'), self._one('lon')
@@ -561,16 +565,6 @@ class _Guesser:
             unit = column.unit if column.unit == 'rad' else COMPASS
             why = 'whether it is yaw or compass, or its unit, is not known'
             self._ask('heading', [column], [unit], why=why, other='rad deg compass')
-
-    def _rudder(self) -> None:
-        column = self._one('rudder')
-        if column is None:
-            return
-        unit = self._angle_unit(column)
-        if unit in ('deg', 'rad'):
-            self._take('rudder', [column], [unit])
-        else:
-            self._ask('rudder', [column], ['deg'])
 
     def _wind(self) -> None:
         speed, angle = self._one('aws'), self._one('awa')

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A log of NMEA 0183 as a bag.
-
-What a sentence does not hold is counted by reason with its first lines; what
-it holds is written, plausible or not, for the monitor to judge. The log itself
-is attached, if it is not too long, so that nothing is lost.
+VHW VBW VTG RMC GGA GLL HDT HDG THS RPM MWV DPT DBT RSA ZDA, each input from one talker; of
+RPM, up to four shafts (numbers 0 to 4) and their pitch. A sentence without a time has that of
+the last one with a time; where the logger wrote the time of receipt before each line (also as
+OpenRVDAS does), the time since is added.
 """
+
+# What a sentence does not hold is counted by reason with its first lines; what it holds is
+# written, plausible or not, for the monitor to judge. The log itself is attached, if it is not
+# too long, so that nothing is lost.
 
 from __future__ import annotations
 
@@ -16,17 +19,34 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, date
 from fractions import Fraction
 from pathlib import Path
+from typing import ClassVar
 
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError, reason_of
-from shipdrag_ros.nmea.clock import ROLLOVER_DAYS, SentenceClock, rollover_days
 from shipdrag_ros.nmea.reading import DAY_NS, START, Checksum, SentenceReader, checksum_of, days_of
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS, Channel
-from shipdrag_ros.sources.formats.nmea.record import TakenSentences
+from shipdrag_ros.sources.format import (
+    CERTAIN,
+    DATE,
+    LIKELY,
+    NO,
+    TRANSDUCER,
+    Format,
+    Head,
+    Job,
+    Option,
+    head_of,
+)
+from shipdrag_ros.sources.formats.nmea.record import (
+    ROLLOVER_DAYS,
+    SentenceClock,
+    TakenSentences,
+    rollover_days,
+)
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
@@ -238,6 +258,7 @@ class NmeaResult(ImportResult):
     log_attached: bool
     damage: str
     checksums: bool
+    unused: ClassVar = 'Sentences not used'
 
     @property
     def size(self) -> str:
@@ -285,9 +306,6 @@ class NmeaResult(ImportResult):
         if self.unknown_talkers:
             lines.append(f'Talkers that NMEA 0183 does not know: {most_of(self.unknown_talkers)}')
         return lines
-
-    def _not_used(self) -> list[str]:
-        return [f'Sentences not used: {most_of(self.not_used)}'] if self.not_used else []
 
 
 def read_nmea(
@@ -434,3 +452,52 @@ def _of_no_use(taken: TakenSentences) -> tuple[Counter[str], Counter[str]]:
         if kind and talker not in NMEA_TALKERS:
             unknown[talker] += count
     return not_used, unknown
+
+
+_SENTENCE = re.compile(r'[$!](?:[A-Z][A-Z0-9]{4}|P[A-Z0-9]{2,}),[^*]*(\*[0-9A-Fa-f]{2})?')
+# sentences that wrap NMEA 2000, which has a format of its own
+_WRAPPED = re.compile(r'[$!](PCDIN|MXPGN|PDGY),')
+
+
+def _score(head: Head) -> float:
+    share = head.share(_SENTENCE.search)
+    if share == 0.0 or head.share(_WRAPPED.search) > 0.5:
+        return NO
+    return CERTAIN if share > 0.5 else LIKELY
+
+
+def _without_checksums(head: Head) -> bool:
+    """Say whether the logger has cut off all checksums: none of the first sentences has one."""
+    found = [match for line in head.lines if (match := _SENTENCE.search(line))]
+    return len(found) > 1 and not any(match[1] for match in found)
+
+
+def _open(job: Job, log: Log) -> NmeaResult:
+    checksum = job.options.get('no_checksum')
+    cut_off = checksum is None and _without_checksums(head_of(job.source))
+    return read_nmea(
+        job.source,
+        log,
+        day=job.options.get('date'),
+        transducer_m=job.options.get('transducer'),
+        checksum=Checksum.OPTIONAL if checksum or cut_off else Checksum.REQUIRED,
+        progress=job.progress,
+    )
+
+
+FORMAT = Format(
+    name='nmea',
+    kind='an NMEA 0183 log',
+    about=__doc__,
+    score=_score,
+    read=_open,
+    options=(
+        DATE,
+        TRANSDUCER,
+        Option(
+            '--no-checksum',
+            '',
+            'take sentences without a checksum too; one that is there must be right',
+        ),
+    ),
+)

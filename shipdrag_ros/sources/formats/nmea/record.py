@@ -12,17 +12,100 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping
+from datetime import date
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.nmea.clock import GAP_NS, SentenceClock
-from shipdrag_ros.nmea.reading import Sentence, SentenceSource, SentenceTime
+from shipdrag_ros.nmea.reading import DAY_NS, Sentence, SentenceSource, SentenceTime, days_of
 from shipdrag_ros.nmea.sentences import NoValue
-from shipdrag_ros.samples import INPUTS, Block, Channel, Int64, UInt8
+from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.log import Rejected
 from shipdrag_ros.sources.stream import SourcedValues
+
+GAP_NS = 10 * SECOND_NS
+"""A longer step of the time is a gap; what was measured inside it has no time."""
+
+
+ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
+
+
+def rollover_days(day: int, true: date) -> int | None:
+    """
+    Return what is to be added to the days of a log whose date is known.
+
+    GPS counts weeks modulo 1024, and an old receiver shows a date that many
+    weeks early. None if the difference is no such number of weeks.
+    """
+    difference = days_of(true) - day
+    return difference if difference % ROLLOVER_DAYS == 0 else None
+
+
+class SentenceClock:
+    """
+    Follows the time through a log.
+
+    Parameters
+    ----------
+    near_ns
+        A time at most half a day from the first one [ns since the epoch]; None
+        if nothing states it but the receipt of the lines.
+    shift_days
+        Added to every date of the log.
+
+    Attributes
+    ----------
+    shift_days
+        As given.
+    dates_put_right
+        Number of times whose date was a day off at midnight.
+    now_ns
+        The present time [ns since the epoch]; None before the first.
+    """
+
+    def __init__(self, near_ns: int | None, shift_days: int = 0) -> None:
+        self._near_ns = near_ns
+        self.shift_days = shift_days
+        self.dates_put_right = 0
+        self.now_ns: int | None = None
+
+    def resolve(self, moment: SentenceTime, receive_ns: int | None) -> int:
+        """
+        Return the time of a sentence [ns since the epoch].
+
+        One without a date has that nearest to the last time, or to that of
+        its receipt before the first.
+
+        Raises
+        ------
+        NoValue
+            If nothing states the date, or a time without a fix does not go on
+            from the last one.
+        """
+        if moment.day is None:
+            time_ns = self._nearest(moment.of_day_ns, receive_ns)
+        else:
+            time_ns = (moment.day + self.shift_days) * DAY_NS + moment.of_day_ns
+            if self.now_ns is not None and abs(abs(time_ns - self.now_ns) - DAY_NS) < GAP_NS:
+                # some receivers change the date a sentence too late or too early
+                time_ns = self._nearest(moment.of_day_ns, receive_ns)
+                self.dates_put_right += 1
+        if not moment.trusted and (
+            self.now_ns is None or not 0 <= time_ns - self.now_ns <= GAP_NS
+        ):
+            # before its first fix a receiver shows any date
+            raise NoValue('without a fix, and not going on from the last')
+        return time_ns
+
+    def _nearest(self, of_day_ns: int, receive_ns: int | None) -> int:
+        known = (self.now_ns, self._near_ns, receive_ns)
+        near_ns = next((time_ns for time_ns in known if time_ns is not None), None)
+        if near_ns is None:
+            raise NoValue('no date')
+        day = round((near_ns - of_day_ns) / DAY_NS)
+        return day * DAY_NS + of_day_ns
+
 
 Refused = dict[str, dict[str, Rejected]]
 TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]

@@ -16,7 +16,7 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.sources.numbers import read_numbers
+from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.residual.fit import (

@@ -17,7 +17,7 @@ from shipdrag_ros.display import Section
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.report.drawing import BLUE, VERMILION, new_figure, styled
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.sources.numbers import read_numbers
+from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface

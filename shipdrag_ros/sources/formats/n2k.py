@@ -1,30 +1,160 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Messages of NMEA 2000 to readings.
-
-Fast packets are put together and fields are read by `nmea2000`, which has the
-table of canboat; units are SI.
+Lines of candump, Actisense (N2K ASCII), Yacht Devices (RAW) or canboat. PGNs 128259 speed
+through water, 129026 speed over ground, 129025 and 129029 position, 127250 heading, 130306
+apparent wind, 128267 depth, 127245 rudder; of 127488, the engine, with --gear. A time of day
+takes its date from 126992 or 129029; lines without any time are counted with --rate.
 """
+
+# Fast packets are put together and fields are read by `nmea2000`, which has the table of
+# canboat; units are SI.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import date
+from datetime import UTC, date
+from functools import cache
 from itertools import chain, islice, pairwise
 from math import cos, pi, remainder, sin
-from typing import Any
-
-from nmea2000 import backend
+from typing import Any, NamedTuple
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import NoValue
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
-from shipdrag_ros.sources.format import Job
-from shipdrag_ros.sources.formats.n2k.frames import DAY_NS, MINUTE_NS, N2kFrame, parse
-from shipdrag_ros.sources.log import BASE_NS
+from shipdrag_ros.sources.format import (
+    CERTAIN,
+    DATE,
+    GEAR,
+    NO,
+    RATE,
+    TRANSDUCER,
+    Format,
+    Head,
+    Job,
+)
+from shipdrag_ros.sources.log import BASE_NS, Log, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, Tally
+from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+
+MINUTE_NS = 60 * SECOND_NS
+DAY_NS = 1440 * MINUTE_NS
+_SINCE = r'\((?P<seconds>\d{1,10})\.(?P<fraction>\d{1,9})\)\s+'
+_CLOCK = r'(?P<hour>\d\d):?(?P<minute>\d\d):?(?P<second>\d\d)\.(?P<fraction>\d{1,6})\s+'
+_ISO = r'\d{4}-\d\d-\d\d[-T ]\d\d:\d\d:\d\d(?:[.,]\d{1,12})?'
+_FORMS = tuple(
+    re.compile(form.replace('HEX', '[0-9A-Fa-f]'))
+    for form in (
+        # can-utils: `candump -L`, then `candump -ta`, `candump`, and a format of its old versions
+        rf'{_SINCE}\S+\s+(?P<id>HEX{{8}})#(?P<data>HEX*)\s*[RT]?',
+        rf'(?:{_SINCE})?\S+\s+(?P<id>HEX{{8}})\s+\[\d+\](?P<data>(?:\s+HEX{{2}})*)',
+        rf'(?:{_SINCE})?<0x(?P<id>HEX{{8}})>\s+\[\d+\](?P<data>(?:\s+HEX{{2}})*)',
+        # candump of can-utils-j1939: the NAME of the sender and the PGN
+        rf'(?:{_SINCE})?\S+?:(?P<sender>HEX{{2,16}}),(?P<pgn>HEX{{5}})\s+-\s+!\d\s+'
+        r'\[\d+\](?P<data>(?:\s+HEX+)*)',
+        # Actisense N2K ASCII: sender, addressee and priority, PGN, the whole message
+        rf'A{_CLOCK}(?P<hex_sender>HEX{{2}})HEX{{3}}\s+(?P<pgn>HEX{{5,6}})\s+(?P<data>HEX+)',
+        # Yacht Devices RAW
+        rf'{_CLOCK}[RT]\s+(?P<id>HEX{{8}})(?P<data>(?:\s+HEX{{2}})+)',
+        # canboat: time, priority, PGN, sender, addressee, length, bytes
+        rf'(?P<iso>{_ISO}Z?),\d,(?P<decimal_pgn>\d{{4,6}}),(?P<sender>\d{{1,3}}),'
+        r'\d{1,3},\d{1,3}(?P<data>(?:,HEX{2})*)',
+        # SLCAN: identifier, length, bytes, and with some adapters milliseconds of a minute
+        r'T(?P<id>HEX{8})(?P<length>[0-8])(?P<data>HEX*)',
+    )
+)
+# what loggers write before a line: the date and time
+_LED = re.compile(rf'[\[(]?({_ISO}\s?(?:Z|[+-]\d\d:?\d\d)?)[\])]?[\s,;]+(.+)')
+
+
+class N2kFrame(NamedTuple):
+    """
+    A frame, or a whole message.
+
+    Attributes
+    ----------
+    time_ns
+        Since 1970, or since its cycle began; None where the line states none.
+    cycle_ns
+        After which the time begins again, a day or a minute; 0 of a time since 1970.
+    pgn, sender, data
+    whole
+        Whether `data` is a message that needs no further frames.
+    """
+
+    time_ns: int | None
+    cycle_ns: int
+    pgn: int
+    sender: str
+    data: bytes
+    whole: bool
+
+
+def parse(line: str) -> N2kFrame | None:
+    """
+    Take a line apart; None where it is no frame.
+    """
+    for form in _FORMS:
+        found = form.fullmatch(line)
+        frame = None if found is None else _frame(found.groupdict(''))
+        if frame is not None:
+            return frame
+    led = _LED.fullmatch(line)
+    if led is None:
+        return None
+    frame, time_ns = parse(led[2]), iso_ns(led[1], UTC)
+    if frame is None or time_ns is None:
+        return frame
+    return frame._replace(time_ns=time_ns, cycle_ns=0)
+
+
+def _frame(parts: dict[str, str]) -> N2kFrame | None:
+    """Put the parts of a line together; None where they do not go together."""
+    digits = re.sub(r'[\s,]+', '', parts['data'])
+    time_ns, cycle_ns = None, 0
+    if 'length' in parts:
+        end = 2 * int(parts['length'])
+        digits, clock = digits[:end], digits[end:]
+        time_ns, cycle_ns = int(clock, 16) * 1_000_000 if clock else None, MINUTE_NS
+        if len(digits) < end or len(clock) not in (0, 4) or (time_ns or 0) >= MINUTE_NS:
+            return None
+    elif 'hour' in parts:
+        time_ns, cycle_ns = _of_day_ns(parts), DAY_NS
+    elif 'iso' in parts:
+        time_ns = iso_ns(f'{parts["iso"][:10]}T{parts["iso"][11:]}', UTC)
+    elif parts['seconds']:
+        time_ns = int(parts['seconds']) * SECOND_NS + _fraction_ns(parts)
+    if len(digits) % 2:
+        return None
+    data = bytes.fromhex(digits)
+    if 'id' in parts:  # of 29 bits; a PGN below 0xF000 is addressed
+        number = int(parts['id'], 16) & 0x1FFFFFFF
+        pgn = (number >> 8) & 0x3FFFF
+        if (pgn >> 8) & 0xFF < 0xF0:
+            pgn &= 0x3FF00
+        if len(data) > 8:
+            return None
+        return N2kFrame(time_ns, cycle_ns, pgn, str(number & 0xFF), data, False)
+    if 'decimal_pgn' in parts:
+        pgn, sender, whole = int(parts['decimal_pgn']), parts['sender'], len(data) > 8
+    elif 'hex_sender' in parts:
+        pgn, sender, whole = int(parts['pgn'], 16), str(int(parts['hex_sender'], 16)), True
+    else:
+        pgn, sender, whole = int(parts['pgn'], 16), parts['sender'], False
+    return N2kFrame(time_ns, cycle_ns, pgn, sender, data, whole)
+
+
+def _of_day_ns(parts: dict[str, str]) -> int | None:
+    hour, minute, second = (int(parts[name]) for name in ('hour', 'minute', 'second'))
+    if hour > 23 or minute > 59 or second > 60:
+        return None
+    return (3600 * hour + 60 * minute + second) * SECOND_NS + _fraction_ns(parts)
+
+
+def _fraction_ns(parts: dict[str, str]) -> int:
+    return int(parts['fraction'][:9].ljust(9, '0'))
+
 
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _SYSTEM_TIME, _GNSS = 126992, 129029
@@ -140,11 +270,20 @@ class _Unwrapped:
         return self._cycles * cycle_ns + time_ns
 
 
+@cache
+def _backend() -> Any:
+    """Return the table of messages, which takes long to import."""
+    from nmea2000 import backend
+
+    return backend
+
+
 class _Packets:
     """Puts the frames of fast packets together."""
 
     def __init__(self) -> None:
-        self._parts = backend.canboat.Reassembler()
+        self._canboat = _backend().canboat
+        self._parts = self._canboat.Reassembler()
 
     def whole(self, frame: N2kFrame) -> bytes | None:
         if frame.whole or frame.pgn not in _FAST:
@@ -152,7 +291,7 @@ class _Packets:
         sender = int(frame.sender) if frame.sender.isdecimal() else hash(frame.sender) % 254
         try:
             data: bytes | None = self._parts.push(frame.pgn, frame.data, sender % 256)
-        except backend.canboat.ReassemblyError:
+        except self._canboat.ReassemblyError:
             return None  # a frame was lost
         return data
 
@@ -245,7 +384,7 @@ class N2kReader:
         data = self._packets.whole(frame)
         if data is None:
             return None
-        message = backend.decode(frame.pgn, data, units='si')
+        message = _backend().decode(frame.pgn, data, units='si')
         try:
             if message is None:
                 raise NoValue('cannot be decoded')
@@ -349,3 +488,25 @@ _READERS: Mapping[int, Callable[[_Fields], N2kValue]] = {
     127245: _rudder,
     127488: _engine,
 }
+
+
+def _score(head: Head) -> float:
+    return CERTAIN if head.share(parse) > 0.5 else NO
+
+
+def _open(job: Job, log: Log) -> StreamResult:
+    clock = clock_of(job)
+    about = {key: job.options.get(key) for key in ('date', 'gear', 'rate', 'transducer')}
+    return read_stream(
+        job, log, 'n2k', lambda tally: N2kReader(tally, clock, job.options).read(job), about=about
+    )
+
+
+FORMAT = Format(
+    name='n2k',
+    kind='a log of NMEA 2000',
+    about=__doc__,
+    score=_score,
+    read=_open,
+    options=(DATE, GEAR, RATE, TRANSDUCER),
+)

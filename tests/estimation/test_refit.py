@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.regression import OrthogonalBasis
-from shipdrag_ros.regression.refit import (
+from shipdrag_ros.estimation.distance import (
     ALPHA,
     BETA,
     COEFFICIENT,
@@ -16,6 +15,7 @@ from shipdrag_ros.regression.refit import (
     evaluate,
     refit,
 )
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 
 
 @pytest.mark.parametrize('n', [13, 100, 500, 2000])

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Diagnosis of coastdowns beside the node, each in a process of its own.
+What runs beside the node: a thread that compiles, and each coastdown diagnosed in a process.
+
+A start that finds nothing kept takes a minute or two until the first estimate
+could be made; nobody should have to take that for a node that hangs.
 
 A diagnosis is seconds of compiled code, in which no callback of the same process
 could run. A process that ends with it takes no memory between coastdowns, and
@@ -14,13 +17,17 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
+import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from enum import Enum
 from threading import Lock
+from time import monotonic
 from typing import Any
 
 from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.warming import warm
 from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
@@ -28,6 +35,80 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
 from shipdrag_ros.simulation.effects import carrying
+
+COMPILER = 'compiling'
+
+
+class Compiling:
+    """
+    Goes on from `begin` to its end.
+
+    Parameters
+    ----------
+    parameters
+        Whose estimator is needed.
+
+    Attributes
+    ----------
+    estimator
+        That is needed.
+    failure
+        What went wrong, '' if nothing did; what is missing is then compiled when it is called.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.failure = ''
+        self.estimator = parameters.estimator
+        self._parameters = parameters
+        self._began_s: float | None = None
+        self._ended_s: float | None = None
+
+    def begin(self) -> None:
+        """
+        Begin, if that was not done.
+        """
+        if self._began_s is None:
+            self._began_s = monotonic()
+            # it cannot be interrupted, and must not be waited for
+            threading.Thread(target=self._run, name=COMPILER, daemon=True).start()
+
+    def done(self) -> bool:
+        """
+        Say whether everything is there.
+        """
+        return self._ended_s is not None
+
+    @property
+    def seconds(self) -> float:
+        """How long it took, or has taken so far [s]."""
+        if self._began_s is None:
+            return 0.0
+        return (monotonic() if self._ended_s is None else self._ended_s) - self._began_s
+
+    def _run(self) -> None:
+        try:
+            warm(self._parameters)
+        except Exception:
+            self.failure = traceback.format_exc()
+        self._ended_s = monotonic()
+
+
+def leave_if_compiling(status: int) -> None:
+    """
+    End the process at once if a compiler still runs in it.
+
+    Python would take its modules away under the compiler, which may then crash.
+
+    Parameters
+    ----------
+    status
+        Exit status of the process.
+    """
+    if any(thread.name == COMPILER for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
 
 _GOES_ON = (
     'The coastdown alone is diagnosed here; `shipdrag diagnose BAG` of the recording holds all of '
