@@ -252,7 +252,8 @@ class _Judge:
 
     def _to_rest(self, end: int) -> int:
         """Return the last bin, where she is all but at rest from there on: that tells nothing."""
-        rests = np.abs(self._binned.speed[end - 1 :]) < max(self._slow, self._reading.rest)
+        # as the bank has it, readings of a ship at rest have the sd `rest`
+        rests = np.abs(self._binned.speed[end - 1 :]) < 2.0 * self._reading.rest
         return len(self._binned.said) if np.all(rests) else end
 
     def _swing(self, span: _SPAN) -> float:
