@@ -145,23 +145,23 @@ def _bad_ship(folder: Path) -> Path:
 
 
 def _other_topic(_: int, message: EncodedMessage) -> EncodedMessage:
-    return replace(message, topic=f'/log{message.topic}_raw')
+    return message._replace(topic=f'/log{message.topic}_raw')
 
 
 def _log_of_another_type(_: int, message: EncodedMessage) -> EncodedMessage:
     if message.topic != '/speed_through_water':
         return message
-    return replace(message, type='sensor_msgs/msg/Range')
+    return message._replace(type='sensor_msgs/msg/Range')
 
 
 def _cut_payload(which: Callable[[int], bool]) -> Callable[[int, EncodedMessage], EncodedMessage]:
     return lambda i, message: (
-        replace(message, payload=message.payload[:-9]) if which(i) else message
+        message._replace(payload=message.payload[:-9]) if which(i) else message
     )
 
 
 def _log_time_zero(_: int, message: EncodedMessage) -> EncodedMessage:
-    return replace(message, log_ns=0)
+    return message._replace(log_ns=0)
 
 
 def _stamps_from_1970(block: Block) -> Block:

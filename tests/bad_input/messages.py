@@ -85,8 +85,8 @@ def _no_fix(message: EncodedMessage, *, status: int, latitude: float) -> Encoded
         position_covariance=np.zeros(9),
         position_covariance_type=0,
     )
-    return replace(
-        message, type=types.NAV_SAT_FIX, payload=types.serialize(types.NAV_SAT_FIX, fix)
+    return message._replace(
+        type=types.NAV_SAT_FIX, payload=types.serialize(types.NAV_SAT_FIX, fix)
     )
 
 
@@ -95,7 +95,7 @@ def _zero_rotation(message: EncodedMessage) -> EncodedMessage:
     sent = types.make(
         types.QUATERNION, header=types.header(message.publish_ns, 'base_link'), quaternion=zero
     )
-    return replace(message, payload=types.serialize(types.QUATERNION, sent))
+    return message._replace(payload=types.serialize(types.QUATERNION, sent))
 
 
 def _other_joint(message: EncodedMessage) -> EncodedMessage:
@@ -107,7 +107,7 @@ def _other_joint(message: EncodedMessage) -> EncodedMessage:
         velocity=np.array([8.0]),
         effort=np.zeros(0),
     )
-    return replace(message, payload=types.serialize(types.JOINT_STATE, sent))
+    return message._replace(payload=types.serialize(types.JOINT_STATE, sent))
 
 
 def _all_inputs(kind: str, change: Callable[[Block], Block], *says: str) -> Case:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, s1
+from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.s1.estimate import estimate as as_published
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.priors import CURRENT
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -93,7 +94,7 @@ def test_error_and_coverage(coast: Any, ship: Ship) -> None:
     assert np.mean(inside) > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / RUNS)
     s1_wrong = [
         rmse(
-            s1.estimate(
+            as_published(
                 window(coast.block(500, seed=seed)), ship, Parameters(estimator='s1_joint')
             ),
             coast,
