@@ -181,9 +181,10 @@ def parser(*of: str) -> argparse.ArgumentParser:
                 module = import_module(known.module, __name__)
             examples: Sequence[str] = known.examples
             if not examples:
-                added.description, _, text = str(module.__doc__).partition(_EXAMPLES)
+                added.description, _, text = (module.__doc__ or '').partition(_EXAMPLES)
                 examples = text.splitlines()
-            added.epilog = '\n  '.join(['examples:', *examples])
+            if examples:  # python -OO drops them
+                added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name not in _WITHOUT_EFFECTS:
                 add_effects(added)

@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.binned import shaft_revs
 from shipdrag_ros.coastdown.regimes.given import (
     BRAKES,
     ENGINES,
@@ -176,9 +178,14 @@ class _Judge:
         kept = kept[0], self._to_rest(kept[1])
         start_ns = window.start_ns if kept[0] <= self._binned.before else self._ns(first)
         end_ns = window.end_ns if kept[1] >= len(self._binned.said) else self._ns(last)
-        if first > self._binned.before + 1:
+        down = []
+        if kept[0] <= self._binned.before and first > self._binned.before + 1:
             start_ns = self._ns(first)
+            down = [
+                NotCoastdown(window.start_ns, start_ns, Dismissal.THRUST, 'the thrust runs down')
+            ]
         cuts = [
+            *down,
             *self._cuts(self._binned.before, kept[0], gaps, kept),
             *self._cuts(kept[1], len(self._binned.said), gaps, kept),
         ]
@@ -199,17 +206,14 @@ class _Judge:
 
         `drives` is -1 where they drive before it, and 1 where they do so after it.
         """
-        found, parts = [], [self._window]
-        if self._window.before is not None:
-            parts.insert(0, self._window.before)
+        before = self._window.before
+        parts = (self._window,) if before is None else (before, self._window)
+        found = []
         for k in range(len(self._window.shafts)):
-            time_ns, turning = (
-                np.concatenate([getattr(part.shafts[k], name) for part in parts])
-                for name in ('time_ns', 'value')
-            )
+            time_ns, revs = shaft_revs(parts, k)
             at = (time_ns - self._binned.zero_ns) / (SECOND_NS * self._binned.step_s)
             near = np.abs(at - place) < _NEAR
-            driving = np.abs(turning[near]) >= n.CREEPS * abs(self._revs[k])
+            driving = np.abs(revs[near]) >= n.CREEPS * abs(self._revs[k])
             at, driving = at[near][::-drives], driving[::-drives]
             if len(at) and driving[0] and not driving[-1]:
                 found.append(at[np.flatnonzero(driving)[-1] + (drives < 0)])
@@ -217,11 +221,12 @@ class _Judge:
 
     def _turns_on(self, kept: _SPAN) -> tuple[str, ...]:
         """Say that a shaft turns faster than water turns it, and is taken not to drive her."""
-        turning = np.abs(self._binned.said[kept[0] : kept[1], SHAFTS : SHAFTS + 4])
-        part = np.abs(self._binned.speed[kept[0] : kept[1], np.newaxis]) / self._binned.top
+        late = slice(kept[0] + 2 * (kept[1] - kept[0]) // 3, kept[1])  # free revs have fallen
+        revs = np.abs(self._binned.said[late, SHAFTS : SHAFTS + 4])
+        part = np.abs(self._binned.speed[late, np.newaxis]) / self._binned.top
         with np.errstate(invalid='ignore', divide='ignore'):
-            over = turning / np.abs(self._revs) > n.WINDMILL[2] * part + n.CREEPS
-        if not over.any(axis=1).mean() > 0.5:
+            over = revs / np.abs(self._revs) > n.WINDMILL[2] * part + n.CREEPS
+        if not _mostly(over, revs):
             return ()
         return (
             'the shaft turns faster than the water turns it, though she slows as without thrust: '
@@ -258,13 +263,16 @@ class _Judge:
 
     def _swing(self, span: _SPAN) -> float:
         """Return the angle over which the heading swings in some bins [rad]."""
-        turned = np.nan_to_num(self._binned.said[span[0] : span[1], RATE]) * self._binned.step_s
-        rudder = self._binned.said[span[0] : span[1], RUDDER]
-        return float(np.ptp(np.cumsum(turned))) if not np.isfinite(rudder).any() else np.inf
+        bins = self._binned.said[span[0] : span[1]]
+        if not np.isfinite(bins[:, RATE]).any():  # what the rudder turns her by nothing shows
+            return np.inf if np.isfinite(bins[:, RUDDER]).any() else 0.0
+        return float(np.ptp(np.cumsum(np.nan_to_num(bins[:, RATE]))) * self._binned.step_s)
 
     def _worth(self, span: _SPAN) -> float:
         """Return the time that is kept, times the part of the speed that is lost in it."""
-        first = float(np.nanmean(self._binned.speed[span[0] : span[0] + 3]))
+        speed = self._binned.speed[span[0] : span[1]]
+        speed = speed[np.isfinite(speed)]
+        first = float(speed[:3].mean()) if len(speed) else 0.0
         if not first > self._slow:
             return -1.0
         return (span[1] - span[0]) * self._reading.lost(span) / first
@@ -350,8 +358,9 @@ class _Judge:
 
     def _reversed(self, turning: Float64) -> bool:
         """Say whether a shaft turns the other way than it mostly does."""
-        against = np.nan_to_num(turning) * np.sign(self._revs) < -n.CREEPS * np.abs(self._revs)
-        return bool(against.any(axis=1).mean() > 0.5)
+        with np.errstate(invalid='ignore'):
+            against = turning * np.sign(self._revs) < -n.CREEPS * np.abs(self._revs)
+        return _mostly(against, turning)
 
     def _shown(self) -> tuple[tuple[int, float], ...]:
         """Return the speed of the window, for a picture."""
@@ -366,6 +375,12 @@ class _Judge:
         """Return the time of a place in bins."""
         time_ns = self._binned.zero_ns + round(place * self._binned.step_s * SECOND_NS)
         return min(max(time_ns, self._window.start_ns), self._window.end_ns)
+
+
+def _mostly(so: NDArray[np.bool_], revs: Float64) -> bool:
+    """Say whether something holds of a shaft in most bins that one is read in."""
+    read_in = np.isfinite(revs).any(axis=1)
+    return bool(read_in.any() and so[read_in].any(axis=1).mean() > 0.5)
 
 
 def _without(span: _SPAN, gaps: list[_SPAN]) -> list[_SPAN]:

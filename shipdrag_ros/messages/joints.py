@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.gather import BODY, COLUMNS, TIME_BYTES, GatherResult
-from shipdrag_ros.messages.types import MalformedMessage
+from shipdrag_ros.messages.types import PADDING_BYTES, MalformedMessage
 from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Channel, Float64, Int64, UInt8
 
 PLACES = len(SHAFTS)
@@ -24,12 +24,12 @@ _CHANNELS = (*SHAFTS, *PITCHES, Channel.RUDDER)
 """Of each slot: of the shafts, of the pitches, and of the rudder."""
 _RUDDER = len(_CHANNELS) - 1
 _KIND = re.compile('(shaft|pitch)', re.IGNORECASE | re.ASCII)
-_NUMBER = re.compile(r'0*([0-9]+)\Z')
 _SIDE = re.compile(
     r'[^a-z]*(?:(port)|(starboard|stbd)|(centre|center)|\Z)(?![a-z])', re.IGNORECASE | re.ASCII
 )
 _WINDOW, _MOST = 64, 4096  # messages compared with the first; twice as many where all are alike
-_KEPT = 64  # layouts, by the size of their messages
+_MOST_BYTES = 1 << 20  # of messages compared at once
+_KEPT, _KEPT_BYTES = 64, 4096  # layouts, by the size of their messages, none of a longer one
 
 
 class Joints(NamedTuple):
@@ -108,7 +108,7 @@ def read_joints(
             rows.found[first] = GatherResult.MALFORMED
             left = left[1:]
             continue
-        near = left[:width]
+        near = left[: max(min(width, _MOST_BYTES // len(content)), 1)]
         alike = end[near] - start[near] == len(content)
         messages = data[start[near[alike]][:, np.newaxis] + np.arange(len(content))]
         same = (messages[:, layout.fixed] == layout.content).all(axis=1)
@@ -116,7 +116,7 @@ def read_joints(
         taken, messages = near[alike], messages[same]
         _fill(rows, taken, messages, layout, more)
         surplus += layout.surplus * len(taken)
-        left = np.concatenate((near[~alike], left[width:]))
+        left = np.concatenate((near[~alike], left[len(near) :]))
         width = min(2 * width, _MOST) if alike.all() else _WINDOW
     codes = [np.full(len(messages), code, np.uint8) for messages, code, _ in more]
     return Joints(
@@ -161,7 +161,8 @@ def _layout_of(content: UInt8, *, rudder: bool) -> _JointLayout | None:
     known = _known.get(key)
     if known is None or (content[known.fixed] != known.content).any():
         known = _layout(content, rudder=rudder)
-        if known is not None and (key in _known or len(_known) < _KEPT):
+        kept = len(content) <= _KEPT_BYTES and (key in _known or len(_known) < _KEPT)
+        if known is not None and kept:
             _known[key] = known
     return known
 
@@ -186,6 +187,8 @@ def _layout(content: UInt8, *, rudder: bool) -> _JointLayout | None:
         firsts.append(BODY + at)
         at += 8 * len(values)
         varies[firsts[-1] : BODY + at] = True
+    if not 0 <= len(content) - (BODY + at) <= PADDING_BYTES:
+        return None
     found = [
         (_CHANNELS[slot], firsts[moves] + 8 * joint)
         for slot, joint in sorted(joints.items())
@@ -235,8 +238,9 @@ def _slots(names: list[str], *, rudder: bool) -> tuple[dict[int, int], int]:
 
 def _place(rest: str) -> int | None:
     """Return the place, from 0, that the rest of a name says; None: the first that is free."""
-    if digits := _NUMBER.search(rest):
-        return (int(digits[1][:4]) or PLACES) - 1
+    # no pattern: a name of a stranger may be long, and a search for its end takes the square of it
+    if digits := rest[len(rest.rstrip('0123456789')) :]:
+        return (int(digits.lstrip('0')[:4] or 0) or PLACES) - 1
     side = _SIDE.match(rest)
     if side is None:
         return None

@@ -185,6 +185,21 @@ def test_a_shaft_that_keeps_its_revs_in_a_glide_is_told() -> None:
     assert 'zero pitch' in found.notes[0]
 
 
+def test_a_shaft_of_which_only_the_glide_is_read_may_windmill_without_a_note() -> None:
+    speed = 4.0 / (1.0 + 0.003 * TIME_S)
+    found = judged(block(LOG, noisy(speed)), block(SHAFT, 1.5 * speed))
+    assert is_whole(found)
+    assert found.notes == ()
+
+
+def test_a_pitch_that_is_read_once_holds() -> None:
+    revs = np.where(TIME_S < 10.0, 1.0, 0.6)
+    pitch = block(Channel.PITCH, np.array([0.8]), np.array([3.0]))
+    found = judged(block(LOG, noisy(slowed(revs))), block(SHAFT, 12.0 * revs), pitch)
+    assert found.failure is not None
+    assert 'the shaft turns' in found.failure
+
+
 def test_of_several_parts_the_better_one_is_kept_and_the_other_told() -> None:
     driven = (TIME_S > 60.0) & (TIME_S < 90.0)
     speed = np.where(TIME_S < 60.0, glide(TIME_S), glide(TIME_S, start_s=90.0, speed=1.64))
@@ -240,6 +255,23 @@ def test_rudder_over_at_the_end_is_cut_and_all_the_time_is_told() -> None:
     found = judged(block(LOG, noisy(glide(TIME_S))), always)
     assert is_whole(found)
     assert 'she turns' in found.notes[0]
+
+
+def test_a_rudder_amidships_is_no_turn() -> None:
+    still = np.zeros(len(TIME_S))
+    found = judged(
+        block(LOG, noisy(glide(TIME_S))), block(Channel.RUDDER, still), block(HEADING, still)
+    )
+    assert is_whole(found)
+    assert found.notes == ()
+
+
+def test_a_log_that_begins_late_hides_no_glide() -> None:
+    late, still = TIME_S >= 20.0, np.zeros(len(TIME_S))
+    log = block(LOG, noisy(glide(TIME_S))[late], TIME_S[late])
+    found = judged(log, block(HEADING, still))
+    assert found.failure is None
+    assert kept_s(found)[1] == LENGTH_S
 
 
 def test_going_astern_is_refused_by_the_log_and_by_the_course() -> None:

@@ -29,7 +29,7 @@ from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import FURTHER, MOTION_INPUTS, SECOND_NS, Float64
+from shipdrag_ros.samples import FURTHER, MOTION_INPUTS, SECOND_NS, Float64, Int64
 
 _BINS, _MOST = 60, 150  # of a window
 _BEFORE = 60  # at most
@@ -87,14 +87,14 @@ class _Bins(NamedTuple):
 
     def of(self, name: str, number: int | None = None) -> tuple[Float64, Float64]:
         """
-        Return times [bins] and values of an input.
+        Return times [bins] and values of an input; of a shaft revs times pitch.
         """
         if number is None:
             found = [part.series(name) for part in self.parts]
+            time_ns = np.concatenate([each.time_ns for each in found])
+            value = np.concatenate([each.value for each in found])
         else:
-            found = [getattr(part, name)[number] for part in self.parts]
-        time_ns = np.concatenate([each.time_ns for each in found])
-        value = np.concatenate([each.value for each in found])
+            time_ns, value = shaft_revs(self.parts, number)
         place = (time_ns - self.zero_ns) / (SECOND_NS * self.step_s)
         inside = (place >= 0.0) & (place < self.bins)
         return place[inside], value[inside]
@@ -240,8 +240,21 @@ def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
 def _shafts(bins: _Bins, said: Float64) -> None:
     """Put revs times pitch of each shaft into `said`."""
     for k in range(len(bins.parts[0].shafts)):
-        turning = bins.means(*bins.of('shafts', k))
-        place, pitch = bins.of('pitches', k)
-        if len(pitch):
-            turning = turning * bins.means(place, pitch)
-        said[:, SHAFTS + k] = turning
+        said[:, SHAFTS + k] = bins.means(*bins.of('shafts', k))
+
+
+def shaft_revs(parts: tuple[Window, ...], number: int) -> tuple[Int64, Float64]:
+    """
+    Return times [ns] of the readings of a shaft, and revs times the pitch of then [rad/s].
+
+    A pitch holds until the next is read, and the first one before it too.
+    """
+    time_ns, revs, pitch_ns, pitch = (
+        np.concatenate([getattr(getattr(part, name)[number], of) for part in parts])
+        for name in ('shafts', 'pitches')
+        for of in ('time_ns', 'value')
+    )
+    if len(pitch):
+        held = np.searchsorted(pitch_ns, time_ns, side='right') - 1
+        revs = revs * pitch[np.maximum(held, 0)]
+    return time_ns, revs

@@ -220,7 +220,7 @@ def _any_power(bank: Histories, i: int, setting: BankSetting, now_s: float, chan
         if regime != AMID or bank.whole[i, KIND] != kind:
             j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
             if j >= 0:
-                if regime not in (AMID, LEVEL):
+                if regime in (GLIDE, BRAKE, GLIDE_TURN):
                     _engages(bank, j)
                 amid(bank, j, setting, kind)
 
