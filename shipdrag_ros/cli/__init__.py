@@ -181,7 +181,7 @@ def parser(*of: str) -> argparse.ArgumentParser:
                 module = import_module(known.module, __name__)
             examples: Sequence[str] = known.examples
             if not examples:
-                added.description, _, text = (module.__doc__ or '').partition(_EXAMPLES)
+                added.description, _, text = (module.__doc__ or known.summary).partition(_EXAMPLES)
                 examples = text.splitlines()
             if examples:  # python -OO drops them
                 added.epilog = '\n  '.join(['examples:', *examples])

@@ -175,7 +175,7 @@ class _Judge:
         for gap in gaps:
             first = max(first, gap[1]) if gap[1] == kept[0] else first
             last = min(last, gap[0]) if gap[0] == kept[1] else last
-        kept = kept[0], self._to_rest(kept[1])
+        glide, kept = kept, (kept[0], self._to_rest(kept[1]))
         start_ns = window.start_ns if kept[0] <= self._binned.before else self._ns(first)
         end_ns = window.end_ns if kept[1] >= len(self._binned.said) else self._ns(last)
         down = []
@@ -193,11 +193,11 @@ class _Judge:
         notes: tuple[str, ...] = ()
         seen = any(reading.stretches(TURNS)) if TURNS in which else bool(len(window.heading))
         swing = self._swing(kept)
-        if seen and swing > self._turn_rad:
+        if seen and swing > self._turn_rad and (TURNS in which or swing < np.inf):
             by = f'by {math.degrees(swing):.0f} degrees' if swing < np.inf else 'by her rudder'
             notes = (f'she turns {by}: the drag of drifting and turning is part of r',)
         shown = self._shown() if cuts else ()
-        notes += self._turns_on(kept)
+        notes += self._turns_on(glide)
         return GivenPart(start_ns, end_ns, tuple(cuts), None, notes, shown)
 
     def _stood(self, place: float, drives: int) -> float:
@@ -264,7 +264,8 @@ class _Judge:
     def _swing(self, span: _SPAN) -> float:
         """Return the angle over which the heading swings in some bins [rad]."""
         bins = self._binned.said[span[0] : span[1]]
-        if not np.isfinite(bins[:, RATE]).any():  # what the rudder turns her by nothing shows
+        # where nothing shows what the rudder turns her by
+        if not np.isfinite(bins[:, RATE]).mean() > 0.5:
             return np.inf if np.isfinite(bins[:, RUDDER]).any() else 0.0
         return float(np.ptp(np.cumsum(np.nan_to_num(bins[:, RATE]))) * self._binned.step_s)
 

@@ -257,11 +257,11 @@ def test_rudder_over_at_the_end_is_cut_and_all_the_time_is_told() -> None:
     assert 'she turns' in found.notes[0]
 
 
-def test_a_rudder_amidships_is_no_turn() -> None:
+@pytest.mark.parametrize('every', [1, 5])
+def test_a_rudder_amidships_is_no_turn(every: int) -> None:
     still = np.zeros(len(TIME_S))
-    found = judged(
-        block(LOG, noisy(glide(TIME_S))), block(Channel.RUDDER, still), block(HEADING, still)
-    )
+    heading = block(HEADING, still[::every], TIME_S[::every])
+    found = judged(block(LOG, noisy(glide(TIME_S))), block(Channel.RUDDER, still), heading)
     assert is_whole(found)
     assert found.notes == ()
 

@@ -132,7 +132,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
         # one so far behind would weigh nothing, as a history that is so
         likely = [each >= max(evidence) - LOST for each in evidence]
         banks, evidence = list(compress(banks, likely)), list(compress(evidence, likely))
-    if not np.isfinite(max(evidence)):  # rounding broke every one: nothing is known of it
+    if not evidence or not np.isfinite(max(evidence)):  # rounding broke every one
         return None
     share = np.exp(np.array(evidence) - max(evidence))
     share /= share.sum()
