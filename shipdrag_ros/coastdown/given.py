@@ -28,6 +28,7 @@ from shipdrag_ros.coastdown.regimes.given import (
     most_revs,
     read,
 )
+from shipdrag_ros.coastdown.regimes.read_out import stretches
 from shipdrag_ros.coastdown.regimes.state import RATE, RUDDER, SHAFTS
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
@@ -281,11 +282,8 @@ class _Judge:
     def _gaps(self, data_stop_s: float) -> list[_SPAN]:
         """Return the bins of stretches in which nothing shows the motion for long."""
         silent = ~np.isfinite(self._binned.speed)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], silent, [False]])))
         return [
-            (int(a), int(b))
-            for a, b in edges.reshape(-1, 2)
-            if (b - a) * self._binned.step_s > data_stop_s
+            (a, b) for a, b in stretches(silent) if (b - a) * self._binned.step_s > data_stop_s
         ]
 
     def _cuts(

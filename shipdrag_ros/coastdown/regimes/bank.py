@@ -286,7 +286,6 @@ _SETTING = BankSetting(
     0,
     0.0,
     0.0,
-    0.0,
 )  # its types are all that counts
 
 

@@ -15,7 +15,13 @@ from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
 from shipdrag_ros.coastdown.regimes.births import LOST
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
-from shipdrag_ros.coastdown.regimes.read_out import Spans, median, probability_of, spans_of
+from shipdrag_ros.coastdown.regimes.read_out import (
+    Spans,
+    median,
+    probability_of,
+    spans_of,
+    stretches,
+)
 from shipdrag_ros.coastdown.regimes.state import (
     AMID,
     BRAKE,
@@ -66,8 +72,7 @@ class WindowRegimes:
         """
         likely = self.probability[list(which)].sum(axis=0) > n.HOLD[0]
         likely[: self.binned.before] = False
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], likely, [False]])))
-        return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+        return stretches(likely)
 
     def lost(self, span: tuple[int, int]) -> float:
         """
@@ -115,13 +120,12 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     setting = BankSetting.of(hull, binned.step_s, shafts=int(read_out.sum()))._replace(
         told_s=binned.before * binned.step_s,
         engine=max(resistance, binned.swing),
-        log_first=math.log(binned.top),
     )
     # a log errs by a part of the speed: as that of the ship of the table
     wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
     short, long = n.WANDER_S
     settings = [*product(n.ANY_GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
-    banks = [_bank(binned, setting, *each) for each in settings]
+    banks = [_bank(binned, *each) for each in settings]
     evidence = [0.0 for _ in banks]
     for k, said in enumerate(binned.said):
         for each, bank in enumerate(banks):
@@ -148,9 +152,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     return WindowRegimes(binned, joined, np.array(probability), rest_speed(hull))
 
 
-def _bank(
-    binned: Binned, setting: BankSetting, gust: float, wander: float, wander_s: float
-) -> Bank:
+def _bank(binned: Binned, gust: float, wander: float, wander_s: float) -> Bank:
     """Return a bank that is to read a window with some noise."""
     bank = Bank.fresh()
     noise = bank.noise.used
@@ -158,7 +160,7 @@ def _bank(
     noise[N_GUST] = gust
     noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
     bank.revs[:] = most_revs(binned)
-    bank.first[:] = setting.log_first, 60.0, np.nan
+    bank.first[:] = math.log(binned.top), 60.0, np.nan
     # what nothing shows before the first bin that is read goes by
     bank.histories.clock[0] = np.argmax(np.isfinite(binned.speed))
     return bank

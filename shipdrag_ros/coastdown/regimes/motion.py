@@ -455,8 +455,9 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
 
 @compiled(uncounted=True)
 def _shown_level(
-    bank: Histories, i: int, setting: BankSetting, nu: float, now_s: float, work: Float64
-) -> float:
+    bank: Histories, i: int, setting: BankSetting, nu: float, log_first: float, now_s: float,
+    work: Float64,
+) -> float:  # fmt: skip
     """Take the revs for those of a level that is reached in this bin; return the log density."""
     f, x = bank.number[i], bank.mean[i]
     reached_s = f[SINCE] + f[RAMP_S]
@@ -466,7 +467,7 @@ def _shown_level(
     for j in range(STATES):
         h[j] = 0.0
     h[OPEN] = 1.0
-    off = math.log(nu) - (x[OPEN] - setting.log_first)
+    off = math.log(nu) - (x[OPEN] - log_first)
     return float(_take(x, bank.spread[i], h, work, off, n.SHAFT_FIRST_SD**2, 1.0, setting.hull)[0])
 
 
@@ -496,7 +497,7 @@ def _shaft(
         moves = n.ENGINE_MOVES[bank.whole[i, KIND]]
         shown = math.log((1.0 - moves) * _off(nu, before) + moves)
         if regime == LEVEL:
-            shown += _shown_level(bank, i, setting, nu, now_s, work)
+            shown += _shown_level(bank, i, setting, nu, log_first, now_s, work)
         return shown
     if regime == AMID:
         density = 0.8 if 0.0 < nu < 1.25 else 0.0

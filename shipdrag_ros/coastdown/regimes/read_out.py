@@ -176,7 +176,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
     found, step_s = found.part(found.what == GLIDE), setting.step_s
     likely = _over_time(found.weight, found.gone_s, found.end_s, len(speed), step_s)
     all_of: list[SmoothedGlide] = []
-    for first, last in _stretches(likely > n.HOLD[0]):
+    for first, last in stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())
         # a glide that was not over at a doubt goes on after it
         if peak < n.HOLD[1] or (all_of and first * step_s < all_of[-1].end_s):
@@ -194,7 +194,10 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
     return all_of
 
 
-def _stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """
+    Return first bins, and those after the last, of the stretches in which something holds.
+    """
     padded = np.concatenate([[False], inside, [False]])
     edges = np.flatnonzero(padded[1:] != padded[:-1])
     return [(int(first), int(last)) for first, last in edges.reshape(-1, 2)]
@@ -245,7 +248,7 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     )
     return [
         (first * step_s, last * step_s)
-        for first, last in _stretches(likely > _LIKELY)
+        for first, last in stretches(likely > _LIKELY)
         if acted[first:last].max() > _LIKELY
     ]
 

@@ -118,8 +118,6 @@ class BankSetting(NamedTuple):
     engine
         What an engine may give or take in a window that a person claims [m/s^2]; 0 where a record
         is followed, in which she sails evenly between manoeuvres.
-    log_first
-        ln of the highest speed of such a window; NaN elsewhere.
     """
 
     hull: HullPrior
@@ -128,11 +126,10 @@ class BankSetting(NamedTuple):
     shafts: int
     told_s: float
     engine: float
-    log_first: float
 
     @classmethod
     def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan, 0.0, np.nan)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan, 0.0)
