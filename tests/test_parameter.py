@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from shipdrag_ros.parameter import (
-    Parameter,
     Prior,
     Shape,
     either_sign,
@@ -75,11 +73,6 @@ def test_a_baseline_that_is_far_off_costs_less_than_a_normal_one() -> None:
     assert stated.penalty(0.5) == pytest.approx(normal_one.penalty(0.5), abs=0.1)
     # twenty standard deviations off is no accident
     assert stated.penalty(20.0) > 40.0
-
-
-def test_a_parameter_can_be_sent_to_another_process() -> None:
-    one = Parameter(0.35, 0.02, name='friction_factor', prior=normal(0.2))
-    assert pickle.loads(pickle.dumps(one)) == one
 
 
 def test_a_heavy_tailed_density_is_a_mixture_that_adds_up_to_one() -> None:

@@ -49,13 +49,6 @@ FAULTS = {
 }
 
 
-def found(ship, block: Block, **estimators) -> EndedCoastdown:
-    monitor = Monitor(ship, Parameters(), **estimators)
-    events = monitor.update(block) + monitor.finish()
-    [coastdown] = [event for event in events if isinstance(event, EndedCoastdown)]
-    return coastdown
-
-
 def spoilt(block: Block, channel: Channel, spoil) -> Block:
     rows = block.channel == channel
     columns = 2 if channel is TRACK else 1

@@ -44,19 +44,6 @@ def test_a_bin_is_the_mean_of_its_second() -> None:
     np.testing.assert_allclose(time, [-1.0 + 1.4 / 3.0, 0.2], atol=5e-4)
 
 
-@pytest.mark.parametrize('rate_hz', [0.2, 1.0, 20.0])
-def test_a_line_is_least_squares(rate_hz: float) -> None:
-    rng = np.random.default_rng(1)
-    time = np.arange(0.3, 100.0, 1.0 / rate_hz)
-    bins = binned(LOG, time, 8.0 - 0.02 * time + 0.05 * rng.standard_normal(len(time)))
-    slope, level, count = line(bins, LOG, FIRST + 90, WIDTH)
-    t, v = speeds(bins, LOG, FIRST + 31, FIRST + 90)
-    expected = np.polyfit(t, v, 1)
-    assert count == len(t)
-    np.testing.assert_allclose(slope, expected[0], rtol=1e-9)
-    np.testing.assert_allclose(level, np.polyval(expected, t[-1]), rtol=1e-12)
-
-
 @settings(max_examples=40, deadline=None)
 @given(
     before=st.lists(st.floats(-40.0, 40.0), max_size=300),
@@ -96,13 +83,6 @@ def test_the_longest_line_does_not_overflow() -> None:
     slope, level, _ = line(bins, LOG, FIRST + 4800, 4800)
     np.testing.assert_allclose(slope, 80.0 / 4801.0, rtol=1e-6)
     np.testing.assert_allclose(level, 40.0 - 80.0 / 4801.0, rtol=1e-6)
-
-
-def test_a_line_needs_points_over_the_window() -> None:
-    bins = binned(LOG, np.arange(100.0), 0.1 * np.arange(100.0))
-    assert np.isnan(line(bins, LOG, FIRST + 98 + WIDTH, WIDTH)[0])
-    assert np.isnan(line(bins, LOG, FIRST + 2, WIDTH)[0])
-    assert not np.isnan(line(bins, LOG, FIRST + 98, WIDTH)[0])
 
 
 def test_a_line_reaches_back_over_a_gap() -> None:

@@ -233,19 +233,6 @@ def test_a_turn_at_the_end_is_cut_by_heading_and_by_course() -> None:
     assert kept_s(found)[1] == pytest.approx(200.0, abs=15.0)
 
 
-def test_a_turn_all_the_time_is_told() -> None:
-    found = judged(block(LOG, noisy(glide(TIME_S))), block(HEADING, TIME_S * 0.02))
-    assert is_whole(found)
-    assert 'she turns' in found.notes[0]
-
-
-def test_a_small_turn_is_none() -> None:
-    turn = block(HEADING, np.minimum(TIME_S * 0.02, 0.3))
-    found = judged(block(LOG, noisy(glide(TIME_S))), turn)
-    assert is_whole(found)
-    assert found.notes == ()
-
-
 def test_rudder_over_at_the_end_is_cut_and_all_the_time_is_told() -> None:
     rudder = np.where(TIME_S < 220.0, 0.0, -0.5)
     found = judged(block(LOG, noisy(glide(TIME_S))), block(Channel.RUDDER, rudder))

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,6 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 
@@ -40,20 +37,6 @@ def monitor(ship, *, estimate=window_only, **parameters) -> Monitor:
 
 def of(kind, events):
     return [event for event in events if isinstance(event, kind)]
-
-
-def test_real_estimates_while_a_coastdown_runs(ship, record) -> None:
-    events = Monitor(ship, Parameters(update_s=100.0)).update(record())
-    (onset,) = of(Onset, events)
-    updates = of(Update, events)
-    assert len(updates) >= 5
-    assert all(isinstance(update.estimate, Estimate) for update in updates)
-    for update in updates:
-        assert update.estimate.start_ns >= onset.start_ns
-        assert update.estimate.end_ns <= update.stamp_ns
-    r = updates[-1].estimate.curve
-    truth = ship.resistance_n(6.0) / ship.mass_kg
-    np.testing.assert_allclose(np.interp(6.0, r.speed_m_s, r.resistance_m_s2), truth, rtol=0.1)
 
 
 def test_states_in_turn(ship, record) -> None:
@@ -208,14 +191,6 @@ def test_the_heading_before_the_onset_is_given(ship, record, sensors) -> None:
 def test_without_a_heading_none_is_given(ship, record) -> None:
     watched = monitor(ship)
     assert of(EndedCoastdown, watched.update(record()) + watched.finish())[0].heading_rad is None
-
-
-def test_other_sources_take_over_from_a_silent_log(ship, record, sensors) -> None:
-    radar = replace(sensors['radar'], sd=3.0)
-    both = record(sensors=(sensors['log'], radar))
-    silent = both[(both.channel != LOG) | (both.stamp_ns < START_NS + 200 * S)]
-    (onset,) = of(Onset, monitor(ship, estimate=refuse).update(silent))
-    assert abs(onset.start_ns - START_NS - 900 * S) < 20 * S
 
 
 def test_speed_over_ground_will_do(ship, record) -> None:

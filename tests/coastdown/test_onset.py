@@ -32,7 +32,6 @@ from shipdrag_ros.simulation import (
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
 LOG = int(Channel.SPEED_THROUGH_WATER)
-STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
 
 
 def refuse(window, ship, parameters):
@@ -129,19 +128,6 @@ def test_an_even_run_down_is_dated_where_the_thrust_is_gone(watch, record, senso
     turning = np.where(second < 10.0, ramp, np.minimum(turning, ramp.clip(0.5 * 11.0)))
     (onset,) = onsets(watch(with_shaft(block, stamps, turning)))
     assert -8.0 <= after_s(onset.start_ns, 900.0) <= 5.0
-
-
-def test_a_shaft_that_holds_its_speed_asks_for_more(watch, record, sensors) -> None:
-    # the propeller is driven at half of its speed
-    driven = record(
-        sensors=(sensors['log'], sensors['shaft']),
-        orders=(EngineOrder(0.0, shaft=0.5, thrust=0.25),),
-    )
-    events = watch(driven)
-    # what is announced at first is withdrawn as the speed settles
-    assert standing(events) == []
-    assert {one.reason for one in dismissed(events)} <= {Dismissal.THRUST, Dismissal.SETTLED}
-    assert dismissed(events)
 
 
 @pytest.mark.parametrize('seed', range(2))
@@ -262,12 +248,6 @@ def test_what_is_dismissed_is_told_with_figures(watch, record, sensors) -> None:
 def test_a_shaft_sensor_that_reads_nothing_does_not_veto(watch, record, sensors) -> None:
     block = record(sensors=(sensors['log'], sensors['shaft']), shaft_rad_s=0.0)
     assert len(onsets(watch(block))) == 1
-
-
-@pytest.mark.parametrize('seed', range(2))
-def test_a_slow_down_is_no_coastdown(watch, record, seed: int) -> None:
-    block = record(orders=(EngineOrder(0.0, shaft=0.7, thrust=0.49),), seed=seed)
-    assert onsets(watch(block)) == []
 
 
 @pytest.mark.parametrize('seed', range(2))

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
@@ -21,7 +19,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.regimes.numbers import NUMBERS, table
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
 
 START_NS = 1_700_000_000_000_000_000
@@ -72,14 +70,6 @@ def test_less_power_is_no_coastdown_and_is_named(ship, record, sensors, seed) ->
     assert {each.reason for each in of(NotCoastdown, events)} == {Dismissal.SETTLED}
 
 
-def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
-    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(400.0, shaft=1.0, thrust=1.0))
-    events = events_of(ship, record(sensors=(LOG, SHAFT), orders=orders, duration_s=1200.0))
-    (ended,) = [each for each in of(EndedCoastdown, events) if not each.withdrawn]
-    assert ended.ended_by is EndedBy.ENGINE
-    assert abs(ended.end_ns - START_NS - 1300 * S) < 30 * S
-
-
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
     orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.3, thrust=0.07))
     block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
@@ -125,29 +115,6 @@ def test_a_compass_that_is_first_heard_in_a_glide_does_not_end_it(ship, record, 
     assert ended.ended_by is EndedBy.RECORD_END
 
 
-@pytest.mark.parametrize('apart_s', [20.0, 90.0])
-def test_of_several_shafts_the_last_that_stops_counts(ship, record, apart_s) -> None:
-    orders = (
-        EngineOrder(0.0, shaft=1.0, thrust=0.5),
-        EngineOrder(apart_s, shaft=0.0, thrust=0.0),
-    )
-    block = record(orders=orders, duration_s=1200.0)
-    since = (block.stamp_ns - START_NS) / S - 900.0
-    rng = np.random.default_rng(4)
-    shafts = [
-        Block.of(
-            channel,
-            block.stamp_ns,
-            11.0 * np.minimum(1.0, np.exp((stop_s - since) / 8.0))
-            + 0.03 * rng.standard_normal(len(block)),
-        )
-        for channel, stop_s in ((Channel.SHAFT, 0.0), (Channel.SHAFT_2, apart_s))
-    ]
-    both = in_arrival_order([block, *shafts])
-    (ended,) = [each for each in of(EndedCoastdown, events_of(ship, both)) if not each.withdrawn]
-    assert -1.0 <= (ended.start_ns - START_NS) / S - 900.0 - apart_s <= 10.0
-
-
 def test_a_ship_that_was_slow_a_while_before_is_judged_still(ship, record) -> None:
     block = record(sensors=(LOG,), seed=1)
     since_s = (block.stamp_ns - START_NS) / S
@@ -178,16 +145,6 @@ def test_a_record_of_what_no_ship_does_is_explained_less_well(ship, record) -> N
         (*_, ended) = of(EndedCoastdown, events_of(ship, replace(block, value=value)))
         explained.append(ended.regimes.explained)
     assert explained[0] > 0.05 > explained[1]
-
-
-@given(seed=st.integers(0, 2**16))
-@settings(max_examples=5, deadline=None)
-def test_how_a_record_is_cut_changes_no_bit(ship, record, bits, seed) -> None:
-    block = record(sensors=(LOG, SHAFT), seed=4)
-    whole = events_of(ship, block)
-    assert of(EndedCoastdown, whole)
-    places = np.sort(np.random.default_rng(seed).integers(0, len(block), 40)).tolist()
-    assert bits(events_of(ship, block, places)) == bits(whole)
 
 
 def test_the_docs_print_the_numbers_of_the_code() -> None:

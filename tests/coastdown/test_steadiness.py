@@ -98,14 +98,3 @@ def test_nothing_is_known_at_first_then_a_guess_then_more() -> None:
     assert 0.0 < guess.limit[LOG, 0] < 0.02
     assert np.isnan(guess.limit[LOG, 1])
     assert np.all(learnt(speed).limit[LOG] < guess.limit[LOG, 0])
-
-
-@pytest.mark.parametrize('window', [5.0, 60.0])
-def test_a_gap_in_the_record_is_survived(window: float) -> None:
-    speed = noise(1500, 11)
-    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
-    monitor = Monitor(ship, Parameters(slope_window_s=window))
-    seconds = FIRST + np.array([*range(700), *range(1_000_000, 1_000_700)])
-    stamps = seconds * SECOND_NS
-    monitor.update(Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed[: len(stamps)]))
-    assert 0.0 < monitor._memory.steadiness.limit[LOG, 0] < 1.0

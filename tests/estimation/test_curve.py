@@ -14,7 +14,6 @@ from shipdrag_ros.estimation.curve import (
     ValidRange,
     froude_max,
     resistance_curve,
-    specific_resistance,
 )
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -48,25 +47,6 @@ def curve(froude: np.ndarray, slope: np.ndarray, slope_sigma: float) -> Resistan
 
 
 FALL = np.polynomial.Polynomial([8.0, -0.012, 8e-6, -2e-9])
-
-
-def test_resistance_and_its_parts(ship: Ship) -> None:
-    falling = motion(np.linspace(0.0, 600.0, 50), FALL)
-    r, total, repeatable = specific_resistance(falling, ship)
-    inertia = 1.0 + ship.n_r(falling.speed)
-    np.testing.assert_allclose(r, -inertia * falling.acceleration, rtol=1e-15)
-    np.testing.assert_allclose(repeatable, inertia * 1e-5, rtol=1e-14)
-    of_n_r = ship.added_mass.sd * np.abs(falling.acceleration)
-    np.testing.assert_allclose(total**2, repeatable**2 + of_n_r**2, rtol=1e-13)
-
-
-def test_slope_against_differences(ship: Ship) -> None:
-    time_s = np.linspace(0.0, 600.0, 4001)
-    found = resistance_curve(motion(time_s, FALL), ship, froude_min=0.05)
-    assert np.all(np.diff(found.speed_m_s) > 0.0)
-    np.testing.assert_allclose(found.froude, ship.froude(found.speed_m_s), rtol=1e-15)
-    expected = np.gradient(found.resistance_m_s2, found.froude)
-    np.testing.assert_allclose(found.slope[5:-5], expected[5:-5], rtol=1e-5)
 
 
 def test_curve_is_that_of_plain_numpy(ship: Ship) -> None:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, decode, types
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.gather import steps
-from shipdrag_ros.samples import FURTHER, concatenate
+from shipdrag_ros.samples import FURTHER, Channel, concatenate
 
 SOURCES = [
     Source(name, type_name)
@@ -120,6 +120,8 @@ def agree(source: Source, payload: bytes, message: Any) -> None:
         stamp = message.header.stamp
         stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     assert block.stamp_ns.tolist() == [stamp_ns]
+    assert types.stated_stamp_ns(source.type, payload, 5) == stamp_ns
+    assert [Channel(code).input for code in block.channel] == [source.input]
     found = [*block.value[0].tolist(), *block.variance[0].tolist()]
     if FURTHER.get(source.input, source.input) in (
         'heading',
@@ -128,6 +130,16 @@ def agree(source: Source, payload: bytes, message: Any) -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
     else:
         np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize('source', SOURCES, ids=IDS)
+@pytest.mark.parametrize('little', [True, False])
+def test_a_rotation_and_plain_numbers(reference: Any, source: Source, little: bool) -> None:
+    numbers = [0.1, 0.2, 0.3, math.sqrt(1 - 0.14), 0.5, 0.6, 0.7, 0.8]
+    message = reference.message(source.type, 10**18 + 7, 'a frame', numbers)
+    agree(source, reference.serialize(source.type, message, little_endian=little), message)
+    over_water = 'Dvl' in source.type and source.input.startswith('speed_over_ground')
+    assert math.isnan(fields(source, message)[0]) is over_water
 
 
 @pytest.mark.parametrize('source', SOURCES, ids=IDS)

@@ -151,14 +151,6 @@ def test_what_gives_nothing_is_counted() -> None:
     assert interpreter.sentences == 6
 
 
-def test_invented_addresses_take_no_memory() -> None:
-    interpreter = Interpreter()
-    for number in range(2000):
-        interpreter.messages(sentence(f'GP{number:03X},1'), LINE, START_NS)
-    assert len(interpreter.unknown) <= 51
-    assert interpreter.unknown['others'] + 50 == interpreter.unknown.total()
-
-
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=120))
 def test_no_text_is_an_error(content: str) -> None:
     interpreter = Interpreter()

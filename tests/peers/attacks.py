@@ -4,45 +4,35 @@ What a stranger does to a node and its page, a line each: goal and result.
 
 `python tests/peers/attacks.py` tries every line, or those that are named, and prints
 the table of docs/results/attacks.txt; `--write` puts it there. It shares no code
-with the package.
+with the package. What else is tried is in `tests/node` and `tests/live/test_guard.py`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import random
 import re
-import resource
-import shutil
 import signal
 import socket
-import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-import urllib.error
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 if __name__ == '__main__':
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(110 + os.getpid() % 90))
 
-import itertools
 
-import rclpy
-from geometry_msgs.msg import TwistStamped, VelocityStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterType
 from rcl_interfaces.srv import SetParameters
-from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from stranger import (
     OK,
@@ -50,14 +40,11 @@ from stranger import (
     Clock,
     Program,
     Stranger,
-    ask,
     cdr_twist,
     coasting,
-    get,
     nmea,
     payloads,
     point,
-    records,
     twist,
 )
 
@@ -91,10 +78,6 @@ class Bench:
         line = ('node', '--ship', self.folder / 'ship.yaml', '--out', self.bags, *options)
         return self.start(*line, '--ros-args', *ros, until=READY)
 
-    def page(self, *options: str) -> str:
-        program = self.start('watch', '--port', '0', *options, until=r'http://\S+/')
-        return program.wait_for(r'http://\S+/')
-
     def run(self, *line: str | Path, check: bool = True) -> str:
         """Run a verb to its end; return all that it says."""
         done = subprocess.run(
@@ -106,17 +89,6 @@ class Bench:
             timeout=600.0,
         )
         return done.stdout + done.stderr
-
-    def ship_with_baseline(self) -> Path:
-        return Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
-
-    def lags_s(self, topic: str) -> list[float]:
-        """Return arrival minus stamp of a topic in the bags [s]."""
-        return [
-            (message.log_time - message.publish_time) * 1e-9
-            for found, message in records(sorted(self.bags.glob('*.mcap')))
-            if found == topic
-        ]
 
     def sail(self, *, ground: bool = False) -> None:
         """One sound reading of the log, never the same twice."""
@@ -137,120 +109,9 @@ class Bench:
             self.peer.spin(0.1)
         return time.monotonic() - began_s
 
-    def gaps(self, since: int) -> float:
-        """Return the longest time between two reports since one of them [s]."""
-        times = [*self.peer.heard_s[max(since - 1, 0) :], time.monotonic()]
-        return max(after - before for before, after in itertools.pairwise(times))
-
 
 def late(seconds: float | None) -> str:
     return 'never' if seconds is None else f'after {seconds:.0f} s'
-
-
-# recordings
-
-
-def another_nodes_file_stays(bench: Bench) -> Found:
-    node = bench.node()
-    bench.seconds_until(
-        lambda: bench.peer.value(LOG, 'used') > 20, meanwhile=bench.sail, within_s=30.0
-    )
-    mine = set(bench.bags.glob('*.mcap'))
-    for number in range(3):  # finished parts of an earlier voyage, which may go
-        shutil.copy(next(iter(mine)), bench.bags / f'coastdown_20200101T00000{number}Z_001.mcap')
-    bench.node('--keep-bytes', '5000', ros=('-r', '__node:=other'))
-    bench.seconds_until(lambda: False, meanwhile=bench.sail, within_s=15.0)
-    old = list(bench.bags.glob('coastdown_2020*'))
-    stays = all(path.exists() for path in mine)
-    lost = bench.peer.value('recording', 'messages lost')
-    node.end(signal.SIGTERM)
-    kept = len(payloads(sorted(mine), '/speed_through_water')) if stays else 0
-    good = stays and not old and kept > 20 and not lost
-    return good, f'it stays: {stays}, {kept} readings in it; {3 - len(old)} of 3 old parts went'
-
-
-def a_file_that_vanishes_is_counted(bench: Bench) -> Found:
-    bench.node()
-    bench.seconds_until(
-        lambda: bench.peer.value(LOG, 'used') > 20, meanwhile=bench.sail, within_s=30.0
-    )
-    for path in bench.bags.glob('*.mcap'):
-        path.unlink()
-
-    def said() -> bool:
-        status = bench.peer.now('recording')
-        return bench.peer.value('recording', 'messages lost') > 0 or (
-            status is not None and status.level[0] != OK
-        )
-
-    seconds = bench.seconds_until(said, meanwhile=bench.sail, within_s=20.0)
-    again = bench.seconds_until(
-        lambda: list(bench.bags.glob('*.mcap')), meanwhile=bench.sail, within_s=20.0
-    )
-    lost = bench.peer.value('recording', 'messages lost')
-    good = seconds is not None and again is not None and lost > 0
-    return good, f'said {late(seconds)}, {lost:.0f} counted lost; a new file {late(again)}'
-
-
-def the_share_of_the_disk_is_said(bench: Bench) -> Found:
-    node = bench.node()
-    bench.seconds_until(lambda: bench.peer.now('recording'), meanwhile=bench.sail, within_s=20.0)
-    quota = {item.key: item.value for item in bench.peer.now('recording').values}.get('quota', '')
-    said = 'of the disk' in quota and 'none that holds a coastdown' in quota
-    return said and quota in node.log, quota
-
-
-def one_flipped_bit(bench: Bench) -> Found:
-    """Half an hour of three inputs at 10 Hz, simulated by the program, damaged by the stranger."""
-    bag = bench.folder / 'sound.mcap'
-    bench.run('simulate', '--ship', bench.ship_with_baseline(), '-o', bag, '--duration', '900')
-    whole = bag.read_bytes()
-    count = sum(1 for _ in records([bag]))
-    shares = []
-    for seed in range(5):
-        damaged = bytearray(whole)
-        damaged[random.Random(seed).randrange(len(whole) // 10, len(whole) * 9 // 10)] ^= 4
-        hurt, saved = bench.folder / f'hurt{seed}.mcap', bench.folder / f'saved{seed}.mcap'
-        hurt.write_bytes(damaged)
-        bench.run('recover', hurt, '-o', saved)
-        shares.append(1.0 - sum(1 for _ in records([saved])) / count)
-    text = f'{statistics.median(shares):.2%} of {count} messages, at most {max(shares):.2%}'
-    return max(shares) < 0.02, text
-
-
-def kill_9(bench: Bench) -> Found:
-    """Nothing that was received more than a second before is lost."""
-    missing = 0
-    received = 0
-    for number in range(KILLS):
-        node = bench.node()
-        sent = []
-
-        def sail(sent: list[bytes] = sent) -> None:
-            sent.append(cdr_twist(time.time_ns(), 5.0 + 1e-4 * len(sent)))
-            bench.peer.log.publish(sent[-1])
-
-        since = len(bench.peer.arrays)
-        bench.seconds_until(
-            lambda since=since: (
-                len(bench.peer.arrays) > since and bench.peer.value(LOG, 'used') > 10
-            ),
-            meanwhile=sail,
-            within_s=30.0,
-        )
-        had = int(bench.peer.value(LOG, 'messages'))
-        bench.seconds_until(lambda: False, meanwhile=sail, within_s=1.2 + 0.1 * (number % 7))
-        node.end(signal.SIGKILL)
-        newest = max(bench.bags.glob('*.mcap'), key=lambda path: path.stat().st_mtime_ns)
-        name = re.sub(r'_\d+$', '', newest.stem)
-        left = payloads(sorted(bench.bags.glob(f'{name}*')), '/speed_through_water')
-        joined = sent.index(left[0]) if left else 0
-        missing += sum(each not in left for each in sent[joined : joined + had])
-        received += had
-    return not missing, f'{KILLS} kills, {missing} of {received} lost'
-
-
-KILLS = 20
 
 
 def under_way(bench: Bench) -> tuple[list[bytes], Callable[[], None]]:
@@ -282,74 +143,6 @@ def stopped_for_15_s(bench: Bench) -> Found:
     return good, f'{len(left)} of {len(sent) - joined} recorded, {rejected:.0f} rejected'
 
 
-# sources
-
-
-def another_type_was_first(bench: Bench) -> Found:
-    """It sends nothing, no number, or is gone: a driver of another type comes later."""
-    said, good = [], True
-    for first in ('silent', 'no number', 'gone'):
-        bench.peer.close()
-        bench.peer = Stranger(None)
-        node = bench.node('--keep-days', '0', ros=('-p', 'record:=false'))
-        other = Stranger(VelocityStamped, name='first')
-        bench.seconds_until(lambda: False, meanwhile=lambda: None, within_s=2.0)
-        if first == 'gone':
-            other.close()
-        bench.peer.send_ground(TwistStamped)
-
-        def sail(first: str = first, other: Stranger = other) -> None:
-            now_ns = time.time_ns()
-            bench.peer.ground.publish(twist(now_ns, 5.0 + 0.01 * math.sin(now_ns * 1e-9)))
-            if first == 'no number':
-                message = VelocityStamped()
-                message.header.stamp = twist(now_ns, 0.0).header.stamp
-                message.velocity.linear.x = math.nan
-                other.ground.publish(message)
-
-        part = 'input speed_over_ground'
-        seconds = bench.seconds_until(
-            lambda part=part: bench.peer.value(part, 'used') > 5, meanwhile=sail, within_s=60.0
-        )
-        named = 'VelocityStamped is given up' in node.log or 'now hearing' in node.log
-        good = good and seconds is not None and named
-        said.append(f'{first}: {late(seconds)}{"" if named else ", not said"}')
-        if first != 'gone':
-            other.close()
-        node.end(signal.SIGTERM)
-    return good, '; '.join(said)
-
-
-def a_sentence_a_second(bench: Bench) -> Found:
-    port = free_port()
-    node = bench.node('--nmea', f'udp://127.0.0.1:{port}')
-    line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    ended = threading.Event()
-
-    def talk() -> None:
-        number = 0
-        while not ended.wait(1.0):
-            number += 1
-            text = nmea(f'IIVHW,,T,,M,{9.7 + 0.01 * (number % 7):.2f},N,,K')
-            line.sendto(text, ('127.0.0.1', port))
-
-    talking = threading.Thread(target=talk)
-    talking.start()
-    try:
-        fed = bench.seconds_until(
-            lambda: bench.peer.value(LOG, 'used') > 3, meanwhile=lambda: None, within_s=30.0
-        )
-        seconds = bench.seconds_until(
-            lambda: 'now from a topic, no longer from NMEA' in node.log,
-            meanwhile=bench.sail,
-            within_s=60.0,
-        )
-    finally:
-        ended.set()
-        talking.join()
-    return fed is not None and seconds is not None, f'the topic feeds {late(seconds)}, said'
-
-
 def a_stall_of_tcp(bench: Bench) -> Found:
     """A multiplexer whose line stands still for 20 s; ZDA, RMC or GGA states the time."""
     said, good = [], True
@@ -373,129 +166,6 @@ def a_stall_of_tcp(bench: Bench) -> Found:
             said.append(f'{kind}: {rejected:.0f} of {used + rejected:.0f} rejected')
             node.end(signal.SIGTERM)
     return good, '; '.join(said)
-
-
-def the_same_name_twice(bench: Bench) -> Found:
-    bench.node(ros=('-p', 'record:=false'))
-    namesake = rclpy.create_node('coastdown_node', context=bench.peer.context)
-    seconds = bench.seconds_until(
-        lambda: 'have the name of this one' in str(bench.peer.last()),
-        meanwhile=bench.sail,
-        within_s=30.0,
-    )
-    namesake.destroy_node()
-    return seconds is not None, f'said {late(seconds)}'
-
-
-# requests
-
-
-def a_giant_request(bench: Bench) -> Found:
-    """300 000 entries: nothing but the request waits."""
-    bench.node()
-    worst = 0.0
-    for name in ('set_parameters', 'get_parameters'):
-        bench.seconds_until(
-            lambda: bench.peer.value(LOG, 'used') > 20, meanwhile=bench.sail, within_s=30.0
-        )
-        helper = subprocess.Popen(
-            [sys.executable, Path(__file__).with_name('asking.py'), name, '300000'],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert helper.stdout is not None
-        helper.stdout.readline()  # it is about to ask
-        since = len(bench.peer.heard_s)
-        bench.seconds_until(
-            lambda helper=helper: helper.poll() is not None, meanwhile=bench.sail, within_s=90.0
-        )
-        bench.seconds_until(lambda: False, meanwhile=bench.sail, within_s=3.0)
-        worst = max(worst, bench.gaps(since))
-        helper.kill()
-        helper.wait()
-    return worst < 5.0, f'longest silence {worst:.1f} s'
-
-
-def dripped_requests(bench: Bench) -> Found:
-    """Three hundred connections that send a letter a second, and as many endless POSTs."""
-    url = bench.page()
-    host, port = re.search(r'//([\d.]+):(\d+)', url).groups()
-    said, good = [], True
-    for kind, head in (
-        ('dripped', b'GET / HTT'),
-        (
-            'endless POST',
-            b'POST /player HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 99999999\r\n\r\n',
-        ),
-    ):
-        held = []
-        for _ in range(300):
-            held.append(socket.create_connection((host, int(port))))
-            held[-1].sendall(head)
-        began_s, seconds = time.monotonic(), None
-        while seconds is None and time.monotonic() < began_s + 30.0:
-            for each in held:
-                with suppress(OSError):
-                    each.sendall(b'P')
-            try:
-                get(f'{url}state.json')
-                seconds = time.monotonic() - began_s
-            except (urllib.error.URLError, OSError, ValueError):
-                time.sleep(0.2)
-        for each in held:
-            each.close()
-        good = good and seconds is not None and seconds < 5.0
-        said.append(f'{kind}: a viewer is answered {late(seconds)}')
-    return good, '; '.join(said)
-
-
-def a_thousand_viewers(bench: Bench) -> Found:
-    url = bench.page()
-    host, port = re.search(r'//([\d.]+):(\d+)', url).groups()
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(max(soft, 4096), hard), hard))
-    request = b'GET /stream HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n'
-    held, answers = [], []
-    for _ in range(1000):
-        held.append(socket.create_connection((host, int(port)), timeout=10.0))
-        held[-1].sendall(request)
-    for each in held:
-        try:
-            answers.append(each.recv(64)[9:12].decode())
-        except OSError:
-            answers.append('closed')
-    for each in held:
-        each.close()
-    time.sleep(1.0)
-    after = get(f'{url}state.json') is not None
-    counts = {each: answers.count(each) for each in sorted(set(answers))}
-    good = after and counts.get('200', 0) >= 200 and set(counts) == {'200', '503'}
-    return good, f'{counts}; afterwards it answers'
-
-
-def nine_thousand_brackets(bench: Bench) -> Found:
-    url = bench.page()
-    answers = []
-    for path in ('player', 'engine_stopped', 'login'):
-        for body in (b'[' * 9000, b'{"a":' * 9000, b'[' * 900, b'1' * 9000, b'\xff' * 100):
-            answers.append(ask(f'{url}{path}', body))
-    return all(status < 500 for status in answers), f'answers {sorted(set(answers))}'
-
-
-def parameters_that_name_files(bench: Bench) -> Found:
-    bench.node(ros=('-p', 'record:=false'))
-    client = bench.peer.node.create_client(SetParameters, '/coastdown_node/set_parameters')
-    client.wait_for_service(timeout_sec=20.0)
-    allowed = []
-    for name in ('ship_file', 'output_directory', 'nmea', 'path_roots', 'keep_bytes', 'keep_days'):
-        entry = Parameter()
-        entry.name = name
-        entry.value.type = ParameterType.PARAMETER_STRING
-        entry.value.string_value = '/etc/passwd'
-        answer = bench.peer.call(client, SetParameters.Request(parameters=[entry]))
-        if answer.results[0].successful:
-            allowed.append(name)
-    return not allowed, f'{len(allowed)} of 6 can be set'
 
 
 def fifty_life_cycles(bench: Bench) -> Found:
@@ -584,54 +254,6 @@ def control_characters(bench: Bench) -> Found:
         not found,
         f'{len(said)} characters of log, health and verbs; {len(found)} kinds in them',
     )
-
-
-# readings
-
-
-def a_flood(bench: Bench) -> Found:
-    """10 kHz on one input, as fast as a publisher can; the log at 10 Hz beside it."""
-    node = bench.node()
-    bench.seconds_until(
-        lambda: bench.peer.value(LOG, 'used') > 50, meanwhile=bench.sail, within_s=30.0
-    )
-    flood = subprocess.Popen([sys.executable, Path(__file__).with_name('flooding.py'), '15'])
-    since = len(bench.peer.heard_s)
-    bench.seconds_until(lambda: flood.poll() is not None, meanwhile=bench.sail, within_s=40.0)
-    flood.wait()
-    gap = bench.gaps(since)
-    rejected = bench.peer.rejected(LOG)
-    named = 'over 1000 a second' in str([a.status for a in bench.peer.arrays[-10:]])
-    node.end(signal.SIGTERM)
-    lags = sorted(bench.lags_s('/speed_through_water'))
-    median, worst = statistics.median(lags), lags[-1]
-    good = not rejected and worst < 2.0 and named
-    return good, f'lag of the log {median:.2f} s, at most {worst:.2f}; {gap:.1f} s of silence'
-
-
-def malformed_and_huge(bench: Bench) -> Found:
-    node = bench.node()
-    wind = bench.peer.node.create_publisher(TwistStamped, 'wind_apparent', QoSProfile(depth=5))
-    huge = twist(0, 0.0)
-    huge.header.frame_id = 'x' * 20_000_000
-    wrong = (b'\x00\x01\x00\x00', b'\xff' * 40, b'\x00\x01\x00\x00' + b'\xff' * 60)
-    count = 0
-
-    def sail() -> None:
-        nonlocal count
-        count += 1
-        bench.sail()
-        if count % 20 == 0:
-            wind.publish(huge)
-        else:
-            wind.publish(wrong[count % 3])
-
-    bench.seconds_until(lambda: False, meanwhile=sail, within_s=15.0)
-    status = bench.peer.now('input wind_apparent')
-    text = '' if status is None else status.message
-    size = memory_mib(node.process.pid)
-    good = 'malformed' in text and not bench.peer.rejected(LOG) and size < 700.0
-    return good, f'{size:.0f} MiB; {text[:110]}'
 
 
 def spoilt(fault: str, random_: random.Random, second: int, value: float) -> float:
@@ -754,123 +376,6 @@ def wrong_readings(bench: Bench) -> Found:
     return good and 'never' not in second, f'{first}; {second}'
 
 
-def a_full_disk(bench: Bench) -> Found:
-    """The node may write no more for 10 s."""
-    node = bench.node()
-    sent, sail = under_way(bench)
-    before = resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, (1000, -1))
-
-    def said() -> bool:
-        status = bench.peer.now('recording')
-        return status is not None and status.level[0] != OK
-
-    seconds = bench.seconds_until(said, meanwhile=sail, within_s=20.0)
-    bench.seconds_until(lambda: False, meanwhile=sail, within_s=10.0)
-    resource.prlimit(node.process.pid, resource.RLIMIT_FSIZE, before)
-    again = bench.seconds_until(lambda: not said(), meanwhile=sail, within_s=60.0)
-    bench.seconds_until(lambda: False, meanwhile=sail, within_s=3.0)
-    lost = bench.peer.value('recording', 'messages lost')
-    node.end(signal.SIGTERM)
-    left = payloads(sorted(bench.bags.glob('*.mcap')), '/speed_through_water')
-    joined = sent.index(left[0])
-    missing = sum(each not in set(left) for each in sent[joined:-1])
-    good = seconds is not None and again is not None and missing <= lost
-    return good, (
-        f'said {late(seconds)}, sound again {late(again)}; {missing} of {len(sent) - joined} '
-        f'missing, {lost:.0f} counted lost'
-    )
-
-
-def a_clock_that_jumps(bench: Bench) -> Found:
-    """The simulated clock: an hour on, and back again."""
-    bench.node(ros=('-p', 'use_sim_time:=true', '-p', 'record:=false'))
-    second, used = 1_700_000_000, []
-    for jump in (0, 3600, -3600):
-        second += jump
-        before = bench.peer.value(LOG, 'used')
-        for _ in range(60):
-            second += 1
-            clock = Clock()
-            clock.clock.sec = second
-            bench.peer.clock.publish(clock)
-            bench.peer.spin(0.03)
-            speed = 5.0 + 0.03 * math.sin(1.7 * second)
-            bench.peer.log.publish(twist(second * 10**9 - 10**8, speed))
-        bench.peer.spin(2.0)
-        used.append(int(bench.peer.value(LOG, 'used') - before))
-    state = bench.peer.now('state')
-    good = min(used) > 40 and state is not None
-    return good, f'of 60 readings {used} are used; then: {"" if state is None else state.message}'
-
-
-def wrong_stamps(bench: Bench) -> Found:
-    """In the future, without a stamp, of another year: named within a minute."""
-    said, good = [], True
-    for name, stamp in (
-        ('future', lambda now: now + 3600 * 10**9),
-        ('unstamped', lambda now: 0),
-        ('an hour old', lambda now: now - 3600 * 10**9),
-    ):
-        bench.peer.close()
-        bench.peer = Stranger()
-        node = bench.node(ros=('-p', 'record:=false'))
-
-        def sail(stamp: Callable[[int], int] = stamp) -> None:
-            now_ns = time.time_ns()
-            bench.peer.log.publish(cdr_twist(stamp(now_ns), 5.0 + 0.01 * math.sin(now_ns * 1e-9)))
-            bench.peer.place.publish(point(now_ns, 5.0 * now_ns * 1e-9 % 1e6))
-
-        def named() -> bool:
-            status = bench.peer.now(LOG)
-            return (
-                status is not None
-                and status.level[0] != OK
-                and 'no data' not in status.message
-                and 'no publisher' not in status.message
-            )
-
-        seconds = bench.seconds_until(named, meanwhile=sail, within_s=60.0)
-        good = good and seconds is not None
-        said.append(f'{name} {late(seconds)}')
-        node.end(signal.SIGTERM)
-    return good, '; '.join(said)
-
-
-def position_alone(bench: Bench) -> Found:
-    """Five minutes of steady sailing by positions at 1 Hz, then the engine stops."""
-    found = []
-    noise = random.Random(3)
-    for lead_s in (300, 420, 750):
-        x, lines = 0.0, ['t,x,y']
-        for second in range(lead_s + 1200):
-            speed = coasting(second - lead_s, speed_m_s=5.0, slowing_1_m=8e-4)
-            x += speed
-            lines.append(f'{second},{x + noise.gauss(0, 0.5):.3f},{noise.gauss(0, 0.5):.3f}')
-        (bench.folder / 'track.csv').write_text('\n'.join(lines))
-        bag = bench.folder / f'track{lead_s}.mcap'
-        bench.run(
-            'import',
-            bench.folder / 'track.csv',
-            '--map',
-            'position=x,y',
-            '--time',
-            't:s',
-            '-o',
-            bag,
-        )
-        text = bench.run(
-            'replay', bag, '--ship', bench.folder / 'ship.yaml', '--json', check=False
-        )
-        try:
-            # what follows is the readable result, on stderr
-            document, _ = json.JSONDecoder().raw_decode(text[text.index('{') :])
-        except ValueError:
-            document = {}
-        found.append((lead_s, len(document.get('coastdowns', ()))))
-    text = ', '.join(f'{lead} s: {"found" if many else "not found"}' for lead, many in found)
-    return bool(found[0][1]), f'steady before the stop for {text}'
-
-
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
@@ -947,52 +452,18 @@ LINES: dict[str, tuple[str, Callable[[Bench], Found]]] = {
         a_log_in_a_wrong_scale,
     ),
     '1 a track that says nothing, the log is sound': (GOAL, a_track_that_says_nothing),
-    '3 a node with --keep-bytes in the folder of another': (
-        'the file that is written stays',
-        another_nodes_file_stays,
-    ),
-    '3 the file that is written vanishes': (
-        'said, counted, a new file',
-        a_file_that_vanishes_is_counted,
-    ),
-    '4 a peer of another type was there first': (
-        'the driver is used within 60 s, said',
-        another_type_was_first,
-    ),
-    '4 one NMEA sentence a second before a topic at 10 Hz': (
-        'the topic feeds within 60 s, said',
-        a_sentence_a_second,
-    ),
-    '5 requests of 300 000 entries': ('no silence of 5 s', a_giant_request),
-    '5 dripped requests, endless POSTs': ('a viewer is answered within 5 s', dripped_requests),
-    '5 9000 brackets': ('no answer of 500 or more', nine_thousand_brackets),
-    '6 a flood on one input': ('lag of another below 2 s, none of it rejected, said', a_flood),
     '6 a stall of TCP of 20 s': ('at most 2 % rejected', a_stall_of_tcp),
-    '7 position alone': ('five minutes of steady sailing suffice', position_alone),
-    '7 one flipped bit in a finished bag': ('at most 2 % quarantined', one_flipped_bit),
-    '7 no quota given': (
-        'a share of the disk, said; no coastdown goes',
-        the_share_of_the_disk_is_said,
-    ),
     '7 control characters of peers': ('none in log, health, verbs', control_characters),
-    '7 the same node name twice': ('said', the_same_name_twice),
-    'kill -9': ('nothing older than 1 s lost', kill_9),
     'SIGSTOP for 15 s': ('all recorded, none rejected', stopped_for_15_s),
-    'stamps that are wrong': ('not green within 60 s', wrong_stamps),
     'no numbers, wrong unit; over ground is sound': (
         'not green within 60 s; NaN: the stop is found',
         wrong_readings,
     ),
-    'a full disk': ('said; sound again; what is missing is counted', a_full_disk),
-    'the clock jumps by an hour, and back': ('readings are used again', a_clock_that_jumps),
-    'malformed and huge messages': ('counted; memory bounded', malformed_and_huge),
-    'parameters that name files': ('none can be set', parameters_that_name_files),
     '50 life cycles': ('none fails, no growth', fifty_life_cycles),
     'three inputs at 1, 10, 100 Hz (received), after 30 and 90 s': (
         'below 512 MiB, growth below 64 MiB',
         memory_by_rate,
     ),
-    '1000 viewers': ('200 see it, the rest is told', a_thousand_viewers),
 }
 
 

@@ -214,12 +214,3 @@ def get(url: str) -> Any:
     """Return the JSON behind an address."""
     with urllib.request.urlopen(url, timeout=WITHIN_S) as answer:
         return json.load(answer)
-
-
-def ask(url: str, body: bytes) -> int:
-    """Return the status with which a POST is answered."""
-    try:
-        with urllib.request.urlopen(url, data=body, timeout=WITHIN_S) as answer:
-            return int(answer.status)
-    except urllib.error.HTTPError as error:
-        return int(error.code)

@@ -51,12 +51,6 @@ def test_where_a_size_is_missing_the_rest_is_not_held_against_it(name):
     assert problem.startswith(f'{name}: missing')
 
 
-def test_tables_must_have_equal_lengths():
-    table = {'speed_m_s': [0.0, 5.0, 9.0], 'resistance_n': [0.0, 1e5], 'relative_sd': 0.02}
-    (problem,) = problems_of(baseline=table)
-    assert problem.startswith('baseline.resistance_n: 2 values, expected 3')
-
-
 def test_a_table_has_no_resistance_at_rest_and_newtons():
     at_rest = {'speed_m_s': [0.0, 9.0], 'resistance_n': [5e3, 4e5], 'relative_sd': 0.02}
     assert 'at rest' in problems_of(baseline=at_rest)[0]
@@ -68,11 +62,6 @@ def test_a_table_of_n_r_must_stay_positive():
     falling = {'model': 'table', 'coefficients': [[0.05], [-0.2]]}
     (problem,) = problems_of(added_mass=falling)
     assert problem.startswith('added_mass: n_r = -0.03 at Fr = 0.4')
-
-
-def test_consistency_is_reported_together_with_other_problems():
-    found = problems_of(length_m=492.1, name=3, breadth_m='wide')
-    assert len(found) == 3
 
 
 def test_a_refused_section_is_not_checked_as_the_default():

@@ -95,9 +95,3 @@ def test_all_problems_come_in_one_report_with_key_value_and_expectation():
 def test_one_wrong_key_is_named(line, key):
     found = problems_of(f'length_m: 150.0\ndisplaced_volume_m3: 20200.0\n{line}\n')
     assert any(problem.startswith(f'{key}:') for problem in found), found
-
-
-@pytest.mark.parametrize('text', ['', '- 1', 'only text', '3', 'null'])
-def test_a_file_that_is_no_mapping_says_what_is_expected(text):
-    (problem,) = problems_of(text)
-    assert 'length_m' in problem

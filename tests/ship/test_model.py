@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import ShipdragError, ShipFileError
+from shipdrag_ros.fields import read_small_text
 from shipdrag_ros.ship import MerchantAddedMass, Ship, TableBaseline, Water
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
@@ -129,14 +130,6 @@ def test_resistance_falls_with_the_square_where_the_ittc_line_ends(cargo):
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
 
 
-def test_resistance_without_baseline_is_an_error():
-    ship = Ship.from_yaml(SMALLEST, subject='test')
-    with pytest.raises(ShipdragError, match='no baseline'):
-        ship.resistance_n(1.0)
-    with pytest.raises(ShipdragError, match='no baseline'):
-        _ = ship.baseline_range_m_s
-
-
 def test_resistance_outside_the_wave_table_is_an_error(cargo):
     low, high = cargo.baseline_range_m_s
     assert low == 0.0
@@ -182,20 +175,6 @@ def test_effects_are_kept():
     assert ship.effects[0].parameters['friction_factor'].sd == 0.05
     assert Ship.from_yaml(ship.to_yaml(), subject='again') == ship
     assert hash(ship) == hash(Ship.from_yaml(ship.to_yaml(), subject='again'))
-
-
-def test_file_that_cannot_be_read(tmp_path):
-    with pytest.raises(ShipFileError, match=r'nothing\.yaml.*\n.*No such file'):
-        Ship.load(tmp_path / 'nothing.yaml')
-    with pytest.raises(ShipFileError, match='cannot be read'):
-        Ship.load(tmp_path)
-    binary = tmp_path / 'binary.yaml'
-    binary.write_bytes(b'\xff\xfe\x00\x93')
-    with pytest.raises(ShipFileError, match='not a text file'):
-        Ship.load(binary)
-    marked = tmp_path / 'marked.yaml'
-    marked.write_bytes(b'\xef\xbb\xbf' + SMALLEST.encode())
-    assert Ship.load(marked).length_m == 150.0
 
 
 JUNK = st.recursive(
@@ -303,3 +282,11 @@ def test_a_ship_made_in_python_has_sizes_above_zero(values: dict[str, Any], key:
 def test_numbers_of_numpy_are_numbers() -> None:
     ship = Ship(length_m=np.float32(80.0), displaced_volume_m3=np.int64(4000))  # type: ignore[arg-type]
     assert ship.mass_kg == 4000 * 1025.0
+
+
+def test_text_is_read_with_or_without_a_mark(tmp_path: Path) -> None:
+    path = tmp_path / 'text'
+    path.write_bytes('\ufeffä'.encode())
+    assert read_small_text(path, most_bytes=5) == 'ä'
+    with pytest.raises(OSError, match='more than 4 bytes'):
+        read_small_text(path, most_bytes=4)

@@ -33,7 +33,6 @@ from shipdrag_ros.simulation.hydrodynamics import friction_n
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')
-SPEED = 'term: {channel: force, scope: hull, variable: %s, shape: decay, expression: "%s", '
 FADING = """
 name: fading
 term: {channel: force, scope: hull, variable: time, shape: decay,

@@ -18,7 +18,6 @@ from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import find, parse
 
 CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
-AT_ONCE = replace(CARGO, propulsion=None)
 SCENARIO = Scenario(speed_m_s=8.0, lead_in_s=0.0, duration_s=900.0)
 N_R = 0.08
 DRAG_1_M = 3e-4

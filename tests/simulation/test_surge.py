@@ -84,28 +84,6 @@ def test_integration_converges_with_the_fourth_power_of_the_step():
     assert abs(last_speed(0.5) - last_speed(0.25)) < 1e-11
 
 
-def test_lead_in_is_steady_until_the_engine_stops():
-    truth = simulate(CARGO, Scenario(speed_m_s=8.2, lead_in_s=300.0, current_m_s=(-1.0, 0.5)))
-    lead_in = truth.time_s <= 300.0
-    np.testing.assert_allclose(truth.speed_through_water_m_s[lead_in], 8.2, rtol=1e-12)
-    assert np.all(np.diff(truth.speed_through_water_m_s[~lead_in]) < 0.0)
-    assert truth.time_s[-1] == 1800.0
-
-
-def test_thrust_and_shaft_run_down_exponentially():
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=100.0, duration_s=200.0, shaft_rad_s=10.0)
-    truth = simulate(CARGO, scenario, step_s=0.05)
-    after = np.maximum(truth.time_s - 100.0, 0.0)
-    np.testing.assert_allclose(truth.shaft_rad_s, 10.0 * np.exp(-after / 8.0), rtol=1e-12)
-    # what is left over in the equation of motion is the thrust
-    t, v = truth.time_s, truth.speed_through_water_m_s
-    late = np.flatnonzero((t > 100.5) & (t < 130.0))
-    slope = (v[late + 1] - v[late - 1]) / (t[late + 1] - t[late - 1])
-    thrust = (1.0 + CARGO.n_r(v[late])) * slope + truth.specific_resistance(v[late])
-    expected = truth.specific_resistance(8.2) * np.exp(-(t[late] - 100.0) / 8.0)
-    np.testing.assert_allclose(thrust, expected, rtol=0.0, atol=2e-7)
-
-
 def test_a_run_down_costs_the_impulse_that_it_gives():
     # to first order in time the ship is faster by r(v0) run_down / (1 + n_r)
     scenario = Scenario(speed_m_s=8.2, lead_in_s=0.0, duration_s=60.0)
@@ -114,12 +92,6 @@ def test_a_run_down_costs_the_impulse_that_it_gives():
     gain = short.speed_through_water_m_s[-1] - at_once.speed_through_water_m_s[-1]
     expected = at_once.specific_resistance(8.2) * 0.5 / (1.0 + CARGO.n_r(8.2))
     assert 0.5 * expected < gain < expected
-
-
-def test_without_run_down_the_shaft_stops_at_once():
-    truth = simulate(AT_ONCE, Scenario(speed_m_s=8.2, lead_in_s=100.25, duration_s=10.0))
-    readings = truth.at(np.array([100.24, 100.25, 100.26]))
-    np.testing.assert_array_equal(readings.shaft_rad_s, [11.5, 0.0, 0.0])
 
 
 def test_a_current_moves_the_position_but_not_the_log():
@@ -180,27 +152,6 @@ def test_without_orders_the_ship_sails_on():
     truth = simulate(CARGO, Scenario(speed_m_s=8.2, lead_in_s=0.0, duration_s=500.0, orders=()))
     np.testing.assert_allclose(truth.speed_through_water_m_s, 8.2, rtol=1e-12)
     np.testing.assert_array_equal(truth.shaft_rad_s, 11.5)
-
-
-def test_a_turn_changes_the_heading_and_adds_its_drag():
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=50.0, duration_s=400.0)
-    straight = simulate(CARGO, scenario)
-    turn = Turn(100.0, 60.0, rate_rad_s=0.01, drag_area_m2=30.0)
-    turned = simulate(CARGO, replace(scenario, turns=(turn,)))
-    times = np.array([140.0, 150.0, 180.0, 210.0, 300.0])
-    np.testing.assert_allclose(turned.at(times).heading_rad, [0.0, 0.0, 0.3, 0.6, 0.6], atol=1e-12)
-    fast = turned.at(times).speed_through_water_m_s
-    slow = straight.at(times).speed_through_water_m_s
-    np.testing.assert_allclose(fast[:2], slow[:2], rtol=1e-9)
-    assert np.all(fast[2:] < slow[2:] - 0.01)
-    # the track is the integral of the velocity
-    path = np.cumsum(
-        0.5
-        * (turned.velocity_over_ground_m_s[1:] + turned.velocity_over_ground_m_s[:-1])
-        * np.diff(turned.time_s)[:, None],
-        axis=0,
-    )
-    np.testing.assert_allclose(turned.position_m[1:], path, atol=1e-3)
 
 
 def test_a_turn_with_edges_is_one_of_many_short_turns():

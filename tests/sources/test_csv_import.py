@@ -62,21 +62,6 @@ def samples(path: Path) -> Block:
     return concatenate([item for item in run.inputs() if isinstance(item, Block)])
 
 
-def test_a_plain_table(import_text: Import) -> None:
-    result, block = import_text('t,u\n0,5.5\n0.5,5.25\n', 'speed_through_water=u', time='t')
-    assert block.channel.tolist() == [Channel.SPEED_THROUGH_WATER] * 2
-    assert block.value[:, 0].tolist() == [5.5, 5.25]
-    assert (block.stamp_ns - BASE_NS).tolist() == [0, 500_000_000]
-    assert block.receive_ns.tolist() == block.stamp_ns.tolist()
-    assert np.isnan(block.variance).all()
-    assert (result.rows, result.left_out, result.backward) == (2, 0, 0)
-    assert result.written == {'speed_through_water': 2}
-    assert result.rejected == {}
-    assert (result.start_ns, result.end_ns) == (BASE_NS, BASE_NS + 500_000_000)
-    assert result.base_ns == BASE_NS
-    assert (result.delimiter, result.header) == (',', True)
-
-
 def test_further_instruments_come_in_as_the_first(import_text: Import) -> None:
     maps = (
         'speed_through_water=a',

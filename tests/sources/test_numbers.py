@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import DataError, ImportDataError
+from shipdrag_ros.errors import DataError
 from shipdrag_ros.sources.table import read_numbers
 
 
@@ -22,24 +22,6 @@ def test_reads_columns_by_name(tmp_path: Path, mark: str) -> None:
     np.testing.assert_array_equal(found.column('a'), [1.0, 4.0])
     assert 'd' not in found
     assert 'a' in found
-
-
-def test_optional_columns_are_read_where_they_are(tmp_path: Path) -> None:
-    path = tmp_path / 'data.csv'
-    path.write_text('a,lcb\n1,2\n')
-    np.testing.assert_array_equal(read_numbers(path, ('a',), optional=('lcb',)).values, [[1, 2]])
-
-
-def test_all_missing_columns_are_told(tmp_path: Path) -> None:
-    path = tmp_path / 'data.csv'
-    path.write_text('a,b,b\n1,2,3\n')
-    with pytest.raises(DataError) as raised:
-        read_numbers(path, ('x', 'a', 'b', 'y'))
-    told = raised.value.problems
-    assert len(told) == 3
-    assert "no column 'x'" in told[0]
-    assert "2 columns 'b'" in told[1]
-    assert "no column 'y'" in told[2]
 
 
 def test_all_bad_cells_are_told_with_their_lines(tmp_path: Path) -> None:
@@ -69,12 +51,3 @@ def test_many_bad_cells_are_counted(tmp_path: Path) -> None:
     path.write_text('a\n' + 'x\n' * 50)
     with pytest.raises(DataError, match='and 30 more'):
         read_numbers(path, ('a',))
-
-
-def test_no_rows_or_no_table(tmp_path: Path) -> None:
-    path = tmp_path / 'data.csv'
-    path.write_text('a,b\n')
-    with pytest.raises(DataError, match='no row below the header'):
-        read_numbers(path, ('a',))
-    with pytest.raises(ImportDataError, match='cannot be read'):
-        read_numbers(tmp_path / 'none.csv', ('a',))

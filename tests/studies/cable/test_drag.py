@@ -74,41 +74,6 @@ def test_a_longer_cable_has_a_smaller_coefficient_and_more_drag(surface, a, b):
     )
 
 
-@FEW
-@given(slenderness=SLENDERNESS)
-def test_a_rough_cable_has_more(slenderness):
-    rough, smooth = (
-        drag_coefficient(slenderness, surface)
-        for surface in (CableSurface.ROUGH, CableSurface.SMOOTH)
-    )
-    assert rough > smooth
-
-
-@SURFACE
-@FEW
-@given(length=st.floats(10.0, 1e3), slenderness=st.floats(21.0, 900.0), speed=SPEED)
-def test_the_drag_is_the_same_on_either_area(surface, length, slenderness, speed):
-    diameter = length / slenderness
-    cable = Cable(length, diameter, surface)
-    base = 0.25 * math.pi * diameter**2
-    zeta0 = base_coefficient(cable.slenderness, surface)
-    np.testing.assert_allclose(
-        cable.in_water(1000.0).force_n(np.array([speed])),
-        0.5 * zeta0 * base * 1000.0 * speed**2,
-        rtol=1e-12,
-    )
-
-
-def test_a_stated_coefficient_is_taken_as_it_is():
-    cable = Cable(100.0, 0.02, 0.02)
-    assert cable.c0 == 0.02
-    drag = cable.in_water(1000.0)
-    np.testing.assert_allclose(drag.force_n(np.array([0.0, 3.0])), [0.0, 180.0], rtol=1e-14)
-    np.testing.assert_allclose(
-        cable.in_water(1025.0).force_n(np.array([3.0])), [184.5], rtol=1e-14
-    )
-
-
 def test_ten_per_cent_holds_where_it_is_solved_and_not_where_it_was_published():
     low, high = tangent_range(0.1)
     assert (round(low, 4), round(high, 4)) == (0.7597, 1.4625)
@@ -168,11 +133,6 @@ def test_the_tangent_touches_at_v0_and_nowhere_else(area, density, v0, u):
     found = tangent.force_n(np.array([u * v0])) / true - 1.0
     np.testing.assert_allclose(found, tangent_error(u), rtol=1e-9, atol=1e-12)
     assert tangent_error(u) <= 0.0
-
-
-def test_the_tangent_may_begin_anywhere():
-    drag = Cable(50.0, 0.1, CableSurface.SMOOTH).in_water(1025.0)
-    assert Tangent(drag, 2.0).gain_n_per_m_s == 2.0 * Tangent(drag, 1.0).gain_n_per_m_s
 
 
 @FEW

@@ -3,36 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
-from shipdrag_ros.cli.output import Output
 from shipdrag_ros.studies.cable.drag import Cable, CableSurface, Tangent, tangent_range
 from shipdrag_ros.studies.cable.face import verb as words
-from shipdrag_ros.studies.face import show
 
 CABLE = Cable(50.0, 0.1, CableSurface.ROUGH)
 TANGENT = Tangent(CABLE.in_water(1025.0), 2.0)
-
-
-def test_the_page_stands_alone(tmp_path: Path, read_page: Callable[[Path], Any]) -> None:
-    show(Output(), words.shown(CABLE, TANGENT, 0.25), tmp_path / 'page.html')
-    page = read_page(tmp_path / 'page.html')
-    assert page.links == []
-    assert len(page.images) == 2
-    assert 'A rough cable, 50 m by 0.1 m' in page.text
-    assert 'within 25 % of it from 1.333 m/s to 4 m/s' in page.text
-    assert '0.6667 1.333 -25.0 -25.0' in page.text
-
-
-def test_an_open_range_is_told() -> None:
-    rows = dict(words.facts(CABLE, TANGENT, 4.0).rows)
-    assert rows['tangent within 400 %, u = V/V0'] == 'above 0.33333'
-    assert rows['tangent within 400 %, V'] == 'above 0.66667 m/s'
-    assert 'without upper end' in words.line(TANGENT, 4.0)
 
 
 def test_the_picture_shows_the_lines_and_the_range() -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.studies.manoeuvring.manoeuvre import (
     Side,
     overshoots_rad,
@@ -80,11 +79,3 @@ def test_a_ship_that_does_not_turn_as_far_has_no_overshoot():
 @pytest.mark.parametrize('manoeuvre', [zigzag(15.0), zigzag(7.5), turn(35.0)])
 def test_names_are_read_back(manoeuvre):
     assert parse(manoeuvre.name) == manoeuvre
-
-
-@pytest.mark.parametrize(
-    'text', ['zigzag', 'zigzag:', 'spiral:10', 'turn:0', 'turn:91', 'zigzag:nan', 'turn:ten', '']
-)
-def test_other_names_are_refused(text):
-    with pytest.raises(SimulationError, match=r'expected zigzag:ANGLE or turn:ANGLE'):
-        parse(text)

@@ -6,11 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.errors import DataError
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 ROW = np.array([[8.18, 4.0, 0.851, 0.15]])
@@ -24,16 +22,6 @@ def test_the_missing_ratio_follows() -> None:
     slender = np.column_stack([ROW[:, :2], hulls.slenderness, ROW[:, 3:]])
     back = Hulls.of('one', ('L_B', 'B_T', 'slenderness', 'Fr'), slender)
     np.testing.assert_allclose(back.C_B, [0.851], rtol=1e-14)
-
-
-def test_problems_are_told_together() -> None:
-    with pytest.raises(DataError) as raised:
-        Hulls.of('one', ('L_B', 'B_T', 'Fr'), np.array([[8.0, 4.0, 0.1], [-8.0, 4.0, 0.0]]))
-    assert raised.value.problems == (
-        'L_B: -8 in row 2, expected above 0; 1 such row(s)',
-        'Fr: 0 in row 2, expected above 0; 1 such row(s)',
-        'neither C_B nor slenderness; give one, the other follows',
-    )
 
 
 def test_contradictions_are_counted() -> None:

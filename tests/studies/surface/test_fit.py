@@ -114,18 +114,3 @@ def test_the_search_ends_where_the_data_do() -> None:
     round_about = np.column_stack([np.cos(circle), 0.5 + np.sin(circle)])
     with pytest.raises(DataError, match=r'follow from each other.* 5 of the 6 terms'):
         fit_surface(round_about, circle, inputs=ANGLES)
-
-
-def test_problems_are_told_together() -> None:
-    points = np.column_stack([np.arange(4.0), np.ones(4)])
-    with pytest.raises(DataError) as raised:
-        fit_surface(points, np.arange(4.0), inputs=ANGLES)
-    assert raised.value.problems == (
-        'beta: 1 different value(s), expected 3 or more',
-        '4 row(s), expected 7 or more for degree 2 in 2 variable(s)',
-    )
-    with pytest.raises(DataError, match=r'alpha: varies by 1\.8e-31 alone'):
-        fit_surface(1e-33 * grid(9), c_x(grid(9)), inputs=ANGLES)
-    line = np.linspace(0.0, 1.0, 30)
-    with pytest.raises(DataError, match='follow from each other'):
-        fit_surface(np.column_stack([line, 2.0 * line]), line, inputs=ANGLES)
