@@ -11,11 +11,9 @@ from __future__ import annotations
 import fcntl
 import gc
 import os
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, TextIO
@@ -24,30 +22,19 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.estimation import estimators
-from shipdrag_ros.estimation.result import (
-    Estimate,
-    FroudeMax,
-    OrderTrial,
-    ResistanceCurve,
-    Track,
-)
+from shipdrag_ros.estimation.result import Estimate, FroudeMax, OrderTrial, ResistanceCurve, Track
 from shipdrag_ros.fleet.rows import FROUDE, BagResult
 from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve
-from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 # how long an example takes says how busy the machine is
 settings.register_profile(
-    'repeatable',
-    derandomize=True,
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow],
+    'repeatable', derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile('repeatable')
 
@@ -153,43 +140,6 @@ def browser() -> Iterator[Any]:
         found = started.chromium.launch(executable_path=program, args=_FLAGS)
         yield found
         found.close()
-
-
-class Page(HTMLParser):
-    """Text, pictures and links of a page; every tag that is opened is closed."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.words: list[str] = []
-        self.images: list[str] = []
-        self.links: list[str] = []
-        self.open: list[str] = []
-        self.feed(path.read_text(encoding='utf-8'))
-        assert self.open == []
-        self.text = re.sub(r'\s+', ' ', ' '.join(self.words))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        values = dict(attrs)
-        if tag == 'img':
-            self.images.append(values['src'] or '')
-            assert values['alt']
-        inside = (values.get('href') or '').startswith('#')
-        if ('href' in values and not inside) or (tag != 'img' and 'src' in values):
-            self.links.append(tag)
-        if tag not in ('img', 'meta', 'br'):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] != 'style':
-            self.words.append(data)
-
-
-@pytest.fixture(scope='session')
-def read_page() -> type[Page]:
-    return Page
 
 
 @pytest.fixture(scope='session')
@@ -330,21 +280,3 @@ def fleet_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made.write(fleet_result(99, 0.0, error='no bag: 3 bytes of text'))
     made.keep_ship('Test <b>ship</b>', {'events.csv': 'date,kind\n2024-02-01,cleaning\n'})
     return made.path
-
-
-def _write(
-    path: Path, block: Block, ship: Ship | None = None, parameters: str = '', **options: Any
-) -> Path:
-    with BagWriter(path, **options) as bag:
-        if ship is not None:
-            bag.attach('ship.yaml', ship.to_yaml())
-        if parameters:
-            bag.attach('parameters.yaml', parameters)
-        bag.write_samples(block)
-    return path
-
-
-@pytest.fixture(scope='session')
-def write_run() -> Callable[..., Path]:
-    """Write a block, and maybe a ship and parameters, to a file."""
-    return _write

@@ -48,17 +48,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     **{
         name: {'studies'}
         for name in (
-            *(
-                'messages',
-                'nmea',
-                'replay',
-                'sources',
-                'node',
-                'fleet',
-                'trend',
-                'report',
-                'live',
-            ),
+            *('messages', 'nmea', 'replay', 'sources', 'node', 'fleet', 'trend', 'report', 'live'),
         )
     },
 }

@@ -308,14 +308,8 @@ print(table.tobytes().hex())
 """
 LIVE = ESTIMATES.replace('(estimate, estimate_final)', '(estimate,)')
 # functions that call those of other files, and what they call
-CALLERS = (
-    'estimation.distance',
-    'inference.sampling',
-)
-CALLEES = (
-    'inference.noise',
-    'inference.linear',
-)
+CALLERS = ('estimation.distance', 'inference.sampling')
+CALLEES = ('inference.noise', 'inference.linear')
 
 
 @pytest.fixture(scope='module')

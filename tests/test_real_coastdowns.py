@@ -12,7 +12,6 @@ import pytest
 
 from benchmarks.accuracy import real_coastdowns
 
-ROOT = Path(__file__).resolve().parents[1]
 START_NS = 10**18
 
 

@@ -46,7 +46,8 @@ def results(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dic
     found = {}
     for record in script.RECORDS:
         script.run_command(record.import_command(), data=data, out=out)
-        for window in (True, False):
+        # nobody asks for the onset of a car
+        for window in (True,) if record.name.startswith('car') else (True, False):
             line = f'{record.replay_command(window=window)} --json one.json'
             script.run_command(line, data=data, out=out)
             found[record.name, window] = json.loads((out / 'one.json').read_text())

@@ -132,8 +132,7 @@ def coastdown() -> Block:
 
 def _sail(lead_in_s: float, duration_s: float) -> Block:
     truth = simulate(
-        Ship.load(SHIP_FILE),
-        Scenario(speed_m_s=8.0, lead_in_s=lead_in_s, duration_s=duration_s),
+        Ship.load(SHIP_FILE), Scenario(speed_m_s=8.0, lead_in_s=lead_in_s, duration_s=duration_s)
     )
     sensors = (
         Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.05),

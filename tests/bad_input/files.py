@@ -13,7 +13,7 @@ _TABLE = _HEADER + ''.join(f'{t},{8.0 - 0.01 * t}\n' for t in range(100))
 _MAP = ('--time', 'time', '--map', 'speed_through_water=speed')
 
 
-def _ship(kind: str, content: str | bytes, status: int, *says: str) -> Case:
+def _ship(kind: str, content: str | bytes, *says: str, status: int = 1) -> Case:
     def line(folder: Path) -> list[str]:
         path = folder / 'ship.yaml'
         path.write_bytes(content.encode() if isinstance(content, str) else content)
@@ -29,7 +29,7 @@ def _changed(old: str, new: str) -> str:
 
 
 def _csv(
-    kind: str, content: str | bytes, status: int, *says: str, arguments: tuple[str, ...] = _MAP
+    kind: str, content: str | bytes, *says: str, status: int = 1, arguments: tuple[str, ...] = _MAP
 ) -> Case:
     def line(folder: Path) -> list[str]:
         path = folder / 'table.csv'
@@ -51,115 +51,96 @@ SHIPS = (
         1,
         ('cannot be read: No such file or directory; give the path',),
     ),
-    _ship('an empty file', '', 1, 'the file: empty, expected the keys name, length_m'),
+    _ship('an empty file', '', 'the file: empty, expected the keys name, length_m'),
     _ship(
-        'not YAML', 'length_m: [150.0\nbreadth_m 21.6\n', 1, 'not YAML: line 3, column 1: expected'
+        'not YAML', 'length_m: [150.0\nbreadth_m 21.6\n', 'not YAML: line 3, column 1: expected'
     ),
     _ship(
         'a tab for indentation',
         'water:\n\tdensity_kg_m3: 1025.0\n',
-        1,
         "not YAML: line 2, column 1: found character '\\t'",
     ),
-    _ship('a binary file', bytes(range(256)), 1, 'is not a text file', 'save it as UTF-8'),
+    _ship('a binary file', bytes(range(256)), 'is not a text file', 'save it as UTF-8'),
     _ship(
         'a list for a mapping',
         '- length_m: 150.0\n- displaced_volume_m3: 20200.0\n',
-        1,
         'is no ship file, none of its keys is known',
         'length_m',
     ),
     _ship(
         'a length in feet',
         _changed('length_m: 150.0', 'length_m: 492.0'),
-        1,
         'length_m: 492.0 beside displaced_volume_m3: 20200.0',
         'is the length in metres',
     ),
     _ship(
         'a length in millimetres',
         _changed('length_m: 150.0', 'length_m: 150000'),
-        1,
         'length_m: 150000, expected 0.5..500 m',
     ),
     _ship(
         'a draught in feet',
         _changed('draught_m: 8.6', 'draught_m: 28.2'),
-        1,
         'draught_m: 28.2',
         'block coefficient of 0.221, expected 0.3..1',
     ),
     _ship(
         'tonnes, under a key of their own',
         'length_m: 150.0\ndisplacement_t: 20705.0\n',
-        1,
         'displacement_t: unknown key; did you mean displaced_volume_m3?',
     ),
     _ship(
         'kilograms for cubic metres',
         _changed('m3: 20200.0', 'm3: 20705000.0'),
-        1,
         'displaced_volume_m3: 20705000.0, expected 0.0001..1e+06 m^3',
     ),
     _ship(
         'a misspelt key',
         _SMALL + 'draft_m: 8.6\n',
-        1,
         'draft_m: unknown key; did you mean draught_m?',
     ),
     _ship(
         'a key given twice',
         _SMALL + 'length_m: 140.0\n',
-        1,
         'length_m: given twice, lines 1 and 3; keep one',
     ),
-    _ship('a missing key', 'length_m: 150.0\n', 1, 'displaced_volume_m3: missing, expected'),
+    _ship('a missing key', 'length_m: 150.0\n', 'displaced_volume_m3: missing, expected'),
     _ship(
-        'NaN',
-        _changed('length_m: 150.0', 'length_m: .nan'),
-        1,
-        'length_m: nan, expected 0.5..500 m',
+        'NaN', _changed('length_m: 150.0', 'length_m: .nan'), 'length_m: nan, expected 0.5..500 m'
     ),
     _ship(
         'a negative value',
         _changed('breadth_m: 21.6', 'breadth_m: -21.6'),
-        1,
         'breadth_m: -21.6, expected 0.05..100 m',
     ),
     _ship(
         'a unit behind the number',
         _changed('length_m: 150.0', 'length_m: 150.0 m'),
-        1,
         "length_m: '150.0 m', expected a number without quotes or unit",
     ),
     _ship(
         'a decimal comma',
         _changed('length_m: 150.0', 'length_m: 150,0'),
-        1,
         "length_m: '150,0', expected a number",
     ),
     _ship(
         'a table that does not ascend',
         _changed('0.12, 0.18,', '0.18, 0.12,'),
-        1,
         'baseline.wave_froude[2]: 0.12 after 0.18, expected ascending',
     ),
     _ship(
         'tables of different lengths',
         _changed('[0.0, 0.12, 0.18,', '[0.0, 0.18,'),
-        1,
         'baseline.wave_coefficient: 5 values, expected 4',
     ),
     _ship(
         'a hull too full for the merchant n_r',
         'length_m: 60.0\ndisplaced_volume_m3: 20200.0\n',
-        1,
         'merchant with L/V^(1/3) = 2.2, expected 4..8; use {model: constant',
     ),
     _ship(
         'several of these at once',
         'length_m: 492 ft\nspeed: 8\nbreadth_m: -1\n',
-        1,
         'ship.yaml: 4 problem(s)',
         'speed: unknown key',
         "'492 ft'",
@@ -168,49 +149,42 @@ SHIPS = (
     _ship(
         'no baseline, where one is needed',
         _SMALL,
-        1,
         'has no baseline resistance; add `baseline` to its ship file',
     ),
 )
 TABLES = (
-    _csv('an empty file', '', 1, "'table.csv' is empty; give a table"),
+    _csv('an empty file', '', "'table.csv' is empty; give a table"),
     _csv(
         'a header and no row',
         _HEADER,
-        1,
         'gave no sample from 0 row(s); give a table with a line a sample',
     ),
     _csv(
         'a column that is not there',
         _TABLE.replace('speed', 'log'),
-        1,
         "has no column 'speed'; it has 'time', 'log'",
     ),
     _csv(
         'an unknown unit',
         _TABLE,
-        1,
         "no unit 'knots' here; units are ft/s, km/h, kn, m/s",
         arguments=('--time', 'time', '--map', 'speed_through_water=speed:knots'),
     ),
     _csv(
         'an unknown input',
         _TABLE,
-        1,
         "no input 'stw'; inputs are speed_through_water",
         arguments=('--time', 'time', '--map', 'stw=speed'),
     ),
     _csv(
         'one column for a position',
         _TABLE,
-        1,
         "--map 'position=speed': expected 2 column(s)",
         arguments=('--time', 'time', '--map', 'position=speed'),
     ),
     _csv(
         'no column of a time',
         'count,speed\n0,8.0\n1,7.9\n',
-        1,
         "has no column that is known as a time; it has 'count', 'speed'",
         'Give --time COLUMN[:unit], or --rate HZ',
         arguments=('--map', 'speed_through_water=speed'),
@@ -218,13 +192,12 @@ TABLES = (
     _csv(
         'words in some cells',
         _TABLE.replace('7.5,', 'error,').replace(',7.9\n', ',n/a\n'),
-        0,
         "1 rejected, not a number: line 12: 'n/a'",
+        status=0,
     ),
     _csv(
         'words in all cells',
         _HEADER + '0,fast\n1,slow\n',
-        1,
         'gave no sample from 2 row(s)',
         "line 2: 'fast'",
         'expected numbers',
@@ -232,66 +205,68 @@ TABLES = (
     _csv(
         'NaN and inf in cells',
         _TABLE.replace(',7.9\n', ',nan\n').replace(',7.8\n', ',inf\n'),
-        0,
         "2 rejected, not a number: line 12: 'nan', line 22: 'inf'",
+        status=0,
     ),
-    _csv('empty cells', _TABLE.replace(',7.9\n', ',\n'), 0, "1 rejected, empty: line 12: ''"),
+    _csv(
+        'empty cells', _TABLE.replace(',7.9\n', ',\n'), "1 rejected, empty: line 12: ''", status=0
+    ),
     _csv(
         'dates whose day and month are ambiguous',
         _HEADER + '03/04/2026 08:00:00,8.0\n03/04/2026 08:00:01,7.9\n',
-        1,
         'day and month are ambiguous',
         'give --date-order dmy or --date-order mdy',
     ),
     _csv(
         'equal times',
         _TABLE.replace('\n11,', '\n10,').replace('\n12,', '\n10,'),
-        0,
         '2 rows have the stamp of an earlier one; a replay rejects those.',
+        status=0,
     ),
     _csv(
         'times that go back',
         _TABLE.replace('\n50,', '\n20,'),
-        0,
         '1 rows are stamped before an earlier one; a replay rejects those.',
+        status=0,
     ),
     _csv(
         'separated by *',
         _TABLE.replace(',', '*'),
-        1,
         "it has 'time*speed', and no comma, semicolon or tab",
     ),
-    _csv('a byte-order mark', b'\xef\xbb\xbf' + _TABLE.encode(), 0, '100 messages of 100 rows'),
+    _csv(
+        'a byte-order mark',
+        b'\xef\xbb\xbf' + _TABLE.encode(),
+        '100 messages of 100 rows',
+        status=0,
+    ),
     _csv(
         'UTF-16, as some spreadsheets save',
         _TABLE.encode('utf-16'),
-        1,
         "'table.csv' is in UTF-16; save it as UTF-8",
     ),
     _csv(
         'commas that may be those of thousands',
         'time;speed\n' + ''.join(f'{t};8,{100 + t}\n' for t in range(100)),
-        1,
         "100 rejected, not a number: line 2: '8,100'",
         'expected numbers with a decimal point',
     ),
     _csv(
         'rows too short and too long',
         _TABLE.replace('10,7.9\n', '10\n11,7.8,3,4\n'),
-        0,
         '1 rejected, empty: line 12',
         "1 rejected, more than 2 columns: line 13: '11,7.8,3,4'",
+        status=0,
     ),
     _csv(
         'bytes 0 in the middle',
         _TABLE.encode() + bytes(100) + b'\n100,7.0\n',
-        0,
         'time: 1 rejected, not a number: line 102',
+        status=0,
     ),
     _csv(
         'a spreadsheet (.xlsx)',
         b'PK\x03\x04' + bytes(range(256)) * 8,
-        1,
         "is no text, it begins with 'PK",
         'save it as CSV',
     ),

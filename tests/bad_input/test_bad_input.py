@@ -10,13 +10,7 @@ import pytest
 from tests.bad_input import bags, files, messages, tables, use
 from tests.bad_input.case import Case, Seen, run
 
-CASES: tuple[Case, ...] = (
-    *bags.CASES,
-    *files.CASES,
-    *messages.CASES,
-    *tables.CASES,
-    *use.CASES,
-)
+CASES: tuple[Case, ...] = (*bags.CASES, *files.CASES, *messages.CASES, *tables.CASES, *use.CASES)
 
 
 def faults(case: Case, seen: Seen) -> list[str]:

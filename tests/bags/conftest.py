@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
+from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.messages import encode
+from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from tests.runs import write_run
 
 START_NS = 1_700_000_000_000_000_000
 
@@ -47,7 +52,7 @@ def block() -> Block:
 
 
 @pytest.fixture
-def write_bag(tmp_path: Path, write_run: Callable[..., Path]) -> Callable[..., Path]:
+def write_bag(tmp_path: Path) -> Callable[..., Path]:
     """Write a block to a new file of the test's folder."""
 
     def new(name: str, block: Block, **options: Any) -> Path:
@@ -66,24 +71,28 @@ def sample_bag(tmp_path_factory: pytest.TempPathFactory, block: Block) -> bytes:
     return path.read_bytes()
 
 
-def samples(items: Sequence[Any]) -> Block:
+def read_samples(run: Any) -> Block:
     """Join the blocks among what a run gives."""
-    from shipdrag_ros.samples import concatenate
-
-    return concatenate([item for item in items if isinstance(item, Block)])
+    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
 
 
-@pytest.fixture
-def read_samples() -> Callable[[Any], Block]:
-    return lambda run: samples(list(run.inputs()))
+def assert_same(one: Block, other: Block) -> None:
+    for name in ('channel', 'stamp_ns', 'receive_ns', 'variance'):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    # a heading has passed through sine and cosine
+    np.testing.assert_allclose(one.value, other.value, rtol=0, atol=1e-15)
 
 
-@pytest.fixture
-def assert_same() -> Callable[[Block, Block], None]:
-    def check(one: Block, other: Block) -> None:
-        for name in ('channel', 'stamp_ns', 'receive_ns', 'variance'):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
-        # a heading has passed through sine and cosine
-        np.testing.assert_allclose(one.value, other.value, rtol=0, atol=1e-15)
-
-    return check
+def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NONE) -> Path:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for message in encode(block):
+            if message.topic not in connections:
+                connections[message.topic] = writer.add_connection(
+                    message.topic, message.type, typestore=store
+                )
+            writer.write(connections[message.topic], message.log_ns, message.payload)
+    return path

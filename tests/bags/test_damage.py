@@ -93,23 +93,6 @@ def test_a_record_of_another_kind_than_indexed(
 
 
 @EXAMPLES
-@given(data=st.data())
-def test_any_cut(tmp_path: Path, sample_bag: bytes, data: st.DataObject) -> None:
-    end = data.draw(st.integers(0, len(sample_bag)))
-    read_or_refuse(tmp_path / 'a.mcap', sample_bag[:end])
-
-
-@EXAMPLES
-@given(data=st.data())
-def test_any_flips(tmp_path: Path, sample_bag: bytes, data: st.DataObject) -> None:
-    damaged = bytearray(sample_bag)
-    places = st.one_of(st.integers(0, 300), st.integers(-3000, -1))
-    for place in data.draw(st.lists(places, min_size=1, max_size=5)):
-        damaged[place] = data.draw(st.integers(0, 255))
-    read_or_refuse(tmp_path / 'a.mcap', bytes(damaged))
-
-
-@EXAMPLES
 @given(junk=st.binary(max_size=300), closed=st.booleans())
 def test_any_junk_behind_the_magic(tmp_path: Path, junk: bytes, closed: bool) -> None:
     read_or_refuse(tmp_path / 'a.mcap', MAGIC + junk + (MAGIC if closed else b''))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -109,36 +108,6 @@ def test_it_is_on_the_disk_within_a_second(tmp_path: Path) -> None:
     assert any(0.0 < longest_in_memory_s(tmp_path / str(attempt)) < 1.0 for attempt in range(4))
 
 
-def test_a_new_part_by_size(tmp_path: Path) -> None:
-    it = recording(
-        tmp_path,
-        limits=PartLimits(size_bytes=50_000, duration_s=1e6),
-        earlier=[message(n, size=1000) for n in range(200)],
-    )
-    end(it)
-    parts = sorted(tmp_path.glob('*.mcap'))
-    assert [part.name for part in parts[:2]] == ['a_000.mcap', 'a_001.mcap']
-    assert len(parts) >= 4
-    assert all_numbers(tmp_path) == list(range(200))
-
-
-def test_a_new_part_by_time_and_readers_join_them(tmp_path: Path) -> None:
-    it = recording(
-        tmp_path,
-        limits=PartLimits(size_bytes=10**9, duration_s=60.0),
-        earlier=map(message, range(200)),
-    )
-    end(it)
-    parts = sorted(tmp_path.glob('*.mcap'))
-    assert [len(numbers(part)) for part in parts] == [61, 61, 61, 17]
-    (run,) = open_runs(reversed(parts))
-    assert run.warnings == ()
-    assert run.attachments == {'ship.yaml': 'name: x\n'}
-    assert run.paths == tuple(parts)
-    (alone,) = open_runs([parts[2]])
-    assert alone.attachments == run.attachments
-
-
 @pytest.mark.usefixtures('quick')
 def test_a_disk_that_is_full_for_a_while_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -188,22 +157,6 @@ def test_what_was_written_but_not_safe_is_written_again_and_not_twice(
         wait_until(lambda: it.progress().error)
     assert end(it).lost == 0
     assert all_numbers(tmp_path) == [0, 1]
-
-
-@pytest.mark.usefixtures('quick')
-def test_a_directory_that_vanishes_is_made_again(tmp_path: Path) -> None:
-    it = recording(tmp_path / 'bags')
-    it.put(message(0))
-    wait_until(lambda: it.progress().messages == 1)
-    shutil.rmtree(tmp_path / 'bags')
-    it.put(message(1))
-    wait_until((tmp_path / 'bags').exists)
-    wait_until(lambda: it.progress().messages == 1)
-    progress = end(it)
-    # message 0 was in the file that is gone
-    assert (progress.messages, progress.lost, progress.vanished) == (1, 1, 1)
-    assert (progress.uncompacted, progress.error) == (0, '')
-    assert all_numbers(tmp_path / 'bags') == [1]
 
 
 def test_a_finished_part_that_is_removed_before_it_is_compact_is_counted(

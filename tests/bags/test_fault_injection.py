@@ -88,6 +88,11 @@ class Saved(NamedTuple):
     doubtful: frozenset[Message]
 
 
+Samples = dict[str, Sample]
+Save = Callable[[bytes], Saved]
+DamageOf = Callable[[bytes], set[tuple[str, str]]]
+
+
 def make(block: Block, options: dict[str, Any]) -> Sample:
     """Write a file with all kinds of records, and a checksum over all of them."""
     file = BytesIO()
@@ -196,10 +201,7 @@ def damage_of(tmp_path: Path) -> Callable[[bytes], set[tuple[str, str]]]:
 
 @pytest.mark.parametrize('writer', WRITERS)
 def test_a_sound_file_is_sound_and_comes_out_whole(
-    writer: str,
-    samples: dict[str, Sample],
-    save: Callable[[bytes], Saved],
-    damage_of: Callable[[bytes], set[tuple[str, str]]],
+    writer: str, samples: Samples, save: Save, damage_of: DamageOf
 ) -> None:
     sample = samples[writer]
     assert damage_of(sample.content) == set()
@@ -222,10 +224,7 @@ def test_a_sound_file_is_sound_and_comes_out_whole(
 
 @pytest.mark.parametrize('writer', WRITERS)
 def test_cut_at_every_record_and_inside(
-    writer: str,
-    samples: dict[str, Sample],
-    save: Callable[[bytes], Saved],
-    damage_of: Callable[[bytes], set[tuple[str, str]]],
+    writer: str, samples: Samples, save: Save, damage_of: DamageOf
 ) -> None:
     sample = samples[writer]
     for record in _each_kind(sample):
@@ -249,10 +248,7 @@ def test_cut_at_every_record_and_inside(
 
 @pytest.mark.parametrize('writer', WRITERS)
 def test_a_bit_flipped_in_every_kind_of_record(
-    writer: str,
-    samples: dict[str, Sample],
-    save: Callable[[bytes], Saved],
-    damage_of: Callable[[bytes], set[tuple[str, str]]],
+    writer: str, samples: Samples, save: Save, damage_of: DamageOf
 ) -> None:
     sample = samples[writer]
     rng = random.Random(1)
@@ -284,11 +280,7 @@ def test_a_bit_flipped_in_every_kind_of_record(
 @pytest.mark.parametrize('writer', WRITERS)
 @pytest.mark.parametrize('fault', ['delete', 'duplicate', 'garbage before', 'zeros before'])
 def test_a_record_deleted_doubled_or_after_garbage(
-    writer: str,
-    fault: str,
-    samples: dict[str, Sample],
-    save: Callable[[bytes], Saved],
-    damage_of: Callable[[bytes], set[tuple[str, str]]],
+    writer: str, fault: str, samples: Samples, save: Save, damage_of: DamageOf
 ) -> None:
     sample = samples[writer]
     rng = random.Random(2)
@@ -311,9 +303,7 @@ def test_a_record_deleted_doubled_or_after_garbage(
 
 
 @pytest.mark.parametrize('writer', WRITERS)
-def test_bytes_lost_in_the_middle_of_a_record(
-    writer: str, samples: dict[str, Sample], save: Callable[[bytes], Saved]
-) -> None:
+def test_bytes_lost_in_the_middle_of_a_record(writer: str, samples: Samples, save: Save) -> None:
     sample = samples[writer]
     rng = random.Random(3)
     for record in _each_kind(sample):
@@ -329,9 +319,7 @@ def test_bytes_lost_in_the_middle_of_a_record(
 
 
 @pytest.mark.parametrize('writer', WRITERS)
-def test_damage_is_named_by_place_and_kind(
-    writer: str, samples: dict[str, Sample], tmp_path: Path
-) -> None:
+def test_damage_is_named_by_place_and_kind(writer: str, samples: Samples, tmp_path: Path) -> None:
     sample = samples[writer]
     for record in _each_kind(sample):
         content = bytearray(sample.content)
@@ -344,7 +332,7 @@ def test_damage_is_named_by_place_and_kind(
 
 
 def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(
-    samples: dict[str, Sample], save: Callable[[bytes], Saved]
+    samples: Samples, save: Save
 ) -> None:
     sample = samples['zstd']
     first = next(record for record in sample.records if record.opcode == Opcode.CHUNK)
@@ -394,8 +382,8 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
     write: Callable[[Path, Block], bytes],
     tmp_path: Path,
     block: Block,
-    save: Callable[[bytes], Saved],
-    damage_of: Callable[[bytes], set[tuple[str, str]]],
+    save: Save,
+    damage_of: DamageOf,
 ) -> None:
     """A chunk that is whole is saved whole; nothing that is not is taken for sound."""
     content = write(tmp_path / 'a.mcap', block[np.isin(block.channel, SMALL)][:9])
@@ -425,7 +413,7 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
         assert damage_of(bytes(damaged)) or sound == everything, at
 
 
-def test_a_key_without_its_value_is_damage(samples: dict[str, Sample], tmp_path: Path) -> None:
+def test_a_key_without_its_value_is_damage(samples: Samples, tmp_path: Path) -> None:
     for first in range(0, 600, 3):
         content = bytearray(samples['zstd'].content)
         content[first : first + 300] = bytes(300)
@@ -442,9 +430,7 @@ def test_a_key_without_its_value_is_damage(samples: dict[str, Sample], tmp_path:
 )
 @given(data=st.data())
 def test_no_damage_makes_a_crash(
-    data: st.DataObject,
-    samples: dict[str, Sample],
-    tmp_path_factory: pytest.TempPathFactory,
+    data: st.DataObject, samples: Samples, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     content = _mangled(data, samples)
     path = tmp_path_factory.mktemp('fuzz') / 'bag.mcap'
@@ -459,7 +445,7 @@ def test_no_damage_makes_a_crash(
             use()
 
 
-def _mangled(data: st.DataObject, samples: dict[str, Sample]) -> bytes:
+def _mangled(data: st.DataObject, samples: Samples) -> bytes:
     content = bytearray(samples[data.draw(st.sampled_from(list(WRITERS)))].content)
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, max(len(content) - 1, 0)))

@@ -45,18 +45,6 @@ def numbers(found: list[object]) -> list[int]:
     return [record.log_time for record in found if isinstance(record, Message)]
 
 
-def test_every_chunk_is_there_once_it_is_written(tmp_path: Path) -> None:
-    file = live(tmp_path / 'a.mcap')
-    sizes = [file.size_bytes]
-    for first in range(0, 30, 3):
-        file.append([message(first + i, topic='/shaft' if i else '/depth') for i in range(3)])
-        sizes.append(file.size_bytes)
-    for cut in range(sizes[0], sizes[-1] + 1, 7):
-        whole = sum(size <= cut for size in sizes) - 1
-        assert numbers(records(file.path, until=cut)) == list(range(3 * whole))
-    file.close()
-
-
 def test_attachments_stand_before_the_first_message_and_topics_before_their_own(
     tmp_path: Path,
 ) -> None:
@@ -96,13 +84,6 @@ def test_nothing_is_left_of_a_file_without_messages_that_is_abandoned(tmp_path: 
     file.append([message(1)])
     file.abandon()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_that_exists_is_not_overwritten(tmp_path: Path) -> None:
-    (tmp_path / 'a.mcap').write_text('precious')
-    with pytest.raises(BagError, match='exists'):
-        live(tmp_path / 'a.mcap')
-    assert (tmp_path / 'a.mcap').read_text() == 'precious'
 
 
 @pytest.mark.parametrize('replaced', [False, True])

@@ -13,20 +13,17 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as Rosbag2Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.rosbag2 import CompressionMode
 
-from shipdrag_ros.bags import BagWriter, Compression, ResetMark, Run, mcap_file, open_runs
+from shipdrag_ros.bags import BagWriter, Compression, ResetMark, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
 from shipdrag_ros.samples import Block, Channel, concatenate
+from tests.bags.conftest import assert_same, read_samples, rosbag2
 
 WriteBag = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
-ReadSamples = Callable[[Run], Block]
-AssertSame = Callable[[Block, Block], None]
 
 
 def foreign(path: Path, block: Block, **options: Any) -> Path:
@@ -48,28 +45,9 @@ def foreign(path: Path, block: Block, **options: Any) -> Path:
     return path
 
 
-def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NONE) -> Path:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    writer = Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(mode, CompressionFormat.ZSTD)
-    with writer:
-        connections: dict[str, Any] = {}
-        for message in encode(block):
-            if message.topic not in connections:
-                connections[message.topic] = writer.add_connection(
-                    message.topic, message.type, typestore=store
-                )
-            writer.write(connections[message.topic], message.log_ns, message.payload)
-    return path
-
-
 @pytest.mark.parametrize('compression', Compression)
 def test_what_was_written_is_read(
-    write_bag: WriteBag,
-    block: Block,
-    compression: Compression,
-    read_samples: ReadSamples,
-    assert_same: AssertSame,
+    write_bag: WriteBag, block: Block, compression: Compression
 ) -> None:
     path = write_bag('a.mcap', block, compression=compression, chunk_bytes=5000)
     (run,) = open_runs([path])
@@ -104,11 +82,7 @@ def test_what_was_written_is_read(
     ids=lambda options: '-'.join(options),
 )
 def test_files_without_an_index_are_read_too(
-    tmp_path: Path,
-    block: Block,
-    options: dict[str, Any],
-    read_samples: ReadSamples,
-    assert_same: AssertSame,
+    tmp_path: Path, block: Block, options: dict[str, Any]
 ) -> None:
     (run,) = open_runs([foreign(tmp_path / 'a.mcap', block, **options)])
     assert_same(read_samples(run), block)
@@ -118,11 +92,7 @@ def test_files_without_an_index_are_read_too(
 
 @pytest.mark.parametrize('mode', CompressionMode)
 def test_bags_of_rosbag2_by_another_tool(
-    tmp_path: Path,
-    block: Block,
-    mode: CompressionMode,
-    read_samples: ReadSamples,
-    assert_same: AssertSame,
+    tmp_path: Path, block: Block, mode: CompressionMode
 ) -> None:
     path = rosbag2(tmp_path / 'bag', block, mode)
     (run,) = open_runs([path])
@@ -136,12 +106,7 @@ def test_bags_of_rosbag2_by_another_tool(
 
 
 @pytest.mark.parametrize('chunked', [True, False])
-def test_arrival_decides_the_order_and_then_the_place(
-    tmp_path: Path,
-    chunked: bool,
-    read_samples: ReadSamples,
-    assert_same: AssertSame,
-) -> None:
+def test_arrival_decides_the_order_and_then_the_place(tmp_path: Path, chunked: bool) -> None:
     # written out of order, with ties, over many chunks
     rng = np.random.default_rng(4)
     n = 3000
@@ -153,10 +118,7 @@ def test_arrival_decides_the_order_and_then_the_place(
 
 
 def test_a_batch_is_bounded_and_its_size_changes_nothing(
-    write_bag: WriteBag,
-    block: Block,
-    monkeypatch: pytest.MonkeyPatch,
-    assert_same: AssertSame,
+    write_bag: WriteBag, block: Block, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (run,) = open_runs([write_bag('a.mcap', block, chunk_bytes=3000)])
     monkeypatch.setattr(run_module, 'BATCH', 7)
@@ -184,7 +146,7 @@ def test_memory_does_not_grow_with_the_bag(
     assert peaks[1] < 1.2 * peaks[0]
 
 
-def test_a_range_of_time(write_bag: WriteBag, block: Block, assert_same: AssertSame) -> None:
+def test_a_range_of_time(write_bag: WriteBag, block: Block) -> None:
     (run,) = open_runs([write_bag('a.mcap', block, chunk_bytes=3000)])
     start, end = block.receive_ns[[100, 300]].tolist()
     (part,) = run.inputs(start_ns=start, end_ns=end)
@@ -194,7 +156,7 @@ def test_a_range_of_time(write_bag: WriteBag, block: Block, assert_same: AssertS
 
 
 def test_parts_of_one_recording_are_joined_in_their_order(
-    write_bag: WriteBag, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+    write_bag: WriteBag, block: Block
 ) -> None:
     paths = [
         write_bag(f'{name}.mcap', block[start : start + 100], recording_id='r', part=part)
@@ -212,7 +174,7 @@ def test_parts_of_one_recording_are_joined_in_their_order(
 
 
 def test_parts_follow_each_other_even_if_the_clock_went_back(
-    write_bag: WriteBag, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+    write_bag: WriteBag, block: Block
 ) -> None:
     paths = [
         write_bag('0.mcap', block[100:200], recording_id='r', part=0),
@@ -232,7 +194,7 @@ def test_bags_given_together_are_runs_of_their_own(write_bag: WriteBag, block: B
 
 
 def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(
-    tmp_path: Path, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+    tmp_path: Path, block: Block
 ) -> None:
     folder = tmp_path / 'split'
     folder.mkdir()
@@ -261,9 +223,7 @@ def test_attachments_are_read_and_a_difference_between_parts_is_told(tmp_path: P
     assert warning.startswith('2.mcap: its ship.yaml differs')
 
 
-def test_resets_are_read_at_their_place(
-    tmp_path: Path, block: Block, assert_same: AssertSame
-) -> None:
+def test_resets_are_read_at_their_place(tmp_path: Path, block: Block) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for i, message in enumerate(encode(block[:20])):
             if i in (5, 12):
@@ -303,21 +263,6 @@ def test_outputs_of_two_nodes_are_told_and_not_mixed(tmp_path: Path) -> None:
     assert 'outputs of 2 nodes, /a, /b' in run.warnings[0]
 
 
-def test_what_cannot_be_decoded_is_counted(tmp_path: Path) -> None:
-    message, *_ = encode(Block.of(Channel.SHAFT, [1], [2.0]))
-    with BagWriter(tmp_path / 'a.mcap') as bag:
-        for log_ns, payload in enumerate([message.payload, message.payload[:30], b'']):
-            bag.write('/shaft', message.type, payload, log_ns=log_ns, publish_ns=0)
-        bag.write('/rudder', message.type, message.payload, log_ns=9, publish_ns=0)
-    (run,) = open_runs([tmp_path / 'a.mcap'])
-    inputs = run.inputs()
-    (block,) = inputs
-    assert isinstance(block, Block)
-    assert len(block) == 1
-    assert inputs.messages == {'shaft': 3, 'rudder': 1}
-    assert inputs.unreadable == {'shaft': {'malformed': 2}, 'rudder': {'no_joint': 1}}
-
-
 def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -> None:
     with (tmp_path / 'a.mcap').open('wb') as file:
         writer = Writer(file)
@@ -335,37 +280,6 @@ def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -
         ('/shaft', 'std_msgs/msg/Float32', True, None),
     ]
     assert list(run.inputs()) == []
-
-
-def test_a_remap_chooses_a_topic(tmp_path: Path, read_samples: ReadSamples) -> None:
-    block = Block.of(Channel.SPEED_THROUGH_WATER, [1, 2], [3.0, 4.0])
-    path = foreign(tmp_path / 'a.mcap', block)
-    (run,) = open_runs([path], remap={'/ship/speed_through_water': 'speed_over_ground'})
-    assert read_samples(run).channel.tolist() == [Channel.SPEED_OVER_GROUND] * 2
-    with pytest.raises(BagError, match=r"a\.mcap.*no topic '/nothing'"):
-        open_runs([path], remap={'/nothing': 'depth'})
-
-
-@pytest.mark.parametrize('name', ['a.mcap', 'bag'])
-def test_a_path_that_is_not_there(tmp_path: Path, name: str) -> None:
-    with pytest.raises(BagError, match='does not exist'):
-        open_runs([tmp_path / name])
-
-
-@pytest.mark.parametrize(
-    ('content', 'expected'),
-    [
-        (b'', 'is empty'),
-        (b'SQLite format 3\0 and more', 'sqlite3 storage; make a bag of it with `shipdrag import'),
-        (b'#ROSBAG V2.0\n', 'ROS 1; make a bag of it with `shipdrag import'),
-        (b'time,speed\n1,2\n', "no MCAP file, it begins with b'time,spe'"),
-        (b'\x89PNG\r\n\x1a\n' + bytes(100), 'no MCAP file'),
-    ],
-)
-def test_files_that_are_no_bags(tmp_path: Path, content: bytes, expected: str) -> None:
-    (tmp_path / 'a.mcap').write_bytes(content)
-    with pytest.raises(BagError, match=expected):
-        open_runs([tmp_path / 'a.mcap'])
 
 
 @pytest.mark.parametrize(

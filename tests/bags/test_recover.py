@@ -20,47 +20,22 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
-from rosbags.rosbag2 import Writer as Rosbag2Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.rosbag2 import CompressionMode
 
-from shipdrag_ros.bags import BagWriter, Run, info, open_runs
+from shipdrag_ros.bags import BagWriter, info, open_runs
 from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block, Channel, concatenate
+from tests.bags.conftest import assert_same, read_samples, rosbag2
 
-ReadSamples = Callable[[Run], Block]
-AssertSame = Callable[[Block, Block], None]
 WriteBag = Callable[..., Path]
 MIB = 1 << 20
 
 
-def rosbag2(path: Path, block: Block, mode: CompressionMode) -> Path:
-    store = get_typestore(Stores.ROS2_JAZZY)
-    writer = Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(mode, CompressionFormat.ZSTD)
-    with writer:
-        connections: dict[str, Any] = {}
-        for message in encode(block):
-            if message.topic not in connections:
-                connections[message.topic] = writer.add_connection(
-                    message.topic, message.type, typestore=store
-                )
-            writer.write(connections[message.topic], message.log_ns, message.payload)
-    return path
-
-
 @pytest.mark.parametrize('mode', CompressionMode)
-def test_a_directory_of_rosbag2(
-    tmp_path: Path,
-    block: Block,
-    mode: CompressionMode,
-    read_samples: ReadSamples,
-    assert_same: AssertSame,
-) -> None:
+def test_a_directory_of_rosbag2(tmp_path: Path, block: Block, mode: CompressionMode) -> None:
     source = rosbag2(tmp_path / 'bag', block[:300], mode)
     (report,) = check([source])
     assert report.damage == ()
@@ -102,7 +77,7 @@ def test_a_message_that_is_packed_by_itself_and_damaged_is_lost_and_told(
 
 
 def test_a_split_bag_is_joined_and_each_damage_names_its_file(
-    tmp_path: Path, write_bag: WriteBag, block: Block, read_samples: ReadSamples
+    tmp_path: Path, write_bag: WriteBag, block: Block
 ) -> None:
     folder = tmp_path / 'split'
     folder.mkdir()
@@ -326,9 +301,7 @@ def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path, damag
     assert max(of_check, of_recover) < 45 * MIB
 
 
-def test_topics_that_have_other_numbers_in_each_file_are_joined(
-    tmp_path: Path,
-) -> None:
+def test_topics_that_have_other_numbers_in_each_file_are_joined(tmp_path: Path) -> None:
     folder = tmp_path / 'split'
     folder.mkdir()
     written = set()

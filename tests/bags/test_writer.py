@@ -19,8 +19,6 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, encode, types
 from shipdrag_ros.samples import Block, Channel
 
-TWIST = 'geometry_msgs/msg/TwistStamped'
-
 
 @pytest.mark.parametrize('compression', Compression)
 def test_the_reference_reader_decodes_it(

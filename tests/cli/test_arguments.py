@@ -38,19 +38,6 @@ def test_an_open_end_excludes_itself() -> None:
         arguments.number(0.0, above=True)('0')
 
 
-def test_a_remapping_has_two_sides() -> None:
-    assert arguments.remap('/a/log:=speed_through_water') == ('/a/log', 'speed_through_water')
-    for text in ('a', 'a:=', ':=b', 'a=b'):
-        with pytest.raises(argparse.ArgumentTypeError, match='expected FROM:=TO'):
-            arguments.remap(text)
-
-
-def test_a_remapping_in_the_place_of_a_bag_is_explained() -> None:
-    assert arguments.bag('a.mcap') == Path('a.mcap')
-    with pytest.raises(argparse.ArgumentTypeError, match='--remap before each'):
-        arguments.bag('a:=b')
-
-
 @pytest.fixture
 def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(formatter_class=arguments.Help)

@@ -30,7 +30,10 @@ def test_the_json(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert about['bag'] == str(steady_bag)
     assert about['duration_s'] == 301.0
     assert about['messages'] == 4 * 302
-    assert about['indexed'] is True
+    assert about['indexed']
+    assert (about['compression'], about['software']) == ('zstd', __version__)
+    assert about['size_bytes'] == steady_bag.stat().st_size
+    assert about['end_ns'] - about['start_ns'] == 301 * 10**9
     assert about['warnings'] == []
     shaft = next(topic for topic in about['topics'] if topic['topic'] == '/shaft')
     assert (shaft['input'], shaft['messages'], shaft['rate_hz']) == ('shaft', 302, 1.0)

@@ -44,9 +44,7 @@ def test_lines_are_told_now_and_then_with_the_time_left(monkeypatch: pytest.Monk
     assert said == ['replaying: 2 of 10, 80 s left', 'replaying: 4 of 10, 60 s left']
 
 
-def test_the_first_word_comes_at_once_and_the_others_wait(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_first_word_comes_at_once_and_the_others_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
     monkeypatch.setattr('shipdrag_ros.cli.output.time.monotonic', lambda: clock[0])
     said: list[str] = []

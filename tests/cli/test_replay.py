@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -141,17 +140,6 @@ def test_a_given_window_is_estimated_as_it_is(
     assert coastdown['samples'] == {'speed_through_water': 801, 'position': 801}
 
 
-def test_a_window_without_an_estimate_is_an_error(
-    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(['replay', str(coastdown_bag), '--window', '400', '401']) == 1
-    captured = capsys.readouterr()
-    assert captured.err.startswith(f'ERROR: {str(coastdown_bag)!r}: no estimate from 400 to 401 s')
-    assert captured.out == ''
-    assert main(['replay', str(coastdown_bag), '--window', '1200', '400']) == 1
-    assert 'window' in capsys.readouterr().err
-
-
 def test_another_ship_gives_another_range(
     coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -228,12 +216,10 @@ def test_one_hull_cannot_be_compared(
     [
         (['--json', 'BAG'], 'would be overwritten by the JSON'),
         ([], 'the following arguments are required: BAG'),
-        (['BAG', '--report', 'a.mcap'], 'expected a name that ends in .html'),
         (['BAG', '--report', 'no such folder/a.html'], "no folder 'no such folder'"),
         (['BAG', '--json', 'no such folder/a.json'], "no folder 'no such folder'"),
         (['BAG', '--window', '1'], 'expected 2 arguments'),
         (['BAG', '--window', '-1', '5'], 'at least 0'),
-        (['BAG', '--remap', 'a=b'], 'expected FROM:=TO'),
         (['--remap', 'a:=b', 'c:=d', 'BAG'], 'write --remap before each'),
     ],
 )
@@ -251,10 +237,7 @@ def test_wrong_usage_is_explained(
 @pytest.mark.parametrize(
     ('line', 'said'),
     [
-        (['no such.mcap'], "ERROR: 'no such.mcap' does not exist"),
-        (['BAG', '--ship', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
         (['BAG', '--parameters', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
-        (['BAG', '--remap', '/a:=position'], "no topic '/a' in the bag"),
         (['BAG', '--out', 'BAG'], 'File exists'),
     ],
 )
@@ -264,11 +247,3 @@ def test_a_user_error_is_told(
     words = [str(coastdown_bag) if word == 'BAG' else word for word in line]
     assert main(['replay', *words]) == 1
     assert said in capsys.readouterr().err
-
-
-def test_a_bag_that_is_none_is_told(
-    tmp_path: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shutil.copy(ship_file, tmp_path / 'ship.mcap')
-    assert main(['replay', str(tmp_path / 'ship.mcap')]) == 1
-    assert capsys.readouterr().err.startswith('ERROR: ')

@@ -189,15 +189,12 @@ def test_the_json_says_what_was_made(
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (('--speed', '30'), 'ERROR: '),
         (('--effect', 'barnacles=1'), "ERROR: effect 'barnacles' is not known; known are added_"),
         (('--effect', 'current=1,up=2'), "ERROR: effect 'current=1,up=2': parameter 'up' is not"),
         (
             ('--effect', 'current=9'),
             'ERROR: effects: current: along_track_m_s is 9.0, expected -5',
         ),
-        (('--ship', 'no such.yaml'), 'ERROR: no such.yaml: 1 problem(s)'),
-        (('-o', '/no/such/folder/a.mcap'), "ERROR: '/no/such/folder/a.mcap' cannot be made"),
     ],
 )
 def test_a_user_error_is_told_and_leaves_no_bag(
@@ -211,25 +208,6 @@ def test_a_user_error_is_told_and_leaves_no_bag(
     assert main(['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT, *arguments]) == 1
     assert capsys.readouterr().err.startswith(said)
     assert not path.exists()
-
-
-def test_a_ship_without_baseline_cannot_be_simulated(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / 'ship.yaml').write_text('{length_m: 150, displaced_volume_m3: 20200}')
-    line = ['simulate', '--ship', str(tmp_path / 'ship.yaml'), '-o', str(tmp_path / 'a.mcap')]
-    assert main(line) == 1
-    assert 'no baseline' in capsys.readouterr().err
-
-
-def test_an_existing_bag_is_kept(
-    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / 'a.mcap'
-    path.write_bytes(b'precious')
-    assert main(['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT]) == 1
-    assert 'exists' in capsys.readouterr().err
-    assert path.read_bytes() == b'precious'
 
 
 @pytest.mark.parametrize(

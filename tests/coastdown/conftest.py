@@ -68,11 +68,6 @@ def bits(thing: object) -> bytes:
     return repr(thing).encode()
 
 
-@pytest.fixture(name='bits', scope='session')
-def bits_fixture() -> Callable[[object], bytes]:
-    return bits
-
-
 def window_itself(window: Window, ship: Ship, parameters: Parameters) -> Window:
     """Stand in for an estimator: what it was given, to the last bit."""
     return window

@@ -6,14 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown.bins import (
-    Bins,
-    displacement,
-    line,
-    mean_place,
-    mean_turning,
-    speeds,
-)
+from shipdrag_ros.coastdown.bins import Bins, displacement, line, mean_place, mean_turning, speeds
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.samples import Channel
 

@@ -11,6 +11,7 @@ from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, No
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, Turn
+from tests.coastdown.conftest import bits
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
@@ -105,7 +106,7 @@ def test_a_turn_on_another_mark_ends_it_still(watch, record, sensors) -> None:
     assert 490.0 <= end_s(coastdown) <= 545.0
 
 
-def test_fixes_on_another_mark_are_kept_and_live_is_as_replay(ship, record, sensors, bits) -> None:
+def test_fixes_on_another_mark_are_kept_and_live_is_as_replay(ship, record, sensors) -> None:
     block = on_another_mark(
         record(sensors=(sensors['log'], sensors['radar']), duration_s=440.0), 300.0, 0
     )

@@ -24,6 +24,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
+from tests.coastdown.conftest import bits
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
@@ -157,7 +158,7 @@ def thinned(block: Block, every) -> Block:
     silence=st.tuples(st.integers(0, 1200), st.integers(0, 300)),
 )
 def test_where_the_record_is_cut_changes_no_bit(
-    ship, eventful, bits, data, seed: int, every, globe: bool, silence
+    ship, eventful, data, seed: int, every, globe: bool, silence
 ) -> None:
     block = thinned(eventful, every)
     second = (block.stamp_ns - START_NS) // S
@@ -174,7 +175,7 @@ def test_where_the_record_is_cut_changes_no_bit(
 @settings(max_examples=4, deadline=None)
 @given(data=st.data(), into_s=st.integers(1, 200), seed=st.integers(0, 1000))
 def test_a_reset_in_mid_coastdown_is_a_fresh_start(
-    ship, eventful, said, bits, data, into_s: int, seed: int
+    ship, eventful, said, data, into_s: int, seed: int
 ) -> None:
     onset = next(event for event in said if isinstance(event, Onset))
     place = int(np.searchsorted(eventful.receive_ns, onset.detected_ns + into_s * S))
@@ -192,14 +193,14 @@ def test_a_reset_in_mid_coastdown_is_a_fresh_start(
     assert bits(events + monitor.finish()) == bits(expected)
 
 
-def test_sample_by_sample_changes_no_bit(ship, eventful, bits) -> None:
+def test_sample_by_sample_changes_no_bit(ship, eventful) -> None:
     block = spoil(eventful, 5)
     events, _ = run(ship, [block])
     assert {Onset, Update, EndedCoastdown, Reset} <= {type(event) for event in events}
     assert bits(run(ship, cut(block, range(1, len(block))))[0]) == bits(events)
 
 
-def test_real_estimates_change_no_bit(ship, record, bits) -> None:
+def test_real_estimates_change_no_bit(ship, record) -> None:
     block = record(lead_in_s=300.0, duration_s=120.0)
     whole, part = Monitor(ship, QUICK), Monitor(ship, QUICK)
     events = whole.update(block) + whole.finish()
@@ -208,7 +209,7 @@ def test_real_estimates_change_no_bit(ship, record, bits) -> None:
     assert bits(again + part.finish()) == bits(events)
 
 
-def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, said, bits) -> None:
+def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, said) -> None:
     twice = eventful[np.repeat(np.arange(len(eventful)), 2)]
     strided = twice[::2]
     for array in (strided.stamp_ns, strided.value, strided.channel):
@@ -246,7 +247,7 @@ def long_records(ship, long_record) -> list:
 @settings(max_examples=5, deadline=None)
 @given(start_s=st.integers(1, 2000), globe=st.booleans())
 def test_a_monitor_that_starts_later_says_the_same(
-    ship, long_records, bits, start_s: int, globe: bool
+    ship, long_records, start_s: int, globe: bool
 ) -> None:
     block, whole = long_records[globe]
     part, _ = run(ship, [block[block.stamp_ns >= START_NS + start_s * S]])

@@ -172,10 +172,7 @@ def test_pitch_to_zero_dates_the_stop(watch, record) -> None:
 
 @pytest.mark.parametrize('apart_s', [20.0, 90.0, 300.0])
 def test_of_several_shafts_the_last_that_stops_counts(watch, record, apart_s: float) -> None:
-    orders = (
-        EngineOrder(0.0, shaft=1.0, thrust=0.5),
-        EngineOrder(apart_s, shaft=0.0, thrust=0.0),
-    )
+    orders = (EngineOrder(0.0, shaft=1.0, thrust=0.5), EngineOrder(apart_s, shaft=0.0, thrust=0.0))
     block = record(orders=orders, duration_s=1200.0)
     second = (block.stamp_ns - START_NS) / S - 900.0
     rng = np.random.default_rng(4)

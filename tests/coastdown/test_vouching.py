@@ -25,6 +25,7 @@ from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.vouching import Craft, Vouching, sound_probabilities
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
+from tests.coastdown.conftest import bits
 
 LOG, GROUND, TRACK = 0, 1, 2
 CRAFT = Craft(60.0, 1.2)
@@ -113,7 +114,7 @@ def test_a_log_that_is_sound_again_is_used_again_without_what_it_read_before() -
 
 
 @pytest.mark.parametrize('fault', ['random', 'position in km'])
-def test_how_the_record_is_cut_into_blocks_cannot_matter(fault: str, bits) -> None:
+def test_how_the_record_is_cut_into_blocks_cannot_matter(fault: str) -> None:
     block = faulty(fault, Channel.POSITION)
     said = []
     for size in (1, 977, len(block)):

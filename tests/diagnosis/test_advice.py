@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,32 +13,28 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, with_known
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.compare import Comparing
-from shipdrag_ros.ship import Fact, Ship
-from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.ship import Fact
 from shipdrag_ros.simulation.effect import Cost, Measure
-from shipdrag_ros.simulation.effects import parse
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
-LEAD_IN_S, COAST_S = 1200.0, 1200.0
 MOTION = ('speed_through_water', 'position')
 HEADING_RAD = 0.3
 
 
 def run(effect: str, *more: str, heading_rad: float = HEADING_RAD, seed: int = 1) -> CoastRun:
-    scenario = Scenario(
-        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=heading_rad
+    return coasted(
+        effect,
+        heading_rad=heading_rad,
+        reference_rad=HEADING_RAD,
+        rate_hz=0.5,
+        inputs=(*MOTION, *more),
+        seed=seed,
     )
-    truth = simulate(SHIP, scenario, effects=[parse(effect)], reference_rad=HEADING_RAD)
-    block = sense(truth, standard_sensors(rate_hz=0.5, inputs=(*MOTION, *more)), seed=seed)
-    first = int(block.stamp_ns.min())
-    stop = first + round(LEAD_IN_S * 1e9)
-    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-    return CoastRun(effect, window)
 
 
 def resolves(found: DiagnosisResult) -> dict[Measure, float | None]:

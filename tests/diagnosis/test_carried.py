@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,18 +16,18 @@ from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameter import Parameter, Prior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation import START_NS
 from shipdrag_ros.simulation.effect import Scope
-from shipdrag_ros.simulation.effects import LIBRARY, find, parse
+from shipdrag_ros.simulation.effects import LIBRARY, find
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 DAY_NS = 86400 * 10**9
 NOW_NS = START_NS + 1000 * DAY_NS
 RUNS = (SeenRun('now', NOW_NS),)
@@ -37,10 +36,7 @@ SIZES = {
     'fouling': {'friction_factor': Parameter(0.35, 0.04)},
     'log_scale': {'factor': Parameter(-0.1, 0.01)},
     'towed_cable': {'drag_area_m2': Parameter(3.0, 0.4)},
-    'current': {
-        'along_track_m_s': Parameter(0.4, 0.05),
-        'cross_track_m_s': Parameter(0.0, 0.1),
-    },
+    'current': {'along_track_m_s': Parameter(0.4, 0.05), 'cross_track_m_s': Parameter(0.0, 0.1)},
 }
 
 
@@ -142,8 +138,7 @@ def test_a_size_that_stays_is_known_less_well_the_more_time_has_passed() -> None
     assert (scale.first, scale.second) == pytest.approx((-0.1, 0.0174), abs=1e-3)
     # a size whose sd could not be found may be anything
     unknown = replace(
-        earlier(1.0),
-        candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': NO_SD}}),),
+        earlier(1.0), candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': NO_SD}}),)
     )
     assert sizes(known(unknown), 'fouling')[0].second > 0.8
 
@@ -201,18 +196,9 @@ def test_a_run_that_two_diagnoses_hold_is_refused() -> None:
         known(one, chained)
 
 
-def coast(effect: str, start_ns: int, seed: int) -> CoastRun:
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1000.0)
-    truth = simulate(SHIP, scenario, effects=[parse(effect)])
-    block = sense(truth, standard_sensors(rate_hz=0.5), seed=seed, start_ns=start_ns)
-    stop_ns = start_ns + 1200 * 10**9
-    window = Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=start_ns)
-    return CoastRun(effect, window)
-
-
 @pytest.fixture(scope='module')
 def fouled() -> CoastRun:
-    return coast('fouling=0.35', NOW_NS, seed=3)
+    return coasted('fouling=0.35', coast_s=1000.0, rate_hz=0.5, seed=3, start_ns=NOW_NS)
 
 
 def diagnosed(run: CoastRun, *given: EarlierDiagnosis) -> DiagnosisResult:

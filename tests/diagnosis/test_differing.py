@@ -3,30 +3,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose, words
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Fact, Ship
-from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import parse
+from shipdrag_ros.ship import Fact
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 FACTS = (*map(Fact, ('no_towed_cable', 'deep_water', 'draughts_read')), Fact('shaft', 'free'))
 
 
 def run(name: str, fouling: float, seed: int) -> CoastRun:
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1000.0)
-    effects = [parse(f'fouling={fouling}')] if fouling else []
-    truth = simulate(SHIP, scenario, effects=effects)
-    block = sense(truth, standard_sensors(rate_hz=0.5), seed=seed)
-    stop_ns = START_NS + 1200 * 10**9
-    window = Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=START_NS)
-    return CoastRun(name, window)
+    effects = [f'fouling={fouling}'] if fouling else []
+    return coasted(*effects, name=name, coast_s=1000.0, rate_hz=0.5, seed=seed)
 
 
 @pytest.mark.parametrize('sizes', [(0.0, 0.35), (0.3, 0.3)])

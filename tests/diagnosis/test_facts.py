@@ -5,22 +5,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact, stated_facts
-from shipdrag_ros.estimation import Window
-from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Fact, Propeller, Ship
-from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import find, parse
+from shipdrag_ros.simulation.effects import find
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 YEAR_NS = round(365.25 * 86400.0 * 1e9)
 CABLE, RUDDER = Fact('no_towed_cable'), Fact('helm_amidships')
 
@@ -87,33 +84,10 @@ def test_a_run_overrides_the_ship_file_and_the_diagnosis_both() -> None:
     }
 
 
-def coast(effect: str) -> CoastRun:
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0)
-    truth = simulate(SHIP, scenario, effects=[parse(effect)])
-    block = sense(truth, standard_sensors(rate_hz=0.5), seed=3)
-    stop_ns = START_NS + 1200 * 10**9
-    window = Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=START_NS)
-    return CoastRun(effect, window)
-
-
-def test_facts_name_what_one_run_leaves_open() -> None:
-    known = ('no_towed_cable', 'deep_water', 'draughts_read')
-    facts = [*map(Fact, known), Fact('shaft', 'free')]
-    run = coast('fouling=0.35')
-    before = diagnose([run], SHIP, Parameters())
-    after = diagnose([run], SHIP, Parameters(), facts=facts)
-    assert before.verdict is Verdict.ONE_OF
-    assert before.facts == ()
-    assert [effect.name for effect in after.effects] == ['fouling']
-    assert not any(each.contradicted for each in after.facts)
-    by_run = diagnose([replace(run, facts=tuple(facts))], SHIP, Parameters())
-    assert by_run.effects == after.effects
-    assert {each.run for each in by_run.facts} == {run.name}
-
-
 def test_a_fact_that_the_data_contradict_is_said() -> None:
-    run = coast('shallow_water=12')
-    depth = CoastRun('measured', with_depth(12.0))
+    run = coasted('shallow_water=12', rate_hz=0.5, seed=3)
+    inputs = ('speed_through_water', 'position', 'depth')
+    depth = coasted('shallow_water=12', rate_hz=0.5, inputs=inputs, seed=3)
     found = diagnose([depth], SHIP, Parameters(), facts=[Fact('deep_water'), CABLE])
     (deep, cable) = found.facts
     assert deep.contradicted
@@ -125,13 +99,3 @@ def test_a_fact_that_the_data_contradict_is_said() -> None:
     assert (
         not diagnose([run], SHIP, Parameters(), facts=[Fact('deep_water')]).facts[0].contradicted
     )
-
-
-def with_depth(depth_m: float) -> Window:
-    """Measure the depth as well."""
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0)
-    truth = simulate(SHIP, scenario, effects=[parse(f'shallow_water={depth_m}')])
-    inputs = ('speed_through_water', 'position', 'depth')
-    block = sense(truth, standard_sensors(rate_hz=0.5, inputs=inputs), seed=3)
-    stop_ns = START_NS + 1200 * 10**9
-    return Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=START_NS)

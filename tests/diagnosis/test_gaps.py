@@ -12,12 +12,11 @@ import pytest
 from shipdrag_ros.diagnosis.gaps import gap_of, held_out
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
+from tests.runs import coasted
 
 HEADINGS = (0.7, 0.7 + math.pi)
 
@@ -28,18 +27,12 @@ def seen(cargo: Ship) -> tuple[Observation, ...]:
     base = cargo.baseline
     assert isinstance(base, CoefficientBaseline)
     rougher = replace(base, form_factor=1.06 * (1.0 + base.form_factor) - 1.0)
-    found = []
-    for seed, heading_rad in enumerate(HEADINGS):
-        scenario = Scenario(
-            speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0, heading_rad=heading_rad
-        )
-        truth = simulate(replace(cargo, baseline=rougher), scenario)
-        block = sense(truth, standard_sensors(rate_hz=1.0, inputs=STANDARD_INPUTS), seed=seed)
-        first = int(block.stamp_ns.min())
-        stop = first + 1200 * 10**9
-        window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-        found.append(Observation.of(window, cargo, Parameters(), name=str(seed)))
-    return tuple(found)
+    rough = replace(cargo, baseline=rougher)
+    runs = [
+        coasted(name=str(seed), ship=rough, heading_rad=heading_rad, seed=seed)
+        for seed, heading_rad in enumerate(HEADINGS)
+    ]
+    return tuple(Observation.of(run.window, cargo, Parameters(), name=run.name) for run in runs)
 
 
 def test_a_held_out_run_is_judged_by_what_the_other_shows(

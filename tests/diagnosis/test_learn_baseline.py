@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,15 +13,12 @@ import pytest
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.learn_baseline import LearntBaseline, learn_baseline
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship, TableBaseline
-from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import parse
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 PARAMETERS = Parameters()
-LEAD_IN_S = 1800.0
 TRUE = np.array([1.04, 0.85])  # friction and wave over what is stated, 2 sd and 1.5 sd off
 SCATTER = 0.01
 
@@ -43,17 +39,16 @@ def scaled(friction: float, wave: float) -> Ship:
 
 
 def coast(ship: Ship, *effects: str, seed: int, heading_rad: float = 0.3) -> CoastRun:
-    """Simulate a coastdown and read it with sensors."""
-    scenario = Scenario(
-        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=1500.0, heading_rad=heading_rad
+    return coasted(
+        *effects,
+        name=f'run {seed}',
+        ship=ship,
+        lead_in_s=1800.0,
+        coast_s=1500.0,
+        heading_rad=heading_rad,
+        reference_rad=0.3,
+        seed=seed,
     )
-    truth = simulate(ship, scenario, effects=[parse(text) for text in effects], reference_rad=0.3)
-    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
-    block = sense(truth, sensors, seed=seed)
-    first = int(block.stamp_ns.min())
-    stop = first + round(LEAD_IN_S * 1e9)
-    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-    return CoastRun(f'run {seed}', window)
 
 
 def clean_runs(count: int, *, seed: int) -> list[CoastRun]:

@@ -3,44 +3,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import find
-
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
-INPUTS = (
-    'speed_through_water',
-    'position',
-    'speed_over_ground',
-    'heading',
-    'shaft',
-    'wind_apparent',
-    'depth',
-)
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
 
 @pytest.fixture(scope='module')
 def seen() -> Observation:
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0, heading_rad=0.7)
-    truth = simulate(SHIP, scenario)
-    block = sense(truth, standard_sensors(rate_hz=1.0, noise=1.0, inputs=INPUTS), seed=5)
-    first = int(block.stamp_ns.min())
-    window = Window.from_block(
-        block, first + 1200 * 10**9, int(block.stamp_ns.max()), before_ns=first
-    )
-    return Observation.of(window, SHIP, Parameters(), name='run')
+    run = coasted(heading_rad=0.7, seed=5)
+    return Observation.of(run.window, SHIP, Parameters(), name='run')
 
 
 @pytest.fixture(scope='module')

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,36 +14,24 @@ from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Fact, Ship
-from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import LIBRARY, parse
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
-LEAD_S, COAST_S = 1200, 1200
+COAST_S = 1200
 
 
-@cache
-def window_of(effects: tuple[str, ...], heading_rad: float = 0.7, seed: int = 5) -> Window:
-    """Return a run in which effects are hidden."""
-    scenario = Scenario(
-        speed_m_s=8.0, lead_in_s=LEAD_S, duration_s=COAST_S, heading_rad=heading_rad
-    )
-    truth = simulate(SHIP, scenario, effects=[parse(each) for each in effects], reference_rad=0.7)
-    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
-    block = sense(truth, sensors, seed=seed)
-    first = int(block.stamp_ns.min())
-    stop = first + LEAD_S * 10**9
-    return Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
+def run_of(*effects: str, heading_rad: float = 0.7, seed: int = 5) -> CoastRun:
+    return coasted(*effects, heading_rad=heading_rad, reference_rad=0.7, seed=seed)
 
 
 @cache
-def answer(*effects: str, ship: Ship = SHIP, facts: tuple[Fact, ...] = ()) -> DiagnosisResult:
+def answer(*effects: str, ship: Ship = SHIP) -> DiagnosisResult:
     """Diagnose one run, once."""
-    run = CoastRun('first', window_of(effects))
-    return diagnose([run], ship, Parameters(), facts=facts)
+    return diagnose([run_of(*effects)], ship, Parameters())
 
 
 @pytest.mark.parametrize(
@@ -82,7 +69,7 @@ def test_without_anything_hidden_nothing_is_most_probable() -> None:
 
 def test_a_limit_grows_where_the_run_shows_less() -> None:
     whole = answer().limits['wind'].value
-    window = window_of(())
+    window = run_of().window
     end = window.start_ns + (COAST_S // 4) * 10**9
     short = replace(
         window,
@@ -98,25 +85,6 @@ def test_a_limit_grows_where_the_run_shows_less() -> None:
     assert found.limits['wind'].value > 1.1 * whole
 
 
-def test_an_effect_that_the_ship_file_states_is_not_missing() -> None:
-    hidden = ('wind=14',)
-    stated = replace(SHIP, effects=(parse('wind=14'),))
-    found = answer(*hidden, ship=stated)
-    assert 'wind' not in {name for each in found.candidates[:1] for name in each.names}
-    assert found.nothing > 10.0 * answer(*hidden).nothing
-
-
-def test_a_fact_speaks_against_an_effect() -> None:
-    without = answer('wind=5')
-    calm = answer('wind=5', facts=(Fact('calm', ''),))
-
-    def of_wind(found: DiagnosisResult) -> float:
-        return sum(each.probability for each in found.candidates if 'wind' in each.names)
-
-    assert of_wind(calm) < 0.7 * of_wind(without)
-    assert [each.fact.name for each in calm.facts] == ['calm']
-
-
 def test_two_look_alikes_are_a_set_that_holds_the_truth() -> None:
     found = answer('wind=14')
     assert found.candidates[0].names == ('wind',)
@@ -124,10 +92,7 @@ def test_two_look_alikes_are_a_set_that_holds_the_truth() -> None:
 
 
 def test_two_runs_share_what_belongs_to_both() -> None:
-    runs = [
-        CoastRun('out', window_of(('current=0.3',))),
-        CoastRun('back', window_of(('current=0.3',), 0.7 + np.pi, 6)),
-    ]
+    runs = [run_of('current=0.3'), run_of('current=0.3', heading_rad=0.7 + np.pi, seed=6)]
     found = diagnose(runs, SHIP, Parameters())
     assert [effect.name for effect in found.effects] == ['current']
     alone = diagnose(runs[:1], SHIP, Parameters())
@@ -143,7 +108,7 @@ def test_the_answer_is_the_same_to_the_bit() -> None:
 
 
 def test_probabilities_are_those_of_evidence_and_odds() -> None:
-    seen = Observation.of(window_of(('wind=14',)), SHIP, Parameters(), name='run')
+    seen = Observation.of(run_of('wind=14').window, SHIP, Parameters(), name='run')
     found = compare((seen,), SHIP, Facts(SHIP)).compare()
     assert sum(found.probability.values()) == pytest.approx(1.0)
     names = {each.names for each in found.fitted}

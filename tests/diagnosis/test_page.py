@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose, pictures
+from shipdrag_ros.diagnosis import diagnose, pictures
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.page import write_diagnosis
 from shipdrag_ros.diagnosis.result import (
@@ -24,38 +24,31 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.tables import Score
 from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
-from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Fact, Ship
-from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import parse
+from tests.page import Page
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-ReadPage = Callable[[Path], Any]
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 SCORE = Score(900, 7, {'precision of a name': (98, 100)}, 0.031)
 
 
 @pytest.fixture(scope='module')
 def found() -> DiagnosisResult:
     """A run with a current, that the ship file does not have."""
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=1800.0, duration_s=1500.0)
-    truth = simulate(SHIP, scenario, effects=[parse('current=0.4')])
-    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
-    block = sense(truth, sensors, seed=1)
-    first = int(block.stamp_ns.min())
-    stop = first + 1800 * 10**9
-    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-    found = diagnose([CoastRun('<outward>', window)], SHIP, Parameters())
-    return replace(found, estimates=(estimate_final(window, SHIP, Parameters()),))
+    run = coasted('current=0.4', name='<outward>', lead_in_s=1800.0, coast_s=1500.0)
+    found = diagnose([run], SHIP, Parameters())
+    return replace(found, estimates=(estimate_final(run.window, SHIP, Parameters()),))
 
 
 @pytest.fixture
-def written(tmp_path: Path, read_page: ReadPage) -> Callable[..., Any]:
+def written(tmp_path: Path) -> Callable[..., Any]:
     def write(found: DiagnosisResult, ship: Ship | None = SHIP, score: Score | None = None) -> Any:
         write_diagnosis(tmp_path / 'page.html', found, ship, score=score)
-        return read_page(tmp_path / 'page.html')
+        return Page(tmp_path / 'page.html')
 
     return write
 
@@ -105,11 +98,7 @@ def test_a_set_says_what_would_decide(found: DiagnosisResult, written: Callable[
     decide = (Advice('a run on the reciprocal heading', 0.93), Advice('a speed log', None))
     page = written(
         replace(
-            found,
-            verdict=Verdict.ONE_OF,
-            effects=(),
-            candidates=candidates,
-            would_decide=decide,
+            found, verdict=Verdict.ONE_OF, effects=(), candidates=candidates, would_decide=decide
         )
     )
     assert 'Missing is one of these: current (60.0 %), log offset (39.5 %).' in page.text

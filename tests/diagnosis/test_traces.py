@@ -4,34 +4,31 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import parse
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 LEAD_IN_S, COAST_S, CURRENT_M_S = 1800.0, 1500.0, 0.3
 
 
 @pytest.fixture(scope='module')
 def found() -> DiagnosisResult:
     """A run into which a current is put."""
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=0.3)
-    truth = simulate(SHIP, scenario, effects=[parse(f'current={CURRENT_M_S}')], reference_rad=0.3)
-    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
-    block = sense(truth, sensors, seed=1)
-    first = int(block.stamp_ns.min())
-    stop = first + round(LEAD_IN_S * 1e9)
-    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-    return diagnose([CoastRun('at sea', window)], SHIP, Parameters())
+    run = coasted(
+        f'current={CURRENT_M_S}',
+        name='at sea',
+        lead_in_s=LEAD_IN_S,
+        coast_s=COAST_S,
+        heading_rad=0.3,
+        reference_rad=0.3,
+    )
+    return diagnose([run], SHIP, Parameters())
 
 
 def test_each_quantity_is_held_against_the_model(found: DiagnosisResult) -> None:

@@ -110,8 +110,7 @@ def test_answers_add_up() -> None:
 
 
 @pytest.mark.parametrize(
-    ('value', 'said'),
-    [(1.0, '> 99.9 %'), (0.98, '98.0 %'), (0.001, '0.1 %'), (1e-9, '< 0.1 %')],
+    ('value', 'said'), [(1.0, '> 99.9 %'), (0.98, '98.0 %'), (0.001, '0.1 %'), (1e-9, '< 0.1 %')]
 )
 def test_nothing_is_told_to_be_certain(value: float, said: str) -> None:
     assert probability(value) == said

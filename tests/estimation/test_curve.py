@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import (
-    Motion,
-    ValidRange,
-    froude_max,
-    resistance_curve,
-)
+from shipdrag_ros.estimation.curve import Motion, ValidRange, froude_max, resistance_curve
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 

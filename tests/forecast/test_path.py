@@ -22,11 +22,7 @@ MADE_S = 400.0
 def test_she_is_where_she_was_foretold_to_be() -> None:
     ship = Ship.example()
     scenario = Scenario(
-        speed_m_s=8.0,
-        lead_in_s=300.0,
-        duration_s=1500.0,
-        heading_rad=0.7,
-        current_m_s=(0.3, -0.2),
+        speed_m_s=8.0, lead_in_s=300.0, duration_s=1500.0, heading_rad=0.7, current_m_s=(0.3, -0.2)
     )
     truth = simulate(ship, scenario)
     block = sense(truth, standard_sensors(), seed=2)

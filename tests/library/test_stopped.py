@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
+from tests.runs import write_run
 
 STAMPS = 10**18 + np.arange(300) * 10**9
 
@@ -24,7 +24,7 @@ STAMPS = 10**18 + np.arange(300) * 10**9
     ],
 )
 def test_the_second_of_a_kind_shows_the_present_speed(
-    write_run: Callable[..., Path], tmp_path: Path, channel: Channel, measured: str
+    tmp_path: Path, channel: Channel, measured: str
 ) -> None:
     speed = 6.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     path = write_run(tmp_path / 'a.mcap', Block.of(channel, STAMPS, speed), Ship.example())

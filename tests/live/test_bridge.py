@@ -68,6 +68,13 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return found
 
 
+def timeline_of(bag: Path) -> Timeline:
+    (run,) = open_runs([bag])
+    timeline = Timeline(run, Ship.load(SHIP), Parameters())
+    timeline.read()
+    return timeline
+
+
 def play(timeline: Timeline, until_ns: int, bridge: Bridge) -> None:
     for moment in timeline.between(0, until_ns):
         for heard in moment.heard:
@@ -162,10 +169,6 @@ def test_deltas_are_what_signal_k_asks_for(bags: list[Path]) -> None:
     assert note['state'] in ('nominal', 'normal', 'alert', 'warn', 'alarm', 'emergency')
 
 
-def status(part: str, level: int = 0, message: str = '', **values: str) -> Status:
-    return Status('a/coastdown_node', part, level, message, values)
-
-
 def test_a_node_is_told_from_other_statuses_by_what_it_says() -> None:
     class Raw:
         def __init__(self, name: str, *keys: str) -> None:
@@ -205,9 +208,7 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
 
 
 def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -> None:
-    (run,) = open_runs(bags[:1])
-    timeline = Timeline(run, Ship.load(SHIP), Parameters())
-    timeline.read()
+    timeline = timeline_of(bags[0])
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.end_ns, bridge)
     texts = [text for _, text in bridge.parts(0.0)['notes']]
@@ -215,9 +216,7 @@ def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -
 
 
 def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> None:
-    (run,) = open_runs(bags[:1])
-    timeline = Timeline(run, Ship.load(SHIP), Parameters())
-    timeline.read()
+    timeline = timeline_of(bags[0])
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.start_ns + 300 * 10**9, bridge)
     before = bridge.parts(0.0)
@@ -292,18 +291,14 @@ def test_the_map_shows_one_antenna_the_first_that_still_speaks(of_first_s: int) 
 
 
 def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:
-    (run,) = open_runs(bags[:1])
-    timeline = Timeline(run, Ship.load(SHIP), Parameters())
-    timeline.read()
+    timeline = timeline_of(bags[0])
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.end_ns, bridge)
-    (other,) = open_runs(bags[1:])
     later = Bridge(Ship.load(SHIP))
     day_ns = 86400 * 10**9
     (past,) = bridge.past
     later.add_past(replace(past, start_ns=past.start_ns - day_ns, end_ns=past.end_ns - day_ns))
-    ahead = Timeline(other, Ship.load(SHIP), Parameters())
-    ahead.read()
+    ahead = timeline_of(bags[1])
     play(ahead, ahead.start_ns + 300 * 10**9, later)
     assert later.parts(0.0)['if_stopped']['hull'].startswith('the coastdown of ')
 
@@ -311,14 +306,8 @@ def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:
 def test_bytes_that_are_none_of_the_outputs_are_said_once_and_change_nothing_else() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
-    for name in (
-        'speed',
-        'resistance',
-        'resistance_curve',
-        'events',
-        'diagnosis',
-        'forecast_path',
-    ):
+    outputs = ('speed', 'resistance', 'resistance_curve', 'events', 'diagnosis', 'forecast_path')
+    for name in outputs:
         bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
     after = bridge.parts(0.0)
     assert len(after['notes']) == 6

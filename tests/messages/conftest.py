@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -151,6 +150,4 @@ class Reference:
         return STORE.deserialize_cdr(payload, type_name)
 
 
-@pytest.fixture(scope='session')
-def reference() -> Reference:
-    return Reference()
+reference = Reference()

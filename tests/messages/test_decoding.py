@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.messages import TOPICS, Source, Unreadable, decode, types
+from tests.messages.conftest import reference
 
 SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
 
 
-def test_short_and_wrongly_encapsulated_messages_are_malformed(reference: Any) -> None:
+def test_short_and_wrongly_encapsulated_messages_are_malformed() -> None:
     source = Source('speed_through_water', 'geometry_msgs/msg/TwistStamped')
     good = reference.serialize(source.type, reference.message(source.type, 1, '', [1.0] * 8))
     parameter_list = b'\x00\x03' + good[2:]
@@ -25,7 +25,7 @@ def test_short_and_wrongly_encapsulated_messages_are_malformed(reference: Any) -
     assert unreadable == {Unreadable.MALFORMED: 4}
 
 
-def test_a_nan_of_either_kind_is_decoded_in_silence(reference: Any) -> None:
+def test_a_nan_of_either_kind_is_decoded_in_silence() -> None:
     message = reference.message(types.TWIST, 1, '', [1.0] * 8)
     good = reference.serialize(types.TWIST, message)
     for bits in (0x7FF8 << 48, (0x7FF0 << 48) + 1):  # the second one signals to the processor
@@ -36,7 +36,7 @@ def test_a_nan_of_either_kind_is_decoded_in_silence(reference: Any) -> None:
         assert np.isnan(decoded.block.value[0, 0])
 
 
-def test_variance_of_the_speed_over_ground_is_that_along_the_track(reference: Any) -> None:
+def test_variance_of_the_speed_over_ground_is_that_along_the_track() -> None:
     source = Source('speed_over_ground', 'geometry_msgs/msg/TwistWithCovarianceStamped')
 
     def variance(x: float, y: float, xx: float, xy: float, yy: float) -> float:
@@ -62,9 +62,7 @@ def test_variance_of_the_speed_over_ground_is_that_along_the_track(reference: An
 @pytest.mark.parametrize(
     'quaternion', [(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 2.0, 0.0), (math.nan, 0.0, 0.0, 1.0)]
 )
-def test_what_is_no_rotation_has_no_yaw(
-    reference: Any, quaternion: tuple[float, float, float, float]
-) -> None:
+def test_what_is_no_rotation_has_no_yaw(quaternion: tuple[float, float, float, float]) -> None:
     source = Source('heading', 'geometry_msgs/msg/QuaternionStamped')
     message = reference.message(source.type, 1, '', [*quaternion, 0, 0, 0, 0])
     block = decode(source, [reference.serialize(source.type, message)], [0]).block
@@ -73,7 +71,7 @@ def test_what_is_no_rotation_has_no_yaw(
 
 
 @pytest.mark.parametrize('tilt', [(0.0, 0.0), (0.2, -0.1)])
-def test_yaw_is_the_yaw_of_a_rolling_ship(reference: Any, tilt: tuple[float, float]) -> None:
+def test_yaw_is_the_yaw_of_a_rolling_ship(tilt: tuple[float, float]) -> None:
     from scipy.spatial.transform import Rotation
 
     rotation = Rotation.from_euler('ZYX', [-2.5, *tilt])
@@ -83,14 +81,14 @@ def test_yaw_is_the_yaw_of_a_rolling_ship(reference: Any, tilt: tuple[float, flo
     assert block.value[0, 0] == pytest.approx(-2.5, abs=1e-14)
 
 
-def test_an_imu_without_orientation_has_no_yaw(reference: Any) -> None:
+def test_an_imu_without_orientation_has_no_yaw() -> None:
     source = Source('heading', 'sensor_msgs/msg/Imu')
     message = reference.message(source.type, 1, '', [0.0, 0.0, 0.0, 1.0, -1.0, 0, 0.5, 0])
     block = decode(source, [reference.serialize(source.type, message)], [0]).block
     assert math.isnan(block.value[0, 0])
 
 
-def test_a_fix_that_is_none_has_no_position(reference: Any) -> None:
+def test_a_fix_that_is_none_has_no_position() -> None:
     source = Source('position', 'sensor_msgs/msg/NavSatFix')
     message = reference.message(source.type, 1, '', [60.0, 5.0, 0, 0, 4.0, 9.0, 1.0, 0])
     message.status.status = -1
@@ -131,9 +129,7 @@ def test_a_range_of_before_iron_is_read() -> None:
     ('compass_deg', 'yaw_deg'),
     [(0.0, 90.0), (90.0, 0.0), (180.0, -90.0), (359.0, 91.0), (-9.0, 99.0)],
 )
-def test_degrees_of_a_compass_become_yaw(
-    reference: Any, compass_deg: float, yaw_deg: float
-) -> None:
+def test_degrees_of_a_compass_become_yaw(compass_deg: float, yaw_deg: float) -> None:
     source = Source('heading', 'std_msgs/msg/Float64')
     payload = reference.serialize(source.type, reference.make(source.type, data=compass_deg))
     block = decode(source, [payload], [5]).block

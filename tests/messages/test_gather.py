@@ -17,6 +17,7 @@ from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, 
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.gather import steps
 from shipdrag_ros.samples import FURTHER, Channel, concatenate
+from tests.messages.conftest import reference
 
 SOURCES = [
     Source(name, type_name)
@@ -134,7 +135,7 @@ def agree(source: Source, payload: bytes, message: Any) -> None:
 
 @pytest.mark.parametrize('source', SOURCES, ids=IDS)
 @pytest.mark.parametrize('little', [True, False])
-def test_a_rotation_and_plain_numbers(reference: Any, source: Source, little: bool) -> None:
+def test_a_rotation_and_plain_numbers(source: Source, little: bool) -> None:
     numbers = [0.1, 0.2, 0.3, math.sqrt(1 - 0.14), 0.5, 0.6, 0.7, 0.8]
     message = reference.message(source.type, 10**18 + 7, 'a frame', numbers)
     agree(source, reference.serialize(source.type, message, little_endian=little), message)
@@ -146,7 +147,6 @@ def test_a_rotation_and_plain_numbers(reference: Any, source: Source, little: bo
 @EXAMPLES
 @given(data=st.data(), stamp_ns=stamps, frame=frames, values=eight, little=st.booleans())
 def test_fields_agree_with_rosbags_and_rclpy(
-    reference: Any,
     source: Source,
     data: st.DataObject,
     stamp_ns: int,
@@ -179,14 +179,12 @@ def test_fields_agree_with_rosbags_and_rclpy(
 @EXAMPLES
 @given(data=st.data())
 def test_what_is_malformed_is_malformed_to_the_other_reader(
-    reference: Any, source: Source, data: st.DataObject
+    source: Source, data: st.DataObject
 ) -> None:
     frame = data.draw(frames)
     little = data.draw(st.booleans())
     good = reference.serialize(
-        source.type,
-        reference.message(source.type, 1, frame, [0.5] * 8),
-        little_endian=little,
+        source.type, reference.message(source.type, 1, frame, [0.5] * 8), little_endian=little
     )
     payloads = []
     for _ in range(8):
@@ -235,7 +233,7 @@ def test_a_frame_id_is_utf8_or_the_message_is_malformed(name: bytes) -> None:
 @settings(max_examples=10, deadline=None)
 @given(data=st.data())
 def test_a_message_reads_the_same_alone_and_behind_others(
-    reference: Any, source: Source, data: st.DataObject
+    source: Source, data: st.DataObject
 ) -> None:
     """Numbers are read where those of the message before lay, where they lie there again."""
     pool = []
@@ -256,7 +254,7 @@ def test_a_message_reads_the_same_alone_and_behind_others(
         assert found.tobytes() == single.tobytes(), field
 
 
-def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(reference: Any) -> None:
+def test_a_giant_length_is_malformed_and_nothing_is_read_beyond() -> None:
     for little in (True, False):
         order = 'little' if little else 'big'
         message = reference.message(types.JOINT_STATE, 1, '', [0.5] * 8)
@@ -269,7 +267,7 @@ def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(reference: Any) 
         assert decoded.unreadable == {Unreadable.MALFORMED: 1}
 
 
-def test_messages_may_lie_anywhere_in_a_buffer_and_at_any_alignment(reference: Any) -> None:
+def test_messages_may_lie_anywhere_in_a_buffer_and_at_any_alignment() -> None:
     source = Source('position', types.POINT)
     payloads = [
         reference.serialize(

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.messages import MalformedMessage, Source, Unreadable, decode, joints, types
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
+from tests.messages.conftest import reference
 
 SHAFT = Source('shaft', types.JOINT_STATE)
 RUDDER = Source('rudder', types.JOINT_STATE)
@@ -132,7 +133,7 @@ def channels(reference: Any, *names: str) -> dict[str, Channel]:
         (('shaft', 'shaft'), (1, 2)),
     ],
 )
-def test_place_of_a_joint(reference: Any, names: tuple[str, ...], found: tuple[int, ...]) -> None:
+def test_place_of_a_joint(names: tuple[str, ...], found: tuple[int, ...]) -> None:
     numbers = [float(i) for i in range(len(names))]
     payload = reference.serialize(types.JOINT_STATE, message(reference, [*names], numbers))
     block = decode(SHAFT, [payload], [0]).block
@@ -142,7 +143,7 @@ def test_place_of_a_joint(reference: Any, names: tuple[str, ...], found: tuple[i
     assert [SHAFTS.index(by_joint[i]) + 1 for i in range(len(names))] == list(found)
 
 
-def test_a_pitch_is_that_of_the_shaft_with_its_name(reference: Any) -> None:
+def test_a_pitch_is_that_of_the_shaft_with_its_name() -> None:
     assert channels(reference, 'pitch_stbd', 'shaft_port', 'pitch_port', 'shaft_stbd') == {
         'shaft_port': Channel.SHAFT,
         'shaft_stbd': Channel.SHAFT_2,
@@ -151,14 +152,14 @@ def test_a_pitch_is_that_of_the_shaft_with_its_name(reference: Any) -> None:
     }
 
 
-def test_joints_of_their_own_messages_have_the_same_places(reference: Any) -> None:
+def test_joints_of_their_own_messages_have_the_same_places() -> None:
     names = ['shaft_0', 'shaft_1', 'shaft_2', 'shaft_3', 'pitch_1']
     together = channels(reference, *names)
     assert {name: channels(reference, name)[name] for name in names} == together
     assert len(set(together.values())) == len(names)
 
 
-def test_more_than_four_are_counted(reference: Any) -> None:
+def test_more_than_four_are_counted() -> None:
     names = [f'shaft_{c}' for c in 'abcdef'] + ['shaft_9', 'pitch_12']
     payload = reference.serialize(
         types.JOINT_STATE, message(reference, names, [1.0] * 8, [2.0] * 8)
@@ -168,7 +169,7 @@ def test_more_than_four_are_counted(reference: Any) -> None:
     assert decoded.unreadable == {Unreadable.SURPLUS_JOINT: 3 * (2 + 1 + 1)}
 
 
-def test_a_pitch_alone_is_read(reference: Any) -> None:
+def test_a_pitch_alone_is_read() -> None:
     payload = reference.serialize(types.JOINT_STATE, message(reference, ['pitch'], [], [-0.25]))
     decoded = decode(SHAFT, [payload], [0])
     assert decoded.block.channel.tolist() == [Channel.PITCH]
@@ -181,12 +182,7 @@ def test_a_pitch_alone_is_read(reference: Any) -> None:
     names=joint_names, velocity=numbers, position=numbers, stamp_ns=stamps, little=st.booleans()
 )
 def test_samples_of_a_message_are_those_of_the_rule(
-    reference: Any,
-    names: list[str],
-    velocity: list[float],
-    position: list[float],
-    stamp_ns: int,
-    little: bool,
+    names: list[str], velocity: list[float], position: list[float], stamp_ns: int, little: bool
 ) -> None:
     sent = message(reference, names, velocity, position, stamp_ns=stamp_ns)
     payload = reference.serialize(types.JOINT_STATE, sent, little_endian=little)
@@ -212,7 +208,7 @@ def test_samples_of_a_message_are_those_of_the_rule(
     )
 )
 def test_a_batch_of_several_sources_gives_the_bits_of_single_messages(
-    reference: Any, rows: list[tuple[list[str], list[float], list[float], int, bool]]
+    rows: list[tuple[list[str], list[float], list[float], int, bool]],
 ) -> None:
     sources = (SHAFT, RUDDER, POINT)
     payloads = []
@@ -246,7 +242,7 @@ def test_a_batch_of_several_sources_gives_the_bits_of_single_messages(
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_broken_bytes_are_malformed_to_both_readers_and_spoil_no_neighbour(
-    reference: Any, data: st.DataObject
+    data: st.DataObject,
 ) -> None:
     names = data.draw(joint_names)
     good = reference.serialize(
@@ -278,9 +274,7 @@ def test_broken_bytes_are_malformed_to_both_readers_and_spoil_no_neighbour(
 
 
 @pytest.mark.parametrize('little', [True, False])
-def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(
-    reference: Any, little: bool
-) -> None:
+def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(little: bool) -> None:
     order = 'little' if little else 'big'
     sent = message(reference, ['shaft_1', 'shaft_2', 'pitch'], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
     good = reference.serialize(types.JOINT_STATE, sent, little_endian=little)
@@ -303,7 +297,7 @@ def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(
     assert math.isclose(decode(SHAFT, [good], [0]).block.value[1, 0], 2.0)
 
 
-def test_a_long_name_takes_no_time_and_its_layout_is_not_kept(reference: Any) -> None:
+def test_a_long_name_takes_no_time_and_its_layout_is_not_kept() -> None:
     name = 'shaft' + '0' * 200_000 + 'x'
     payload = reference.serialize(types.JOINT_STATE, message(reference, [name], [1.0]))
     known = len(joints._known)

@@ -22,15 +22,10 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.forecast.foretell import foretell
 from shipdrag_ros.forecast.result import PathAhead
-from shipdrag_ros.messages import (
-    EventKind,
-    EventNote,
-    MalformedMessage,
-    event_message,
-    read_event,
-)
+from shipdrag_ros.messages import EventKind, EventNote, MalformedMessage, event_message, read_event
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.ship import Ship
+from tests.messages.conftest import reference
 
 STAMP_NS = 1_700_000_000_000_000_001
 
@@ -69,7 +64,7 @@ def estimate() -> Estimate:
     )
 
 
-def test_an_update_is_speed_resistance_and_curve(reference: Any, estimate: Estimate) -> None:
+def test_an_update_is_speed_resistance_and_curve(estimate: Estimate) -> None:
     speed, resistance, curve, *_ = outputs(Update(STAMP_NS, estimate))
     assert [m.topic for m in (speed, resistance, curve)] == [
         '/coastdown_node/speed',
@@ -151,7 +146,7 @@ def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
     }
 
 
-def test_a_forecast_and_its_path(reference: Any, estimate: Estimate) -> None:
+def test_a_forecast_and_its_path(estimate: Estimate) -> None:
     forecast = foretell(estimate, Ship.example())
     ahead = forecast.in_time()
     places = np.column_stack([3.0 * ahead[:, 4], 4.0 * ahead[:, 4]]) / 5.0
@@ -178,9 +173,7 @@ def test_a_forecast_and_its_path(reference: Any, estimate: Estimate) -> None:
     assert last.pose.orientation.z == pytest.approx(np.sin(0.5 * path.course_rad))
 
 
-def test_a_forecast_is_withdrawn_when_the_coastdown_ends(
-    reference: Any, estimate: Estimate
-) -> None:
+def test_a_forecast_is_withdrawn_when_the_coastdown_ends(estimate: Estimate) -> None:
     for event in (
         Update(STAMP_NS, estimate),  # nothing is left to foretell
         EndedCoastdown(1, STAMP_NS, 3, EndedBy.ENGINE, estimate),
@@ -226,7 +219,7 @@ def test_notes_round_trip() -> None:
     assert read_event(event_message(note).payload) == note
 
 
-def test_an_array_of_another_kind_is_malformed(reference: Any) -> None:
+def test_an_array_of_another_kind_is_malformed() -> None:
     name = 'diagnostic_msgs/msg/DiagnosticArray'
     empty = reference.make(name, header=reference.header(1), status=[])
     with pytest.raises(MalformedMessage):

@@ -10,20 +10,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.nmea.interpreter import BEHIND_NS, SETTLE_NS, SILENT_NS, Interpreter, raw_message
 from shipdrag_ros.nmea.sentences import Mounting
 from shipdrag_ros.samples import Channel
+from tests.sources.log_samples import sentence
 
 START_NS = 1_700_000_000 * 10**9
 LINE = 'udp://127.0.0.1:10110'
 KNOT_M_S = 1852.0 / 3600.0
-
-
-def sentence(content: str) -> str:
-    return f'${content}*{calc_checksum(content)}'
 
 
 def settled(*contents: str) -> tuple[Interpreter, dict[Channel, tuple[float, float]]]:
@@ -144,10 +140,7 @@ def test_what_gives_nothing_is_counted() -> None:
         assert interpreter.messages(text, LINE, START_NS) == []
     assert interpreter.rejected == {'wrong checksum': 1, 'without checksum': 1, 'no sentence': 1}
     assert interpreter.unknown == {'GPXYZ': 1, 'PRDID': 1}
-    assert interpreter.no_value == {
-        'heading HDT: empty': 1,
-        'heading HDT: not a number': 1,
-    }
+    assert interpreter.no_value == {'heading HDT: empty': 1, 'heading HDT: not a number': 1}
     assert interpreter.sentences == 6
 
 

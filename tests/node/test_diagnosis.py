@@ -33,12 +33,7 @@ from shipdrag_ros.simulation.effects import parse
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 LEAD_IN_S, COAST_S = 660.0, 660.0
-SETTINGS = {
-    'steady_s': 600.0,
-    'slope_window_s': 30.0,
-    'data_stop_s': 20.0,
-    'update_s': 30.0,
-}
+SETTINGS = {'steady_s': 600.0, 'slope_window_s': 30.0, 'data_stop_s': 20.0, 'update_s': 30.0}
 PARAMETERS = Parameters.from_mapping(SETTINGS, subject='test')
 SHIP = Ship.load(SHIP_FILE)
 TOPIC = '/coastdown_node/diagnosis'
@@ -136,32 +131,6 @@ def test_node_names_what_is_missing_as_the_verb_does(
     assert [types.deserialize('std_msgs/msg/String', each.data).data for each in recorded] == [
         told.data
     ]
-
-
-def test_monitor_hands_out_what_a_replay_reads_again() -> None:
-    block = record()
-    ended, window = a_coastdown()
-    assert window.before is not None
-    assert ended.stop_ns is not None
-    whole = Window.from_block(
-        block,
-        ended.stop_ns,
-        ended.end_ns,
-        before_ns=ended.stop_ns - round(PARAMETERS.steady_s * 1e9),
-    )
-    for one, other in ((window, whole), (window.before, whole.before)):
-        for name in STANDARD_INPUTS:
-            assert len(getattr(one, name)) > 500
-            assert (getattr(one, name).value == getattr(other, name).value).all()
-
-
-def test_nothing_hidden_gives_no_warning() -> None:
-    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
-    diagnosing.begin(*a_coastdown())
-    assert diagnosing.status.state is DiagnosisState.RUNNING
-    status = result_of(diagnosing)
-    assert status.found is not None
-    assert status.found['verdict'] == 'none'
 
 
 def test_too_little_steady_record_is_told() -> None:

@@ -64,11 +64,7 @@ def test_what_is_well_is_receiving() -> None:
         ({'age_s': 99.0}, STALE, 'no data for 99 s'),
         ({'age_s': 99.0, 'senders': ()}, STALE, 'no publisher any more'),
         ({'type': None, 'age_s': None, 'senders': ()}, WARN, 'no publisher'),
-        (
-            {'type': None, 'age_s': None, 'senders': (), 'needed': False},
-            OK,
-            'no publisher',
-        ),
+        ({'type': None, 'age_s': None, 'senders': (), 'needed': False}, OK, 'no publisher'),
         ({'misfit': 'DURABILITY'}, WARN, 'its DURABILITY QoS does not fit'),
         ({'doubt': 'it is off'}, WARN, 'it is off'),
     ],

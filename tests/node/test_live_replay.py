@@ -151,17 +151,6 @@ def test_after_a_reset(desk: Desk) -> None:
     assert_identical(result, at_least=30)
 
 
-def test_a_recording_that_starts_after_a_reset(desk: Desk) -> None:
-    start_ns = int(record().receive_ns[0])
-    desk.feed(0, LEAD_IN_S + 250.0)
-    desk.session.reset('asked for', start_ns + round((LEAD_IN_S + 250.0) * SECOND_NS))
-    desk.feed(LEAD_IN_S + 250.0, 3700.0)
-    desk.recorder.start()
-    desk.feed(3700.0, 1e9)
-    (result,) = desk.replay()
-    assert_identical(result, at_least=30)
-
-
 def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
     desk.recorder.start()
     desk.feed(0, LEAD_IN_S + 250.0)
@@ -210,9 +199,7 @@ def test_a_clock_that_is_set_forward_ends_the_run(desk: Desk) -> None:
 
 
 @settings(
-    max_examples=3,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    max_examples=3, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(
     start_s=st.floats(0.0, 4200.0),

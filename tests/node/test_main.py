@@ -44,13 +44,6 @@ def attachments(bag: Path) -> dict[str, str]:
         return {item.name: item.data.decode() for item in reader.iter_attachments()}
 
 
-def test_a_bad_ship_file_ends_the_process(start_node: Any) -> None:
-    node = start_node(up=None, ship_file='/nowhere/ship.yaml')
-    assert node.wait() == 1
-    assert 'ERROR: /nowhere/ship.yaml: 1 problem(s)\n  - cannot be read' in node.log
-    assert 'Traceback' not in node.log
-
-
 @pytest.mark.parametrize(
     ('name', 'value', 'said'),
     [
@@ -75,15 +68,6 @@ def test_bad_parameters_are_user_errors(
     error = capfd.readouterr().err
     assert 'ERROR: ' in error
     assert said in error
-
-
-def test_parameters_for_another_node_are_an_error(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    file = tmp_path / 'other.yaml'
-    file.write_text('coastdown:\n  ros__parameters: {window_s: 600.0}\n')
-    assert main(['coastdown_node', '--ros-args', '--params-file', str(file)]) == 1
-    assert "expected one for '/coastdown_node'" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -115,11 +99,6 @@ def test_bad_ros_arguments_are_user_errors(
 ) -> None:
     assert main(['coastdown_node', '--ros-args', *arguments]) == 1
     assert 'ERROR: ROS does not start' in capfd.readouterr().err
-
-
-def test_stray_arguments_are_a_usage_error(capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(['coastdown_node', 'stray']) == 2
-    assert 'usage: coastdown_node' in capfd.readouterr().err
 
 
 def test_signal_handlers_are_given_back() -> None:

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 from mcap.reader import make_reader
-from pynmeagps.nmeahelpers import calc_checksum
+
+from tests.sources.log_samples import sentence
 
 pytest.importorskip('rclpy')
 
@@ -21,10 +22,6 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 
 SPEED_TYPE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
-
-
-def sentence(content: str) -> str:
-    return f'${content}*{calc_checksum(content)}'
 
 
 class Instruments:

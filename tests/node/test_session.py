@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.messages import Decoded, EventKind, OutputMessage, Source, encode, read_event
+from shipdrag_ros.messages import EventKind, OutputMessage, Source, encode, read_event
 from shipdrag_ros.node import session
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.session import Session
@@ -111,31 +111,10 @@ def test_a_small_step_back_of_the_clock_is_held(desk: Desk) -> None:
     assert desk.published == []
 
 
-def test_a_clock_set_back_resets_and_begins_a_new_bag(desk: Desk) -> None:
-    desk.feed(speeds([100, 101, 50, 51]))
-    assert desk.kinds() == [EventKind.RESET_REQUEST, EventKind.RESET, EventKind.CLOCK_JUMP]
-    # both begin within a second, each written by a thread: whose name comes first is open
-    first, second = sorted(desk.bags(), key=lambda bag: bag[0].topic == f'{NODE}/events')
-    assert [row.topic for row in first] == ['/speed_through_water'] * 2 + [f'{NODE}/events'] * 2
-    assert [row.topic for row in second] == [f'{NODE}/events'] + ['/speed_through_water'] * 2
-    for bag in (first, second):
-        assert np.all(np.diff([row.log_ns for row in bag]) >= 0)
-
-
 def test_the_clock_is_watched_also_while_nothing_arrives(desk: Desk) -> None:
     desk.feed(speeds([100]))
     desk.session.watch_clock(START_NS)
     assert EventKind.CLOCK_JUMP in desk.kinds()
-
-
-def test_a_reset_is_recorded_before_what_comes_of_it(desk: Desk) -> None:
-    desk.feed(speeds([0, 1]))
-    desk.session.reset('asked for', START_NS + 2 * SECOND_NS)
-    desk.feed(speeds([3]))
-    (bag,) = desk.bags()
-    kinds = [read_event(row.payload).kind for row in bag if row.topic == f'{NODE}/events']
-    assert kinds == [EventKind.RESET_REQUEST, EventKind.RESET]
-    assert [row.topic for row in bag][2:4] == [f'{NODE}/events'] * 2
 
 
 def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk: Desk) -> None:
@@ -160,24 +139,6 @@ def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
     desk.feed(speeds([4]))
     (bag,) = desk.bags()
     assert [(row.log_ns - START_NS) // SECOND_NS for row in bag] == [3, 4]
-
-
-def test_what_is_not_understood_is_recorded_too(desk: Desk) -> None:
-    source = Source('depth', 'sensor_msgs/msg/Range')
-    counted: list[Decoded] = []
-    desk.session.receive(source, b'rubbish', START_NS, counted.append)
-    assert [sum(decoded.unreadable.values()) for decoded in counted] == [1]
-    (bag,) = desk.bags()
-    assert [row.payload for row in bag] == [b'rubbish']
-
-
-def test_every_output_is_recorded_as_published(desk: Desk) -> None:
-    desk.session.note(EventKind.LIFECYCLE, 'active', START_NS)
-    desk.session.reset('asked for', START_NS)
-    desk.feed(speeds([0]))
-    (bag,) = desk.bags()
-    outputs = [row.payload for row in bag if row.topic.startswith(NODE)]
-    assert outputs == [it.payload for it in desk.published]
 
 
 def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
@@ -224,11 +185,3 @@ def test_what_waits_is_bounded_by_its_size_too(
     desk.ready = True
     desk.session.go_on()
     assert not desk.session.full
-
-
-def test_what_still_waits_at_the_end_is_in_the_recording(desk: Desk) -> None:
-    desk.ready = False
-    desk.feed(speeds([0, 1, 2]))
-    (bag,) = desk.bags()
-    assert [row.log_ns for row in bag] == [START_NS + k * SECOND_NS for k in range(3)]
-    assert desk.published == []

@@ -41,13 +41,6 @@ def test_mapping_goes_there_and_back() -> None:
     assert NodeSettings.from_mapping(there.to_mapping(), subject='test') == there
 
 
-def test_problems_come_together() -> None:
-    with pytest.raises(ParameterError) as caught:
-        settings(record='yes', windows_s=1.0, window_s=1.0, ship_file=3)
-    assert len(caught.value.problems) == 4
-    assert 'did you mean window_s?' in caught.value.problems[0]
-
-
 def test_the_file_is_up_to_date() -> None:
     text = (ROOT / 'config' / 'parameters.yaml').read_text()
     assert text == parameters_file(), 'run python -m shipdrag_ros.node.settings'
@@ -65,10 +58,7 @@ def test_paths_stay_inside_their_roots(tmp_path: Path) -> None:
     (inside / 'link').symlink_to(outside)
     fits = {'ship_file': str(inside / 'ship.yaml'), 'output_directory': str(inside / 'bags')}
     roots = f'{tmp_path / "other"}:{inside}'
-    assert settings(**fits, path_roots=roots).paths() == (
-        inside / 'ship.yaml',
-        inside / 'bags',
-    )
+    assert settings(**fits, path_roots=roots).paths() == (inside / 'ship.yaml', inside / 'bags')
     assert settings(**fits | {'ship_file': str(outside / 'x')}).paths()[0] == outside / 'x'
     for name, path in (
         ('ship_file', outside / 'ship.yaml'),
@@ -77,11 +67,6 @@ def test_paths_stay_inside_their_roots(tmp_path: Path) -> None:
     ):
         with pytest.raises(ParameterError, match=f'{name}: .*outside of path_roots'):
             settings(**fits | {name: str(path), 'path_roots': roots}).paths()
-
-
-def test_sources_of_nmea_are_checked() -> None:
-    with pytest.raises(ParameterError, match='nmea: NMEA source'):
-        settings(nmea='udp://0.0.0.0:10110 ttyUSB0')
 
 
 def test_no_path_or_line_can_be_set_over_a_service() -> None:

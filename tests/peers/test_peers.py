@@ -177,9 +177,7 @@ def test_a_log_in_a_wrong_scale_is_named_once_she_slows_and_the_positions_find_t
     assert good, text
 
 
-def test_a_log_that_says_nothing_is_named_and_what_is_sound_finds_the_stop(
-    tmp_path: Path,
-) -> None:
+def test_a_log_that_says_nothing_is_named_and_what_is_sound_finds_the_stop(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
     try:
         good, text = nonsense(

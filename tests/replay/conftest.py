@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +12,7 @@ import pytest
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Event
-from shipdrag_ros.messages import (
-    EncodedMessage,
-    EventKind,
-    EventNote,
-    OutputMessage,
-    Source,
-    decode,
-    encode,
-    event_message,
-)
+from shipdrag_ros.messages import EncodedMessage, OutputMessage, Source, decode, encode
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -69,12 +60,10 @@ class Live:
         self.bag: BagWriter | None = None
         self.events: list[Event] = []
 
-    def start(self, path: Path, ring: Iterable[EncodedMessage] = ()) -> None:
+    def start(self, path: Path) -> None:
         self.bag = BagWriter(path)
         self.bag.attach('ship.yaml', self.ship.to_yaml())
         self.bag.attach('parameters.yaml', self.parameters.to_yaml())
-        for message in ring:
-            self.write(message)
 
     def receive(self, message: EncodedMessage) -> None:
         self.write(message)
@@ -82,15 +71,8 @@ class Live:
         block = decode(source, [message.payload], [message.log_ns]).block
         self.report(self.monitor.update(block), message.log_ns)
 
-    def reset(self, now_ns: int) -> None:
-        self.write_output(
-            event_message(EventNote(EventKind.RESET_REQUEST, now_ns, 'service')), now_ns
-        )
-        self.report(self.monitor.reset(now_ns, 'service'), now_ns)
-
-    def stop(self, now_ns: int, *, finish: bool = True) -> None:
-        if finish:
-            self.report(self.monitor.finish(), now_ns)
+    def stop(self, now_ns: int) -> None:
+        self.report(self.monitor.finish(), now_ns)
         assert self.bag is not None
         self.bag.close()
         self.bag = None

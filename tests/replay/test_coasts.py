@@ -12,6 +12,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.replay import clocks_apart, coast_windows, replay
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from tests.runs import write_run
 
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
@@ -32,7 +33,7 @@ def with_clock(block: Block, offset_s: float, *, silent_s: tuple[float, float]) 
 @pytest.mark.parametrize('shaft', [True, False])
 @pytest.mark.parametrize('offset_s', [-36.0, -9.0, 9.0])
 def test_a_log_whose_clock_is_off_is_heard(
-    ship, parameters, voyage, write_run, tmp_path, offset_s: float, shaft: bool
+    ship, parameters, voyage, tmp_path, offset_s: float, shaft: bool
 ) -> None:
     block = with_clock(voyage(), offset_s, silent_s=(600.0, 640.0))
     if not shaft:
@@ -56,9 +57,7 @@ def test_a_log_whose_clock_is_off_is_heard(
     np.testing.assert_array_equal(window.speed_through_water.value, block.value[log, 0])
 
 
-def test_what_the_clocks_do_not_ask_for_is_not_done(
-    ship, parameters, voyage, write_run, tmp_path
-) -> None:
+def test_what_the_clocks_do_not_ask_for_is_not_done(ship, parameters, voyage, tmp_path) -> None:
     (run,) = open_runs([write_run(tmp_path / 'sound.mcap', voyage(), ship=ship)])
     result = replay(run, parameters=parameters)
     assert clocks_apart(result) == ()
@@ -67,7 +66,7 @@ def test_what_the_clocks_do_not_ask_for_is_not_done(
     assert coastdown.estimate is not None
 
 
-def test_a_window_that_was_given_stays(ship, parameters, voyage, write_run, tmp_path) -> None:
+def test_a_window_that_was_given_stays(ship, parameters, voyage, tmp_path) -> None:
     block = with_clock(voyage(), -9.0, silent_s=(600.0, 640.0))
     (run,) = open_runs([write_run(tmp_path / 'apart.mcap', block, ship=ship)])
     result = replay(run, parameters=parameters, window=(450.0, 900.0))

@@ -107,9 +107,7 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
         assert comparison.finish().largest_difference == pytest.approx(difference, rel=0.01)
 
 
-def test_a_difference_is_told_in_standard_deviations(
-    recording: tuple[Path, list[Event]],
-) -> None:
+def test_a_difference_is_told_in_standard_deviations(recording: tuple[Path, list[Event]]) -> None:
     (update, *_) = [event for event in recording[1] if isinstance(event, Update)]
     was = update.estimate
     apart = replace(was, last_resistance_m_s2=was.last_resistance_m_s2 + 3.0 * was.last_sigma_m_s2)

@@ -20,8 +20,8 @@ from shipdrag_ros.replay import Recorded, coast_windows, replay
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
+from tests.runs import write_run
 
-WriteRun = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
 BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
 
@@ -124,7 +124,7 @@ def test_a_window_ends_with_the_bag_at_the_latest(recording: tuple[Path, list[Ev
 
 
 def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
 ) -> None:
     block = voyage()
     later = replace(block, receive_ns=block.receive_ns + 3600 * 10**9)
@@ -141,7 +141,7 @@ def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
 
 
 def test_a_clock_set_in_a_window_is_no_estimate(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
 ) -> None:
     block = voyage()
     second = replace(block, receive_ns=block.receive_ns + 1200 * 10**9)
@@ -152,7 +152,7 @@ def test_a_clock_set_in_a_window_is_no_estimate(
 
 
 def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after_it(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
 ) -> None:
     block = voyage()
     span_ns = int(block.receive_ns[-1] - block.receive_ns[0])
@@ -176,7 +176,7 @@ def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after
 
 
 def test_a_window_over_a_clock_that_was_set_is_diagnosed_with_words(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
 ) -> None:
     block = voyage()
     second = replace(block, receive_ns=block.receive_ns + 1200 * 10**9)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.replay import replay, why_no_coastdown
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import ConstantAddedMass, Ship
+from tests.runs import write_run
 
 BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
 STAMPS = 10**18 + np.arange(1800) * 10**9
@@ -26,9 +26,7 @@ STAMPS = 10**18 + np.arange(1800) * 10**9
         (600, Channel.SPEED_OVER_GROUND_3),
     ],
 )
-def test_a_log_that_stands_still_is_told(
-    write_run: Callable[..., Path], tmp_path: Path, from_s: int, channel: Channel
-) -> None:
+def test_a_log_that_stands_still_is_told(tmp_path: Path, from_s: int, channel: Channel) -> None:
     speed = 4.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed[from_s:] = 4.017
     path = write_run(tmp_path / 'a.mcap', Block.of(channel, STAMPS, speed))
@@ -40,7 +38,7 @@ def test_a_log_that_stands_still_is_told(
 
 @pytest.mark.parametrize('steady', [0.0, 4.0])
 def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(
-    write_run: Callable[..., Path], tmp_path: Path, steady: float
+    tmp_path: Path, steady: float
 ) -> None:
     noise = 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed = steady + noise if steady else np.zeros(len(STAMPS))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,17 +13,14 @@ from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.page import write_report
 from shipdrag_ros.replay.run_result import RunResult
-
-ReadPage = Callable[[Path], Any]
+from tests.page import Page
 
 
 @pytest.fixture(scope='module')
-def page(
-    simulated: RunResult, tmp_path_factory: pytest.TempPathFactory, read_page: ReadPage
-) -> Any:
+def page(simulated: RunResult, tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = tmp_path_factory.mktemp('page') / 'report.html'
     write_report(path, [simulated])
-    return read_page(path)
+    return Page(path)
 
 
 def test_the_page_needs_no_network(page: Any) -> None:
@@ -49,73 +45,60 @@ def test_the_page_says_all_of_it(page: Any) -> None:
     assert [each for each in words if each not in page.text] == []
 
 
-def test_names_from_outside_are_text_and_nothing_else(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_names_from_outside_are_text_and_nothing_else(run: RunResult, tmp_path: Path) -> None:
     evil = '<script>alert(1)</script>'
     write_report(
-        tmp_path / 'report.html',
-        [replace(run, bag=evil, ship=replace(run.ship, name=evil))],
+        tmp_path / 'report.html', [replace(run, bag=evil, ship=replace(run.ship, name=evil))]
     )
     assert '<script' not in (tmp_path / 'report.html').read_text(encoding='utf-8')
-    assert evil in read_page(tmp_path / 'report.html').text
+    assert evil in Page(tmp_path / 'report.html').text
 
 
-def test_a_record_without_coastdown_is_a_result(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_a_record_without_coastdown_is_a_result(run: RunResult, tmp_path: Path) -> None:
     dismissed = NotCoastdown(0, 60 * 10**9, Dismissal.TURN, 'the ship turned by 90 deg')
     none = replace(run, coastdowns=(), not_coastdowns=(dismissed,), steady_lead_s=345.0)
     write_report(tmp_path / 'report.html', [none])
-    page = read_page(tmp_path / 'report.html')
+    page = Page(tmp_path / 'report.html')
     assert 'No coastdown found: longest steady sailing 345 s; one stretch was looked' in page.text
     assert 'the ship turned by 90 deg' in page.text
     assert page.images == []
 
 
-def test_a_coastdown_without_estimate_says_why(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_a_coastdown_without_estimate_says_why(run: RunResult, tmp_path: Path) -> None:
     failed = replace(run.coastdowns[0], estimate=None, failure='only 3 samples')
     write_report(tmp_path / 'report.html', [replace(run, coastdowns=(failed,))])
-    assert 'only 3 samples' in read_page(tmp_path / 'report.html').text
+    assert 'only 3 samples' in Page(tmp_path / 'report.html').text
 
 
-def test_without_a_table_of_orders_none_is_drawn(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_without_a_table_of_orders_none_is_drawn(run: RunResult, tmp_path: Path) -> None:
     (coastdown,) = run.coastdowns
     assert coastdown.estimate is not None
     averaged = replace(coastdown, estimate=replace(coastdown.estimate, order=None, orders=()))
     write_report(tmp_path / 'report.html', [replace(run, coastdowns=(averaged,))])
-    page = read_page(tmp_path / 'report.html')
+    page = Page(tmp_path / 'report.html')
     assert len(page.images) == 4
     assert 'number of coefficients' not in page.text
     assert 'averaged over models' in page.text
 
 
-def test_hulls_compared_come_first(run: RunResult, tmp_path: Path, read_page: ReadPage) -> None:
+def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
     other = replace(run, ship=replace(run.ship, name='Rowdy'))
     write_report(tmp_path / 'report.html', [run, other], ranking=rank([run, other]))
-    page = read_page(tmp_path / 'report.html')
+    page = Page(tmp_path / 'report.html')
     assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
     assert len(page.images) == 11
 
 
-def test_coastdowns_of_one_ship_are_shown_together(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_coastdowns_of_one_ship_are_shown_together(run: RunResult, tmp_path: Path) -> None:
     write_report(tmp_path / 'report.html', [run, replace(run, bag='again.mcap')])
-    page = read_page(tmp_path / 'report.html')
+    page = Page(tmp_path / 'report.html')
     assert page.text.index('All coastdowns together') < page.text.index('sea trial.mcap')
     assert 'run to run' in page.text
     assert len(page.images) == 12
     write_report(tmp_path / 'one.html', [run])
-    assert 'All coastdowns together' not in read_page(tmp_path / 'one.html').text
+    assert 'All coastdowns together' not in Page(tmp_path / 'one.html').text
 
 
-def test_a_warning_about_the_bag_is_shown(
-    run: RunResult, tmp_path: Path, read_page: ReadPage
-) -> None:
+def test_a_warning_about_the_bag_is_shown(run: RunResult, tmp_path: Path) -> None:
     write_report(tmp_path / 'report.html', [replace(run, warnings=('part 2 is missing',))])
-    assert 'Warning: part 2 is missing' in read_page(tmp_path / 'report.html').text
+    assert 'Warning: part 2 is missing' in Page(tmp_path / 'report.html').text

@@ -9,26 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, open_runs
-from shipdrag_ros.coastdown.events import (
-    EndedBy,
-    EndedCoastdown,
-    Event,
-    Onset,
-    Reset,
-    Update,
-)
-from shipdrag_ros.errors import BagError, ShipFileError
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Onset, Update
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, replay
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import Ship
-
-WriteRun = Callable[..., Path]
+from tests.runs import write_run
 
 
 def replayed(path: Path) -> ReplayResult:
@@ -104,64 +94,6 @@ def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(
     )
 
 
-def test_also_when_recording_starts_in_mid_run(
-    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
-) -> None:
-    block = voyage()
-    messages = list(encode(block))
-    session = live(ship)
-    begin = int(0.7 * len(messages))  # in the coastdown
-    for message in messages[:begin]:
-        session.receive(message)
-    before = sum(isinstance(event, Update) for event in session.events)
-    assert before > 3
-    session.start(tmp_path / 'a.mcap', ring=messages[:begin])
-    for message in messages[begin:]:
-        session.receive(message)
-    session.stop(int(block.receive_ns[-1]))
-    result = replayed(tmp_path / 'a.mcap')
-    after = sum(isinstance(event, Update) for event in session.events) - before
-    assert result.recorded == Recorded(5 * after + 3, 5 * after + 3, None, by=__version__)
-
-
-def test_also_when_recording_stops_before_the_node(
-    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
-) -> None:
-    block = voyage()
-    session = live(ship)
-    session.start(tmp_path / 'a.mcap')
-    for message in encode(block):
-        session.receive(message)
-    session.stop(int(block.receive_ns[-1]), finish=False)
-    result = replayed(tmp_path / 'a.mcap')
-    updates = sum(isinstance(event, Update) for event in session.events)
-    assert result.recorded == Recorded(5 * updates, 5 * updates, None, by=__version__)
-    assert len(result.coastdowns) == 1  # which the recording does not know to have ended
-
-
-def test_also_after_a_reset_in_the_coastdown(
-    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
-) -> None:
-    block = voyage()
-    messages = list(encode(block))
-    at = int(0.75 * len(messages))
-    session = live(ship)
-    session.start(tmp_path / 'a.mcap')
-    for message in messages[:at]:
-        session.receive(message)
-    session.reset(messages[at - 1].log_ns)
-    for message in messages[at:]:
-        session.receive(message)
-    session.stop(int(block.receive_ns[-1]))
-    result = replayed(tmp_path / 'a.mcap')
-    assert result.recorded.compared == result.recorded.identical > 10
-    cut_short, *rest = result.coastdowns
-    assert cut_short.ended_by is EndedBy.RESET
-    # what is left of the glide may be found again, by what came after the reset alone
-    assert all(coastdown.start_ns >= messages[at - 1].log_ns for coastdown in rest)
-    assert Reset(messages[at - 1].log_ns, 'service') in result.events
-
-
 def test_another_ship_or_parameters_are_used_and_not_compared(
     recording: tuple[Path, list[Event]], ship: Ship, parameters: Parameters
 ) -> None:
@@ -194,7 +126,7 @@ def test_progress_is_told_and_ends_at_the_total(recording: tuple[Path, list[Even
 
 
 def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
 ) -> None:
     block = voyage(steady_s=60.0, coast_s=60.0)
     value = block.value.copy()
@@ -209,24 +141,6 @@ def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(
     # what is read before a window, to judge what is in it by, is none of its messages
     counts = replay(run, window=(15.0, 100.0)).inputs['speed_through_water']
     assert (counts.messages, counts.used, counts.rejected) == (86, 85, {'absurd': 1})
-
-
-def test_unreadable_messages_and_wrong_types_are_counted_among_the_rejected(
-    tmp_path: Path, ship: Ship
-) -> None:
-    (good,) = encode(Block.of(Channel.SHAFT, [1], [2.0]))
-    with BagWriter(tmp_path / 'a.mcap') as bag:
-        for payload in (good.payload, b'', good.payload[:20]):
-            bag.write('/shaft', good.type, payload, log_ns=1, publish_ns=1)
-        bag.write('/depth', good.type, good.payload, log_ns=2, publish_ns=2)
-        bag.write('/log', good.type, good.payload, log_ns=2, publish_ns=2)
-    (run,) = open_runs([tmp_path / 'a.mcap'], remap={'/log': 'speed_through_water'})
-    result = replay(run, ship=ship)
-    assert result.inputs['shaft'].messages == 3
-    assert result.inputs['shaft'].used == 1
-    assert result.inputs['shaft'].rejected == {'malformed': 2}
-    assert result.inputs['depth'].rejected == {'type': 1}
-    assert result.inputs['speed_through_water'].rejected == {'type': 1}
 
 
 def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, ship: Ship) -> None:
@@ -246,38 +160,3 @@ def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, shi
     (run,) = open_runs([tmp_path / 'a.mcap'])
     counts = replay(run, ship=ship).inputs['shaft']
     assert counts == InputCounts(10, 9 * 4 + 10, {'surplus_joint': 10, 'nan': 4})
-
-
-def test_a_bag_without_a_ship_file_asks_for_one(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
-) -> None:
-    (run,) = open_runs([write_run(tmp_path / 'a.mcap', voyage()[:50])])
-    with pytest.raises(BagError, match=r'a\.mcap.* no ship\.yaml attached; give one with --ship'):
-        replay(run)
-    assert replay(run, ship=ship).parameters == Parameters()
-
-
-def test_attachments_that_cannot_be_used_are_told(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
-) -> None:
-    (run,) = open_runs(
-        [write_run(tmp_path / 'a.mcap', voyage()[:9], ship, parameters='window: 1')]
-    )
-    assert replay(run).parameters == Parameters()
-    (noted,) = (text for text in run.warnings if 'window: unknown key' in text)
-    assert noted.startswith('parameters.yaml: ')
-    assert noted.endswith(': not used')
-    with BagWriter(tmp_path / 'b.mcap') as bag:
-        bag.attach('ship.yaml', 'length_m: -1')
-        bag.register('/shaft', 'sensor_msgs/msg/JointState')
-    (run,) = open_runs([tmp_path / 'b.mcap'])
-    with pytest.raises(ShipFileError, match=r'b\.mcap: ship\.yaml'):
-        replay(run)
-
-
-def test_a_bag_without_inputs_says_what_it_has(tmp_path: Path, ship: Ship) -> None:
-    with BagWriter(tmp_path / 'a.mcap') as bag:
-        bag.register('/gps', 'sensor_msgs/msg/NavSatFix')
-    (run,) = open_runs([tmp_path / 'a.mcap'])
-    with pytest.raises(BagError, match=r'it has /gps \(sensor_msgs/msg/NavSatFix\): name one'):
-        replay(run, ship=ship)

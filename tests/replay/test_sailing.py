@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,13 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.replay.sailing import accepted_samples
 from shipdrag_ros.samples import Block, Channel
+from tests.runs import write_run
 
 STAMPS = 10**18 + np.arange(1200) * 10**9
 
 
 @pytest.mark.parametrize('channel', [Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2])
-def test_zeros_of_any_log_are_kept_where_asked_for(
-    write_run: Callable[..., Path], tmp_path: Path, channel: Channel
-) -> None:
+def test_zeros_of_any_log_are_kept_where_asked_for(tmp_path: Path, channel: Channel) -> None:
     speed = np.linspace(8.0, -8.0, len(STAMPS))
     speed += 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed = np.maximum(speed, 0.0)

@@ -87,13 +87,7 @@ def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:
     assert {(row['bag'], row['coastdown']) for row in rows} == {('sea trial.mcap', '2')}
     assert run.coastdowns[0].estimate is not None
     curve = run.coastdowns[0].estimate.valid_curve
-    for name in (
-        'speed_m_s',
-        'resistance_m_s2',
-        'sigma_m_s2',
-        'sigma_repeatable_m_s2',
-        'froude',
-    ):
+    for name in ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2', 'sigma_repeatable_m_s2', 'froude'):
         np.testing.assert_array_equal([float(row[name]) for row in rows], getattr(curve, name))
 
 

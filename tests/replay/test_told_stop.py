@@ -20,15 +20,15 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
+from tests.runs import write_run
 
-WriteRun = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
 STOP_S = 400.0
 
 
 @pytest.mark.parametrize('clock_s', [0.0, 3600.0])
 def test_a_stop_is_of_the_clock_of_the_bag(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun, clock_s: float
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], clock_s: float
 ) -> None:
     block = voyage()
     log = block[block.channel == Channel.SPEED_THROUGH_WATER]

@@ -12,10 +12,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.replay.truth import TrueCurve
 
 
-@given(
-    st.lists(st.floats(0.0, 40.0), min_size=1, max_size=9, unique=True).map(sorted),
-    st.data(),
-)
+@given(st.lists(st.floats(0.0, 40.0), min_size=1, max_size=9, unique=True).map(sorted), st.data())
 def test_round_trip(speeds: list[float], data: st.DataObject) -> None:
     r = data.draw(st.lists(st.floats(-1.0, 1.0), min_size=len(speeds), max_size=len(speeds)))
     curve = TrueCurve(np.array(speeds), np.array(r), {'seed': 1, 'ship': 'Vitus'})

@@ -24,11 +24,9 @@ def problems_of(**keys: object) -> tuple[str, ...]:
 @pytest.mark.parametrize(
     ('keys', 'message'),
     [
-        ({'length_m': 492.1}, 'is the length in metres'),  # feet
         ({'displaced_volume_m3': 20.2}, 'is the length in metres'),  # thousands of tonnes
         ({'displaced_volume_m3': 713e3}, 'is the length in metres'),  # cubic feet
         ({'breadth_m': 70.9}, 'block coefficient'),  # feet
-        ({'draught_m': 28.2}, 'block coefficient'),  # feet
         ({'draught_m': 5.0}, 'block coefficient'),
         ({'breadth_m': 2.16}, 'breadth_m: 2.16'),
         ({'wetted_surface_m2': 48890.0}, 'wetted_surface_m2'),  # square feet

@@ -19,13 +19,7 @@ from ruamel.yaml import YAML
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.ship.term import LearntTerm
-from shipdrag_ros.simulation import (
-    Scenario,
-    sense,
-    simulate,
-    simulate_columns,
-    standard_sensors,
-)
+from shipdrag_ros.simulation import Scenario, sense, simulate, simulate_columns, standard_sensors
 from shipdrag_ros.simulation.declared import force_n
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, declared, find, parse, using

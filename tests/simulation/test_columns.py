@@ -118,32 +118,6 @@ def test_a_speed_over_ground_may_be_filtered_too():
     assert 0.05 < behind[TIME_S == 120.0][0] < 0.2
 
 
-@settings(max_examples=20, deadline=None)
-@given(
-    name=st.sampled_from(['fouling', 'locked_propeller', 'towed_cable', 'windmilling_propeller']),
-    size=st.floats(0.05, 1.0),
-)
-def test_more_drag_makes_a_slower_ship(name, size):
-    rest = [quantity.value for quantity in LIBRARY[name].parameters_of(CARGO)[1:]]
-    small, large = (LIBRARY[name].action(FRAME, value, *rest) for value in (size, 1.5 * size))
-    clean, little, much = simulate_columns(
-        CARGO, SCENARIO, [Action(), small, large], TIME_S
-    ).speed_through_water_m_s
-    late = TIME_S > 150.0
-    assert np.all(clean[late] > little[late] + 1e-4)
-    assert np.all(little[late] > much[late] + 1e-5)
-
-
-def test_columns_do_not_disturb_each_other():
-    actions = [drawn(name, 3)[0] for name in LIBRARY]
-    together = simulate_columns(CARGO, SCENARIO, actions, TIME_S)
-    for i, action in enumerate(actions):
-        alone = simulate_columns(CARGO, SCENARIO, [action], TIME_S)
-        # where no column adds resistance its table is not even looked up
-        np.testing.assert_allclose(together.position_m[i], alone.position_m[0], rtol=1e-14)
-        np.testing.assert_allclose(together.log_m_s[i], alone.log_m_s[0], rtol=1e-14)
-
-
 def test_the_steps_that_are_chosen_are_good_for_a_tenth_of_a_millimetre_per_second():
     # N = 4 draws of each effect, seeds 0..3
     actions = [drawn(name, seed)[0] for name in LIBRARY for seed in range(4)]

@@ -44,9 +44,7 @@ def test_all_problems_are_in_one_message():
 
 def test_orders_are_approached_one_after_the_other():
     scenario = Scenario(
-        speed_m_s=8.2,
-        lead_in_s=100.0,
-        orders=(STOP, EngineOrder(10.0, shaft=0.5, thrust=0.25)),
+        speed_m_s=8.2, lead_in_s=100.0, orders=(STOP, EngineOrder(10.0, shaft=0.5, thrust=0.25))
     )
     at = np.array([0.0, 99.9, 100.0, 105.0, 110.0, 115.0, 1000.0])
     left = np.exp(-1.0)

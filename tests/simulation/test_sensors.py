@@ -180,16 +180,6 @@ def test_seeds_decide_and_sensors_do_not_disturb_each_other(coast):
     np.testing.assert_array_equal(alone.value, together.value)
 
 
-def test_standard_sensors_follow_rate_and_noise(coast):
-    exact = sense(coast, standard_sensors(rate_hz=2.0, noise=0.0), seed=1)
-    assert len(exact) == 4 * 2001
-    log = exact[exact.channel == Channel.SPEED_THROUGH_WATER]
-    truth = coast.at(np.arange(2001) / 2.0).speed_through_water_m_s
-    np.testing.assert_allclose(log.value[:, 0], truth, atol=1e-12)
-    doubled = {sensor.channel: sensor.sd for sensor in standard_sensors(noise=2.0)}
-    assert doubled[Channel.SPEED_THROUGH_WATER] == pytest.approx(0.1)
-
-
 @pytest.mark.parametrize(
     ('sensor', 'message'),
     [

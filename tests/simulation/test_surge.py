@@ -118,14 +118,6 @@ def test_a_head_current_eases_the_still_air():
     assert head > calm > astern
 
 
-def test_the_heading_turns_the_track():
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=60.0)
-    east = simulate(CARGO, scenario)
-    north = simulate(CARGO, replace(scenario, heading_rad=np.pi / 2))
-    np.testing.assert_allclose(north.position_m[:, 1], east.position_m[:, 0], rtol=1e-12)
-    np.testing.assert_allclose(north.position_m[:, 0], 0.0, atol=1e-8)
-
-
 def test_a_slow_down_settles_where_resistance_meets_the_ordered_thrust():
     ordered = EngineOrder(0.0, shaft=0.7, thrust=0.49)
     truth = simulate(

@@ -50,12 +50,7 @@ def test_a_plan_is_its_seed() -> None:
 def test_some_changes_are_written_down_and_some_are_not() -> None:
     plan = plan_fleet(PATTERN, ships=3, months=12, every_days=7, seed=0)
     kinds = {(change.kind, change.known) for each in plan for change in each.history.changes}
-    assert kinds == {
-        ('cleaning', True),
-        ('cleaning', False),
-        ('idle', False),
-        ('docking', True),
-    }
+    assert kinds == {('cleaning', True), ('cleaning', False), ('idle', False), ('docking', True)}
     assert len({each.ship.name for each in plan}) == 3
     for each in plan:
         assert all(0 < change.day < 360 for change in each.history.changes)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -80,11 +81,12 @@ def csv_commas() -> bytes:
     return '\r\n'.join(lines).encode()
 
 
-def _sentence(body: str) -> str:
-    checksum = 0
-    for letter in body:
-        checksum ^= ord(letter)
-    return f'${body}*{checksum:02X}'
+def sentence(body: str) -> str:
+    """Add the checksum, by an arithmetic of its own."""
+    check = 0
+    for byte in body.encode('latin-1'):
+        check ^= byte
+    return f'${body}*{check:02X}'
 
 
 def nmea() -> bytes:
@@ -94,13 +96,13 @@ def nmea() -> bytes:
         degrees, minutes = divmod(latitude(k) * 60.0, 60.0)
         east, east_minutes = divmod(longitude(k) * 60.0, 60.0)
         lines += [
-            _sentence(
+            sentence(
                 f'GPRMC,{when(k):%H%M%S},A,{int(degrees):02d}{minutes:08.5f},N,'
                 f'{int(east):03d}{east_minutes:08.5f},E,{sog(k) / KNOT:.3f},355.0,'
                 f'{when(k):%d%m%y},,,A'
             ),
-            _sentence(f'VWVHW,,,,M,{stw(k) / KNOT:.3f},N,,'),
-            _sentence(f'HEHDT,{compass(k):.2f},T'),
+            sentence(f'VWVHW,,,,M,{stw(k) / KNOT:.3f},N,,'),
+            sentence(f'HEHDT,{compass(k):.2f},T'),
         ]
     return '\r\n'.join(lines).encode()
 
@@ -128,53 +130,53 @@ def _can_id(pgn: int, sender: int = 35) -> int:
     return (2 << 26) | (pgn << 8) | sender
 
 
+def _frames(line: Callable[[int, int, bytes], str], end: str = '\n') -> bytes:
+    """Write each message of each second in a line."""
+    return end.join(line(k, *each) for k in range(ROWS) for each in n2k_messages(k)).encode()
+
+
 def candump() -> bytes:
     """Frames as `candump -L` writes them."""
-    lines = []
-    for k in range(ROWS):
-        for pgn, data in n2k_messages(k):
-            stamp = f'{epoch_ns(k) // 10**9}.000000'
-            lines.append(f'({stamp}) can0 {_can_id(pgn):08X}#{data.hex().upper()}')
-    return '\n'.join(lines).encode()
+    return _frames(
+        lambda k, pgn, data: (
+            f'({epoch_ns(k) // 10**9}.000000) can0 {_can_id(pgn):08X}#{data.hex().upper()}'
+        )
+    )
 
 
 def actisense() -> bytes:
     """Messages as Actisense's N2K ASCII."""
-    lines = []
-    for k in range(ROWS):
-        for pgn, data in n2k_messages(k):
-            lines.append(f'A{when(k):%H%M%S}.000 23FF2 {pgn:05X} {data.hex().upper()}')
-    return '\r\n'.join(lines).encode()
+    return _frames(
+        lambda k, pgn, data: f'A{when(k):%H%M%S}.000 23FF2 {pgn:05X} {data.hex().upper()}', '\r\n'
+    )
 
 
 def yacht_devices() -> bytes:
     """Frames as a gateway of Yacht Devices sends them (RAW)."""
-    lines = []
-    for k in range(ROWS):
-        for pgn, data in n2k_messages(k):
-            lines.append(f'{when(k):%H:%M:%S}.000 R {_can_id(pgn):08X} {data.hex(" ").upper()}')
-    return '\r\n'.join(lines).encode()
+    return _frames(
+        lambda k, pgn, data: (
+            f'{when(k):%H:%M:%S}.000 R {_can_id(pgn):08X} {data.hex(" ").upper()}'
+        ),
+        '\r\n',
+    )
 
 
 def slcan() -> bytes:
     """Frames of a serial CAN adapter, with its milliseconds of a minute."""
-    lines = []
-    for k in range(ROWS):
-        for pgn, data in n2k_messages(k):
-            clock = (30_000 + 1000 * k) % 60_000
-            lines.append(f'T{_can_id(pgn):08X}{len(data)}{data.hex().upper()}{clock:04X}')
-    return '\n'.join(lines).encode()
+    return _frames(
+        lambda k, pgn, data: (
+            f'T{_can_id(pgn):08X}{len(data)}{data.hex().upper()}{(30_000 + 1000 * k) % 60_000:04X}'
+        )
+    )
 
 
 def canboat() -> bytes:
     """Frames as canboat's plain format."""
-    lines = []
-    for k in range(ROWS):
-        for pgn, data in n2k_messages(k):
-            lines.append(
-                f'{when(k):%Y-%m-%dT%H:%M:%S}.000Z,2,{pgn},35,255,{len(data)},{data.hex(",")}'
-            )
-    return '\n'.join(lines).encode()
+    return _frames(
+        lambda k, pgn, data: (
+            f'{when(k):%Y-%m-%dT%H:%M:%S}.000Z,2,{pgn},35,255,{len(data)},{data.hex(",")}'
+        )
+    )
 
 
 def signalk() -> bytes:
@@ -213,26 +215,10 @@ def gpx() -> bytes:
 
 def ardupilot() -> bytes:
     """A dataflash log: definitions, then GPS and ATT."""
-    sizes = {
-        'B': 1,
-        'H': 2,
-        'I': 4,
-        'L': 4,
-        'Q': 8,
-        'f': 4,
-        'c': 2,
-        'C': 2,
-        'n': 4,
-        'N': 16,
-        'Z': 64,
-    }
+    sizes = dict(zip('BHILQfcCnNZ', (1, 2, 4, 4, 8, 4, 2, 2, 4, 16, 64), strict=True))
     codes = {'L': 'i', 'c': 'h', 'C': 'H'}
     kinds = {
-        130: (
-            'GPS',
-            'QBBIHBLLff',
-            'TimeUS,I,Status,GMS,GWk,NSats,Lat,Lng,Alt,Spd',
-        ),
+        130: ('GPS', 'QBBIHBLLff', 'TimeUS,I,Status,GMS,GWk,NSats,Lat,Lng,Alt,Spd'),
         131: ('ATT', 'QccccCC', 'TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw'),
     }
 

@@ -29,20 +29,13 @@ from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
 
 from .conftest import into_bag
+from .log_samples import sentence
 
 KNOT = 1852 / 3600
 START = datetime(2024, 2, 28, 12, 0, 0, tzinfo=UTC)
 START_NS = int(START.timestamp()) * 10**9
 SECOND = 10**9
 REAL = 'psaros_lake_geneva.nmea.gz'
-
-
-def sentence(body: str) -> str:
-    """Add the checksum, by an arithmetic of its own."""
-    check = 0
-    for byte in body.encode('latin-1'):
-        check ^= byte
-    return f'${body}*{check:02X}'
 
 
 def rmc(second: float, *, day: str = '280224', status: str = 'A', more: str = '') -> str:
@@ -100,37 +93,17 @@ signed = st.integers(-350, 350)
 
 @settings(max_examples=60, deadline=None)
 @given(
-    water=tenths,
-    ground=tenths,
-    wind=tenths,
-    wind_from=angles,
-    heading=angles,
-    variation=signed,
-    deviation=signed,
-    rpm=signed,
-    rudder=signed,
-    depth=st.integers(0, 9999),
-    offset=st.integers(0, 99),
-    latitude=st.integers(-90 * 60_000, 90 * 60_000),
-    longitude=st.integers(-180 * 60_000, 180 * 60_000),
-    unit=st.sampled_from('NKM'),
+    st.tuples(tenths, tenths, tenths, angles, angles, signed, signed, signed, signed),
+    st.tuples(st.integers(0, 9999), st.integers(0, 99)),
+    st.tuples(st.integers(-90 * 60_000, 90 * 60_000), st.integers(-180 * 60_000, 180 * 60_000)),
+    st.sampled_from('NKM'),
 )
 def test_values_are_those_written(
-    water: int,
-    ground: int,
-    wind: int,
-    wind_from: int,
-    heading: int,
-    variation: int,
-    deviation: int,
-    rpm: int,
-    rudder: int,
-    depth: int,
-    offset: int,
-    latitude: int,
-    longitude: int,
-    unit: str,
+    case: tuple[int, ...], below: tuple[int, int], at: tuple[int, int], unit: str
 ) -> None:
+    water, ground, wind, wind_from, heading, variation, deviation, rpm, rudder = case
+    (depth, offset), (latitude, longitude) = below, at
+
     def coordinate(thousandths: int, width: int, sides: str) -> str:
         degrees, minutes = divmod(abs(thousandths), 60_000)
         side = sides[thousandths < 0]

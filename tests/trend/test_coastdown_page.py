@@ -17,6 +17,7 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.store import read_coastdowns
 from shipdrag_ros.trend.coastdown_page import coastdown_page, page_name
 from shipdrag_ros.trend.export import COLUMNS
+from tests.page import Page
 
 
 @pytest.fixture
@@ -26,13 +27,13 @@ def row(fleet_store: Path) -> dict[str, Any]:
     return max(rows, key=lambda each: each['time_ns'])
 
 
-def text_of(row: dict[str, Any], tmp_path: Path, read_page: Any) -> str:
+def text_of(row: dict[str, Any], tmp_path: Path) -> str:
     path = tmp_path / 'page.html'
     path.write_text(coastdown_page(row, fleet='fleet.html'))
-    return str(read_page(path).text)
+    return str(Page(path).text)
 
 
-def test_it_says_what_the_store_knows_of_a_run(row: Any, tmp_path: Path, read_page: Any) -> None:
+def test_it_says_what_the_store_knows_of_a_run(row: Any, tmp_path: Path) -> None:
     size = {'value': 0.11, 'sd': 0.02}
     named = [{'name': 'fouling', 'probability': 0.9, 'parameters': {'friction_factor': size}}]
     other = [{'name': 'an effect to come', 'probability': 0.1, 'parameters': {'x': size}}]
@@ -46,7 +47,7 @@ def test_it_says_what_the_store_knows_of_a_run(row: Any, tmp_path: Path, read_pa
         'flags': ['cut'],
         'bag': '<i>',
     }
-    said = text_of(row, tmp_path, read_page)
+    said = text_of(row, tmp_path)
     assert 'Test <b>ship</b>: coastdown of' in said  # as text, not as markup
     assert '11.0 ± 6.0 % over the clean hull' in said
     assert 'part of the record was cut' in said
@@ -55,22 +56,20 @@ def test_it_says_what_the_store_knows_of_a_run(row: Any, tmp_path: Path, read_pa
     assert "shipdrag diagnose '<i>' --report" in said
 
 
-def test_it_speaks_of_three_quarters_of_the_speed_at_the_stop(
-    row: Any, tmp_path: Path, read_page: Any
-) -> None:
-    said = text_of(row, tmp_path, read_page)
+def test_it_speaks_of_three_quarters_of_the_speed_at_the_stop(row: Any, tmp_path: Path) -> None:
+    said = text_of(row, tmp_path)
     knots = float(said.partition('At ')[2].partition(' knots')[0])
     step = max(b - a for a, b in pairwise(row['speed_m_s']))
     assert knots * 1852.0 / 3600.0 == pytest.approx(0.75 * row['speed_at_stop_m_s'], abs=step)
 
 
-def test_without_an_estimate_it_says_why(row: Any, tmp_path: Path, read_page: Any) -> None:
+def test_without_an_estimate_it_says_why(row: Any, tmp_path: Path) -> None:
     nothing = [None] * len(row['froude'])
     row |= {'resistance_m_s2': nothing, 'sigma_m_s2': nothing, 'error': 'too short'}
-    said = text_of(row, tmp_path, read_page)
+    said = text_of(row, tmp_path)
     assert 'No estimate: too short.' in said
     assert 'It was not diagnosed.' in said
-    assert 'clean_m_s2' not in text_of(row | {'clean_m_s2': None}, tmp_path, read_page)
+    assert 'clean_m_s2' not in text_of(row | {'clean_m_s2': None}, tmp_path)
 
 
 def test_rows_of_the_report_lead_to_pages_and_back(fleet_store: Path, tmp_path: Path) -> None:

@@ -5,14 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from shipdrag_ros.trend.hull_state import (
-    GROWTH_PER_YEAR,
-    LEVEL_SD,
-    Growth,
-    HullState,
-    Runs,
-    Steps,
-)
+from shipdrag_ros.trend.hull_state import GROWTH_PER_YEAR, LEVEL_SD, Growth, HullState, Runs, Steps
 
 
 def runs(years, added, sd=0.01, covariates=None):

@@ -19,14 +19,7 @@ def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
     [ship] = found['ships']
     assert ship['name'] == 'Test <b>ship</b>'
     assert (ship['coastdowns'], ship['rank'], ship['cleaning_pays_from']) == (12, 1, None)
-    assert set(ship['added_resistance'][0]) == {
-        'time_ns',
-        'bag',
-        'value',
-        'sd',
-        'used',
-        'reason',
-    }
+    assert set(ship['added_resistance'][0]) == {'time_ns', 'bag', 'value', 'sd', 'used', 'reason'}
     assert set(ship['now']) == {'value', 'sd', 'power_kw'}
     assert set(ship['growth_per_year']) == {'value', 'sd'}
     [event] = ship['events']
@@ -55,10 +48,7 @@ def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
         ),
         ('select ship, rank, added_percent > 5, usd_per_year from ships', [NAME, 1, True, None]),
         ('select to_timestamp(min(time_ns) / 1e9) from coastdowns', ['2023-11-14 22:13:20+00:00']),
-        (
-            'select [1, 2], 1.5::decimal(4, 2), null',
-            [[1, 2], '1.50', None],
-        ),
+        ('select [1, 2], 1.5::decimal(4, 2), null', [[1, 2], '1.50', None]),
     ],
 )
 def test_what_an_office_asks_is_answered(fleet_store, capsys, question, row):

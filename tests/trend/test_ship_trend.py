@@ -9,12 +9,9 @@ from shipdrag_ros.fleet.store import HullEvent
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import export, fleet_trends, words
 from shipdrag_ros.trend.page import draw_added_resistance
+from tests.trend.conftest import CLEAN, DAY_NS, START_NS, row
 
-START_NS = 1_700_000_000_000_000_000
-DAY_NS = 86_400_000_000_000
-SPEED = np.linspace(1.0, 10.0, 46)
 EVERY_TWO_WEEKS = np.arange(0.0, 720.0, 15.0)
-CLEAN = 1e-3 * SPEED**2
 PRICES = """
 length_m: 80.0
 displaced_volume_m3: 1000.0
@@ -34,25 +31,8 @@ def rows(ship, growth, *, days=EVERY_TWO_WEEKS, seed=1, cleaned=None, length=80.
     found = []
     for day in days:
         added = growth * day / 365.25 - 0.1 * (cleaned is not None and day >= cleaned)
-        r = (1.0 + added + rng.normal(0.0, 0.015)) * CLEAN
-        found.append(
-            {
-                'ship': ship,
-                'bag': f'{ship}/{day:.0f}.mcap',
-                'time_ns': START_NS + round(day * DAY_NS),
-                'speed_at_stop_m_s': 8.0,
-                'speed_m_s': SPEED.tolist(),
-                'clean_m_s2': CLEAN.tolist(),
-                'resistance_m_s2': r.tolist(),
-                'sigma_m_s2': (0.03 * CLEAN).tolist(),
-                'sigma_repeatable_m_s2': (0.01 * CLEAN).tolist(),
-                'displaced_volume_m3': 1000.0,
-                'water_density_kg_m3': 1025.0,
-                'water_temperature_c': None,
-                'length_m': length,
-                'error': None,
-            }
-        )
+        added += rng.normal(0.0, 0.015)
+        found.append(row(day, added, ship=ship, bag=f'{ship}/{day:.0f}.mcap', length_m=length))
     return found
 
 

@@ -10,12 +10,7 @@ import pytest
 from scipy import stats
 
 from shipdrag_ros.estimation.curve import sigma
-from shipdrag_ros.estimation.s1.problems import (
-    ScalarInput,
-    Solution,
-    solve_joint,
-    solve_one,
-)
+from shipdrag_ros.estimation.s1.problems import ScalarInput, Solution, solve_joint, solve_one
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 
 START_NS = 1_700_000_000_123_456_789
@@ -126,11 +121,7 @@ def test_speeds_improve_every_coefficient_but_the_first() -> None:
 def test_derivatives_and_fitted_values_hang_together() -> None:
     speed, position = pair(60, np.random.default_rng(3), order=8)
     h = 1e-4
-    for solution in (
-        solve_one(speed),
-        solve_one(position),
-        solve_joint(speed, position),
-    ):
+    for solution in (solve_one(speed), solve_one(position), solve_joint(speed, position)):
         fit = solution.fit
         at = np.linspace(-0.9, 0.9, 7)
         motion, after, before = (fit.motion(at + d) for d in (0.0, h, -h))

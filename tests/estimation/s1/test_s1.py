@@ -144,12 +144,7 @@ def test_speed_over_ground_stands_in_for_a_log_and_is_said(
     ],
 )
 def test_too_little_is_refused_with_the_count(
-    coast: Any,
-    ship: Ship,
-    estimator: str,
-    channels: tuple[Channel, ...],
-    n: int,
-    message: str,
+    coast: Any, ship: Ship, estimator: str, channels: tuple[Channel, ...], n: int, message: str
 ) -> None:
     with pytest.raises(EstimationError, match=message):
         estimate(window(only(coast.block(n), *channels)), ship, Parameters(estimator=estimator))

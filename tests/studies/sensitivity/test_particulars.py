@@ -69,8 +69,7 @@ def test_each_is_changed_alone():
 
 
 @pytest.mark.parametrize(
-    ('key', 'part'),
-    [('baseline.C_V', 'viscous'), ('baseline.wave_coefficient', 'wave')],
+    ('key', 'part'), [('baseline.C_V', 'viscous'), ('baseline.wave_coefficient', 'wave')]
 )
 def test_a_coefficient_as_a_whole_is_a_factor(key, part):
     changed = listed(CARGO)[key].scaled(CARGO, 1.3).baseline

@@ -31,17 +31,6 @@ def test_terms() -> None:
     assert terms_up_to(5, [5, 5])[:15].tolist() == terms_up_to(4, [4, 4]).tolist()
 
 
-def test_against_numpy() -> None:
-    polynomial, points = some(2, 5, 3)
-    grid = np.zeros((6, 6))
-    grid[tuple(polynomial.powers.T)] = polynomial.coefficients
-    z = (points - polynomial.centre) / polynomial.half
-    expected = np.polynomial.polynomial.polyval2d(*z.T, grid)
-    np.testing.assert_allclose(polynomial(points), expected, rtol=1e-12)
-    columns = monomials(z, polynomial.powers)
-    np.testing.assert_allclose(columns @ polynomial.coefficients, expected, rtol=1e-12)
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 4), st.integers(0, 5), st.integers(0, 10**6))
 def test_derivatives_raw_powers_and_source(variables: int, degree: int, seed: int) -> None:

@@ -10,22 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.accuracy import diagnosis_score as score
+from benchmarks.worlds.hidden import cases, scoring
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.samples import Channel, concatenate
-
-
-@pytest.fixture(scope='module')
-def score():
-    from benchmarks.accuracy import diagnosis_score
-
-    return diagnosis_score
-
-
-@pytest.fixture(scope='module')
-def scoring():
-    from benchmarks.worlds.hidden import scoring
-
-    return scoring
 
 
 def _found(
@@ -43,9 +31,7 @@ def _found(
     }
 
 
-def _trial(scoring, found, *names, kind='one', shelf=1, parameters=None, **more):
-    from benchmarks.worlds.hidden import cases
-
+def _trial(found, *names, kind='one', shelf=1, parameters=None, **more):
     truth = cases.Truth(kind, shelf, names, parameters or {}, cases.CONDITIONS[0])
     answers = {key: scoring.parse(value) for key, value in more.items()}
     return scoring.Trial(truth, scoring.parse(found), 1.0, **answers)
@@ -55,7 +41,7 @@ def _share(scores, name):
     return scores[name].count, scores[name].of
 
 
-def test_names_sets_and_alarms_are_counted(scoring) -> None:
+def test_names_sets_and_alarms_are_counted() -> None:
     named = _found('named', effects=['current'], candidates=[(['current'], 0.99)])
     pair = [(['current', 'fouling'], 0.6), (['current'], 0.4)]
     three = [(['wind'], 0.5), (['waves'], 0.3), (['current'], 0.2)]
@@ -85,7 +71,7 @@ def test_names_sets_and_alarms_are_counted(scoring) -> None:
     assert _share(scores, 'pair in the answer') == (1, 1)
 
 
-def test_parameters_and_held_out_runs_count_for_right_names_alone(scoring) -> None:
+def test_parameters_and_held_out_runs_count_for_right_names_alone() -> None:
     parameters = {'along_track_m_s': {'value': 0.4, 'sd': 0.02}}
     found = _found('named', effects=['current'], held_out=1.05, parameters=parameters)
     near = {'current': {'along_track_m_s': 0.43, 'cross_track_m_s': 0.1}}
@@ -101,7 +87,7 @@ def test_parameters_and_held_out_runs_count_for_right_names_alone(scoring) -> No
     assert _share(scores, 'held-out chi^2 per sample <= 1.1') == (2, 2)
 
 
-def test_a_recommendation_counts_where_anything_resolves(scoring) -> None:
+def test_a_recommendation_counts_where_anything_resolves() -> None:
     one_of = _found(
         'one_of',
         candidates=[(['current'], 0.6), (['log_offset'], 0.4)],
@@ -137,19 +123,19 @@ def test_a_recommendation_counts_where_anything_resolves(scoring) -> None:
         ('a run after the hull is cleaned', None),
     ],
 )
-def test_recommendations_are_understood(scoring, text, test) -> None:
+def test_recommendations_are_understood(text, test) -> None:
     answer = scoring.parse(_found('one_of', would_decide={text: None}))
     assert answer.recommended[0].test == test
 
 
-def test_calibration_error_of_honest_and_of_boastful_answers(scoring) -> None:
+def test_calibration_error_of_honest_and_of_boastful_answers() -> None:
     honest = [(0.75, k % 4 > 0) for k in range(400)]
     boastful = [(0.99, k % 2 > 0) for k in range(400)]
     assert scoring.calibration_error(honest) == pytest.approx(0.0, abs=1e-12)
     assert scoring.calibration_error(boastful) == pytest.approx(0.49, abs=1e-12)
 
 
-def test_blocks_and_bags_hold_the_same_samples(score, tmp_path: Path) -> None:
+def test_blocks_and_bags_hold_the_same_samples(tmp_path: Path) -> None:
     seen = score.cases.observe(0)
     block = score.as_block(seen.runs[0])
     _, bags = score.write_bags(seen, tmp_path)
@@ -173,7 +159,7 @@ def diagnose(ship_file, runs):
 
 
 def test_ten_cases_are_scored_and_a_broken_run_goes_on(
-    score, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / 'fake.py').write_text(FAKE, encoding='utf-8')
     monkeypatch.syspath_prepend(tmp_path)
@@ -193,7 +179,7 @@ def test_ten_cases_are_scored_and_a_broken_run_goes_on(
     assert figures['unknown, outside the library']['count'] == 0
 
 
-def test_the_oracle_tells_what_is_far_above_the_noise(score) -> None:
+def test_the_oracle_tells_what_is_far_above_the_noise() -> None:
     # a dead band, a log that sticks, and nothing
     found = [score.answer('oracle', 'blocks', number)['found'] for number in (2, 3, 4)]
     assert [one['verdict'] for one in found] == ['named', 'unknown', 'none']
@@ -201,7 +187,7 @@ def test_the_oracle_tells_what_is_far_above_the_noise(score) -> None:
 
 
 def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
-    score, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     given = []
 
@@ -222,7 +208,7 @@ def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
     assert 'no baseline' in score._answer(('command', 'bags', 0))['error']
 
 
-def test_an_answer_that_fails_is_told_and_not_counted(score, tmp_path: Path) -> None:
+def test_an_answer_that_fails_is_told_and_not_counted(tmp_path: Path) -> None:
     row = score._answer(('no_such_module:diagnose', 'blocks', 0))
     assert 'ModuleNotFoundError' in row['error']
     assert score.trials([row]) == []

@@ -11,16 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.worlds.hidden import cases
+from benchmarks.worlds.hidden.effect import Leg
+from benchmarks.worlds.hidden.sailing import Disturbance, World, coasting_m_s2, sail
 from shipdrag_ros.ship import Ship
 
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'hidden'
-
-
-@pytest.fixture(scope='module')
-def cases():
-    from benchmarks.worlds.hidden import cases
-
-    return cases
 
 
 @pytest.mark.parametrize('path', sorted(FOLDER.glob('*.py')), ids=lambda path: path.name)
@@ -35,7 +31,7 @@ def test_nothing_is_imported_from_the_package(path: Path) -> None:
         assert not [name for name in names if name.partition('.')[0] == 'shipdrag_ros']
 
 
-def test_there_are_enough_of_every_kind(cases) -> None:
+def test_there_are_enough_of_every_kind() -> None:
     truths = [cases.reveal(number) for number in range(cases.count())]
     kinds = Counter(truth.kind for truth in truths)
     first = {truth.names for truth in truths if truth.kind == 'one' and truth.shelf == 1}
@@ -49,7 +45,7 @@ def test_there_are_enough_of_every_kind(cases) -> None:
         assert {truth.names for truth in here if truth.kind == 'one'} >= first
 
 
-def test_a_case_is_the_same_whenever_it_is_made(cases) -> None:
+def test_a_case_is_the_same_whenever_it_is_made() -> None:
     first = cases.observe(3)
     cases.observe(4)
     again = cases.observe(3)
@@ -60,7 +56,7 @@ def test_a_case_is_the_same_whenever_it_is_made(cases) -> None:
             np.testing.assert_array_equal(one[name].stamp_ns, other[name].stamp_ns)
 
 
-def test_what_is_measured_besides_changes_nothing_else(cases) -> None:
+def test_what_is_measured_besides_changes_nothing_else() -> None:
     number = next(
         number
         for number in range(cases.count())
@@ -74,7 +70,7 @@ def test_what_is_measured_besides_changes_nothing_else(cases) -> None:
         np.testing.assert_array_equal(series.value, added.runs[0][name].value)
 
 
-def test_the_ship_file_is_one_and_states_the_baseline_that_sails(cases) -> None:
+def test_the_ship_file_is_one_and_states_the_baseline_that_sails() -> None:
     seen = cases.observe(1)
     ship = Ship.from_yaml(seen.ship_file, subject='hidden')
     hull = cases._case(1).hull
@@ -83,7 +79,7 @@ def test_the_ship_file_is_one_and_states_the_baseline_that_sails(cases) -> None:
     np.testing.assert_allclose(ship.n_r(speeds), hull.added_mass(speeds), rtol=1e-9)
 
 
-def test_stamps_ascend_and_never_lie_ahead_of_their_arrival(cases) -> None:
+def test_stamps_ascend_and_never_lie_ahead_of_their_arrival() -> None:
     for number in range(12):
         for run in cases.observe(number, added=cases.TESTS).runs:
             for series in run.values():
@@ -92,7 +88,7 @@ def test_stamps_ascend_and_never_lie_ahead_of_their_arrival(cases) -> None:
                 assert np.all(np.isfinite(series.value))
 
 
-def test_the_baseline_is_as_uncertain_as_stated_and_three_times_in_its_own_block(cases) -> None:
+def test_the_baseline_is_as_uncertain_as_stated_and_three_times_in_its_own_block() -> None:
     numbers = range(0, cases.count(), 3)
     worlds = {True: [], False: []}
     for number in numbers:
@@ -103,7 +99,7 @@ def test_the_baseline_is_as_uncertain_as_stated_and_three_times_in_its_own_block
     assert np.std(worlds[True]) == pytest.approx(0.06, rel=0.45)
 
 
-def test_a_case_is_made_quickly(cases) -> None:
+def test_a_case_is_made_quickly() -> None:
     cases.observe(0)
     start = time.process_time()
     for number in range(1, 11):
@@ -111,10 +107,7 @@ def test_a_case_is_made_quickly(cases) -> None:
     assert time.process_time() - start < 10 * 0.2
 
 
-def test_the_true_r_is_what_slows_the_ship_at_last(cases) -> None:
-    from benchmarks.worlds.hidden.effect import Leg
-    from benchmarks.worlds.hidden.sailing import Disturbance, World, coasting_m_s2, sail
-
+def test_the_true_r_is_what_slows_the_ship_at_last() -> None:
     hull = cases.known(7).hull
     leg, world = Leg(hull, 1.0, 1500.0, hull.speed_m_s), World(friction=0.02, shape=(0.01,) * 4)
     motion = sail(

@@ -3,9 +3,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.worlds.hidden.effect import Leg
+from benchmarks.worlds.hidden.hull import draw_hull
+from benchmarks.worlds.hidden.library import FIRST_SHELF, SECOND_SHELF
+from benchmarks.worlds.hidden.motion import TABLE_POINTS, Drive, integrate
+from benchmarks.worlds.hidden.outside import OUTSIDE
+from benchmarks.worlds.hidden.sailing import Disturbance, World, sail
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
 
@@ -14,18 +22,11 @@ HEADING_RAD = 0.6
 
 @pytest.fixture(scope='module')
 def leg():
-    from benchmarks.worlds.hidden.effect import Leg
-    from benchmarks.worlds.hidden.hull import draw_hull
-
     hull = draw_hull(np.random.default_rng(2))
     return Leg(hull, 1.0, 900.0, hull.speed_m_s)
 
 
 def _sail(leg, *effects, sign=1.0, **world):
-    from dataclasses import replace
-
-    from benchmarks.worlds.hidden.sailing import Disturbance, World, sail
-
     return sail(
         replace(leg, sign=sign),
         effects,
@@ -37,9 +38,6 @@ def _sail(leg, *effects, sign=1.0, **world):
 
 
 def _kinds():
-    from benchmarks.worlds.hidden.library import FIRST_SHELF, SECOND_SHELF
-    from benchmarks.worlds.hidden.outside import OUTSIDE
-
     return (*FIRST_SHELF, *SECOND_SHELF, *OUTSIDE)
 
 
@@ -48,8 +46,6 @@ def _effect(kind, leg):
 
 
 def test_the_integrator_meets_the_closed_form_of_quadratic_drag() -> None:
-    from benchmarks.worlds.hidden.motion import TABLE_POINTS, Drive, integrate
-
     time = np.arange(0.0, 601.0)
     n, drag_1_m, speed = len(time), 3e-4, 8.0
     nothing, table = np.zeros(n), np.zeros(TABLE_POINTS)

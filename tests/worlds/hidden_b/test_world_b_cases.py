@@ -4,25 +4,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from itertools import count, islice
 
 import numpy as np
 import pytest
 import yaml
 
+from benchmarks.worlds.hidden_b import cases
+from benchmarks.worlds.hidden_b.facts import arguments, draw_facts
+from benchmarks.worlds.hidden_b.voyage import sail
 from shipdrag_ros.samples import Channel
 
 FEW = tuple(range(12))
 
 
-@pytest.fixture(scope='module')
-def cases():
-    from benchmarks.worlds.hidden_b import cases
-
-    return cases
-
-
-def test_a_seed_and_a_number_make_a_case(cases) -> None:
+def test_a_seed_and_a_number_make_a_case() -> None:
     one = cases.observe(3)
     cases._case.cache_clear()
     again, other = cases.observe(3), cases.observe(3, seed=5)
@@ -32,7 +29,7 @@ def test_a_seed_and_a_number_make_a_case(cases) -> None:
         assert np.array_equal(series.stamp_ns, again.runs[0][name].stamp_ns)
 
 
-def test_what_is_measured_besides_changes_nothing_else(cases) -> None:
+def test_what_is_measured_besides_changes_nothing_else() -> None:
     number = next(n for n in FEW if cases.condition(n).runs == 1)
     few, all_of_it = cases.observe(number), cases.observe(number, added=cases.TESTS)
     assert len(all_of_it.runs) == 2
@@ -41,25 +38,25 @@ def test_what_is_measured_besides_changes_nothing_else(cases) -> None:
         assert np.array_equal(series.value, all_of_it.runs[0][name].value)
 
 
-def test_the_halves_hold_the_same(cases) -> None:
+def test_the_halves_hold_the_same() -> None:
     plans = cases.plans_of(cases.SEED)
     assert Counter(plans[::2]) == Counter(plans[1::2])
     assert {condition.runs for _, condition in plans} == {1, 2, 3}
     assert len({names for names, _ in plans}) >= 19 + 8 + 8 + 1
 
 
-def test_weather_of_every_day_moves_r_by_less_than_a_percent(cases) -> None:
+def test_weather_of_every_day_moves_r_by_less_than_a_percent() -> None:
     assert max(cases.everyday(n) for n in FEW) < 0.01
 
 
-def test_what_is_hidden_matters(cases) -> None:
+def test_what_is_hidden_matters() -> None:
     sizes = [size for n in range(40) for size in cases.reveal(n).r_change.values()]
     assert min(sizes) >= 0.9 * cases.LEAST
     assert max(sizes) <= 1.1 * cases.MOST
 
 
 @pytest.mark.parametrize('number', FEW)
-def test_readings_are_plausible(cases, number) -> None:
+def test_readings_are_plausible(number) -> None:
     seen = cases.observe(number, added=cases.TESTS)
     ship = yaml.safe_load(seen.ship_file)
     assert {'length_m', 'displaced_volume_m3', 'added_mass', 'baseline'} <= set(ship)
@@ -91,11 +88,7 @@ def test_readings_are_plausible(cases, number) -> None:
             assert np.hypot(*over_ground) == pytest.approx(first, rel=0.4)
 
 
-def test_true_r_is_what_the_ship_does(cases) -> None:
-    from dataclasses import replace
-
-    from benchmarks.worlds.hidden_b.voyage import sail
-
+def test_true_r_is_what_the_ship_does() -> None:
     for number in islice((n for n in count() if not cases.reveal(n).what), 6):
         setting = cases._case(number, cases.SEED).settings[0]
         none = replace(setting.weather, wind=(0.0, 0.0), flow=(0.0, 0.0), tide=(0.0, 0.0, 0.0))
@@ -109,9 +102,7 @@ def test_true_r_is_what_the_ship_does(cases) -> None:
         assert np.median(np.abs(slowing[use] - true)) < 0.01 * largest
 
 
-def test_facts_are_mostly_true(cases) -> None:
-    from benchmarks.worlds.hidden_b.facts import arguments, draw_facts
-
+def test_facts_are_mostly_true() -> None:
     rng = np.random.default_rng(0)
     told = lies = with_cable = 0
     for _ in range(2000):

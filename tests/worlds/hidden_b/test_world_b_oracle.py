@@ -8,22 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.diagnosis_score import diagnosis
+from benchmarks.worlds.hidden_b import cases
+from benchmarks.worlds.hidden_b.instruments import Series
+from benchmarks.worlds.hidden_b.measure import quiet
+from benchmarks.worlds.hidden_b.oracle_rows import _means
+from benchmarks.worlds.hidden_b.oracle_sail import made, quick, run_of, stated
+from benchmarks.worlds.hidden_b.voyage import sail
+
 # even, one run: a stream, a radar that is wrong in scale, and nothing
 CURRENT, SCALE, NOTHING = 4, 188, 34
 
 
-@pytest.fixture(scope='module')
-def cases():
-    from benchmarks.worlds.hidden_b import cases
-
-    return cases
-
-
-def test_it_sails_as_the_generator_does(cases) -> None:
-    from benchmarks.worlds.hidden_b.measure import quiet
-    from benchmarks.worlds.hidden_b.oracle_sail import quick
-    from benchmarks.worlds.hidden_b.voyage import sail
-
+def test_it_sails_as_the_generator_does() -> None:
     for number in (2, 18):  # a free shaft with thrust left in wind; controllable pitch
         setting = quiet(cases._case(number, cases.SEED).settings[0])
         setting = replace(setting, coast_s=0.5 * setting.coast_s)
@@ -34,7 +31,7 @@ def test_it_sails_as_the_generator_does(cases) -> None:
         assert found.place_m == pytest.approx(true.place_m, abs=1e-6)
 
 
-def test_it_is_told_nothing_of_what_is_hidden(cases) -> None:
+def test_it_is_told_nothing_of_what_is_hidden() -> None:
     told, setting = cases.known(CURRENT), cases._case(CURRENT, cases.SEED).settings[0]
     assert not told.hull.still_n.any()
     assert told.hull.n_r == told.kit.log_scale == told.kit.log_offset_m_s == 0.0
@@ -42,9 +39,7 @@ def test_it_is_told_nothing_of_what_is_hidden(cases) -> None:
 
 
 @pytest.mark.parametrize('number', [SCALE, NOTHING])
-def test_it_names_what_is_plain_and_nothing_where_nothing_is(cases, number) -> None:
-    from benchmarks.accuracy.diagnosis_score import diagnosis
-
+def test_it_names_what_is_plain_and_nothing_where_nothing_is(number) -> None:
     found, _ = diagnosis('oracle', 'blocks', number, 'b')(cases.observe(number))
     assert sum(each['probability'] for each in found['candidates']) > 0.98
     true = cases.reveal(number).names
@@ -52,9 +47,7 @@ def test_it_names_what_is_plain_and_nothing_where_nothing_is(cases, number) -> N
     assert tuple(effect['name'] for effect in found['effects']) == true
 
 
-def test_fouling_is_of_any_size_and_not_in_steps(cases) -> None:
-    from benchmarks.worlds.hidden_b.oracle_sail import made, run_of, stated
-
+def test_fouling_is_of_any_size_and_not_in_steps() -> None:
     known = cases.known(CURRENT)
     hull = stated(cases.observe(CURRENT).ship_file, known).hull
 
@@ -70,10 +63,7 @@ def test_fouling_is_of_any_size_and_not_in_steps(cases) -> None:
     assert np.all(np.diff([drag(f) for f in factors]) > 0.0)
 
 
-def test_a_mean_is_of_the_readings_that_are_there(cases) -> None:
-    from benchmarks.worlds.hidden_b.instruments import Series
-    from benchmarks.worlds.hidden_b.oracle_rows import _means
-
+def test_a_mean_is_of_the_readings_that_are_there() -> None:
     t = np.arange(0.0, 100.0, 1.0)
     t = t[(t < 11.0) | (t > 22.0)]  # a gap of a kind that every source has
     grid = np.linspace(0.0, 100.0, 1001)

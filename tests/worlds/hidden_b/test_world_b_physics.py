@@ -10,14 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.worlds.hidden_b import cases, hulls
+from benchmarks.worlds.hidden_b.voyage import sail
+from benchmarks.worlds.hidden_b.weather import Sinusoids, gusts
+
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'hidden_b'
 
 
 @pytest.fixture(scope='module')
 def base():
     """One quiet run with nothing hidden."""
-    from benchmarks.worlds.hidden_b import cases
-
     number = next(n for n in range(200) if not cases.plans_of(cases.SEED)[n][0])
     setting = cases._case(number, cases.SEED).settings[0]
     calm = replace(
@@ -40,8 +42,6 @@ def test_it_shares_no_code(path: Path) -> None:
 
 @pytest.mark.parametrize('drive', ['declutched', 'direct', 'electric', 'cpp', 'locked', 'folding'])
 def test_work_is_the_energy_that_is_lost(base, drive) -> None:
-    from benchmarks.worlds.hidden_b.voyage import sail
-
     screw = replace(base.screw, drive=drive, hold='torque')
     track = sail(replace(base, screw=screw))
     u, inertia = track.water_m_s, base.mass_kg * (1.0 + base.n_r)
@@ -50,8 +50,6 @@ def test_work_is_the_energy_that_is_lost(base, drive) -> None:
 
 
 def test_a_square_law_slows_as_it_must(base) -> None:
-    from benchmarks.worlds.hidden_b.voyage import sail
-
     factor = 0.02 / base.speed_m_s * base.mass_kg
     screw = replace(base.screw, drive='folding', ramp_s=1e-3, stagger_s=0.0)
     setting = replace(base, screw=screw, still=[lambda _, v, r: factor * v**2], coast_s=200.0)
@@ -65,16 +63,12 @@ def test_a_square_law_slows_as_it_must(base) -> None:
 
 @pytest.mark.parametrize('hold', ['torque', 'power', 'revs'])
 def test_the_engine_holds_her_speed(base, hold) -> None:
-    from benchmarks.worlds.hidden_b.voyage import sail
-
     screw = replace(base.screw, hold=hold, drive='declutched')
     track = sail(replace(base, screw=screw, coast_s=1.0, quiet=False, **_still(base)))
     assert np.ptp(track.water_m_s) < 0.01 * base.speed_m_s
 
 
 def _still(base):
-    from benchmarks.worlds.hidden_b.weather import Sinusoids
-
     none = Sinusoids(np.zeros(1), np.ones(1), np.zeros(1))
     return {'weather': replace(base.weather, eddies=(none, none))}
 
@@ -110,8 +104,6 @@ def test_engine_friction_stops_the_shaft_below_a_speed(base) -> None:
 
 
 def test_hull_laws() -> None:
-    from benchmarks.worlds.hidden_b import hulls
-
     reynolds = np.geomspace(3e6, 2e9, 20)
     assert hulls.katsui(reynolds) == pytest.approx(hulls.ittc57(reynolds), rel=0.09)
     thin, thick = (hulls.michell_integral(20.0, b, 1.2, 4.5) for b in (2.0, 4.0))
@@ -131,8 +123,6 @@ def test_hull_laws() -> None:
 
 @pytest.mark.parametrize('law', ['karman', 'davenport'])
 def test_gusts_have_their_size_and_die_out_at_high_frequency(law) -> None:
-    from benchmarks.worlds.hidden_b.weather import gusts
-
     wind = gusts(np.random.default_rng(1), law, 8.0, 10.0, 1.5)
     assert np.sum(wind.size**2 / 2) == pytest.approx(1.5**2)
     f = wind.omega / (2 * np.pi)
@@ -140,8 +130,6 @@ def test_gusts_have_their_size_and_die_out_at_high_frequency(law) -> None:
 
 
 def test_a_tide_carries_her_along_and_a_front_does_not(base) -> None:
-    from benchmarks.worlds.hidden_b.voyage import sail
-
     ground, water = [], []
     for change in ({}, {'shear': [lambda t: 0.5 * np.clip(t / 60.0, 0.0, 1.0)]}):
         track = sail(replace(base, **change))

@@ -6,13 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.accuracy import band_score, diagnosis_score
+from benchmarks.worlds.hidden_b import cases
+
 NOTHING = {'verdict': 'none', 'effects': [], 'candidates': [{'names': [], 'probability': 1.0}]}
 
 
 def test_the_scoreboard_asks_and_reveals_world_b(monkeypatch) -> None:
-    from benchmarks.accuracy import diagnosis_score
-    from benchmarks.worlds.hidden_b import cases
-
     seen = []
 
     def by(*_):
@@ -30,8 +30,6 @@ def test_the_scoreboard_asks_and_reveals_world_b(monkeypatch) -> None:
 @pytest.mark.parametrize('name', ['a', 'b'])
 @pytest.mark.parametrize(('off', 'cover', 'chi2'), [(0.0, 1.0, 0.0), (3.0, 0.0, 9.0)])
 def test_the_band_is_held_against_the_true_curve(off, cover, chi2, name) -> None:
-    from benchmarks.accuracy import band_score
-
     world = getattr(band_score.World, name)()
     number = band_score.chosen(world, 'odd', 'own', 0, 1)[0]
     first, stop = world.first_speed(number, 0), world.stops_ns(number)[0]
@@ -59,9 +57,6 @@ def test_the_band_is_held_against_the_true_curve(off, cover, chi2, name) -> None
 
 
 def test_odd_cases_are_odd() -> None:
-    from benchmarks.accuracy import band_score
-    from benchmarks.worlds.hidden_b import cases
-
     numbers = band_score.chosen(band_score.World.b(), 'odd', 'nothing', 0, 20)
     assert len(numbers) == 20
     assert all(number % 2 for number in numbers)

@@ -10,6 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.worlds.propulsion.cases import Case
+from benchmarks.worlds.propulsion.drive import CLUTCHED, Mode, steady
+from benchmarks.worlds.propulsion.motion import Hold, Orders, Surroundings, move
+from benchmarks.worlds.propulsion.propeller import (
+    AREA_RATIO,
+    open_water,
+    thrust_and_torque,
+    windmilling,
+)
+from benchmarks.worlds.propulsion.score import INPUTS, score
+from benchmarks.worlds.propulsion.world import build
+
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'propulsion'
 DOORS = {
     'shipdrag_ros.coastdown',
@@ -23,9 +35,6 @@ KINDS = ('declutched', 'direct drive, fuel cut', 'declutched, shaft locked')
 
 @pytest.fixture(scope='module')
 def glides():
-    from benchmarks.worlds.propulsion.cases import Case
-    from benchmarks.worlds.propulsion.world import build
-
     return {
         (kind, hull): build(Case(kind, hull, 'calm', 3))
         for kind in KINDS
@@ -49,8 +58,6 @@ def test_shares_only_the_doors() -> None:
 
 @pytest.mark.skipif('SHIPDRAG_DATA' not in os.environ, reason='measured data are not here')
 def test_propeller_is_like_a_measured_one_in_four_quadrants() -> None:
-    from benchmarks.worlds.propulsion.propeller import AREA_RATIO, thrust_and_torque
-
     path = Path(os.environ['SHIPDRAG_DATA']) / 'wageningen_B4-70_fourquadrant_fourier.csv'
     k, *series = np.loadtxt(path, delimiter=',', skiprows=1).T
     angles = np.linspace(0.0, 2 * np.pi, 73)
@@ -69,8 +76,6 @@ def test_propeller_is_like_a_measured_one_in_four_quadrants() -> None:
 
 
 def test_propeller_drives_with_the_efficiency_of_one() -> None:
-    from benchmarks.worlds.propulsion.propeller import open_water
-
     for pitch in (0.7, 0.9, 1.1):
         best = 0.0
         for advance in np.linspace(0.05, 1.2, 60):
@@ -80,8 +85,6 @@ def test_propeller_drives_with_the_efficiency_of_one() -> None:
 
 
 def test_no_quadrant_makes_power() -> None:
-    from benchmarks.worlds.propulsion.propeller import thrust_and_torque
-
     for pitch in (-0.6, 0.0, 0.8, 1.1):
         for angle in np.linspace(-np.pi, np.pi, 73):
             advance, omega = 5.0 * np.sin(angle), 14.0 * np.cos(angle)
@@ -90,8 +93,6 @@ def test_no_quadrant_makes_power() -> None:
 
 
 def test_locked_drags_more_than_windmilling() -> None:
-    from benchmarks.worlds.propulsion.propeller import thrust_and_torque, windmilling
-
     for pitch in (0.7, 0.9, 1.1):
         free = thrust_and_torque(4.0, windmilling(4.0, pitch, 3.0), pitch, 3.0)[0]
         locked = thrust_and_torque(4.0, 0.0, pitch, 3.0)[0]
@@ -135,10 +136,6 @@ def test_what_the_hull_loses_is_what_the_forces_take(glides) -> None:
 
 
 def test_locked_shaft_shortens_the_glide() -> None:
-    from benchmarks.worlds.propulsion.cases import Case
-    from benchmarks.worlds.propulsion.drive import CLUTCHED, Mode, steady
-    from benchmarks.worlds.propulsion.motion import Hold, Orders, Surroundings, move
-
     hull = Case('declutched', 'ferry', 'calm', 1).ship
     n = 700
     still = np.zeros((2, n))
@@ -158,9 +155,6 @@ def test_locked_shaft_shortens_the_glide() -> None:
 
 
 def test_a_case_is_its_name_and_seed() -> None:
-    from benchmarks.worlds.propulsion.cases import Case
-    from benchmarks.worlds.propulsion.world import build
-
     a, b, c = (build(Case('declutched', 'ferry', 'rough', seed)) for seed in (5, 5, 6))
     assert np.array_equal(a.blocks['log'][0].value, b.blocks['log'][0].value)
     assert a.truth.glide == b.truth.glide != c.truth.glide
@@ -173,8 +167,5 @@ def test_a_filtered_log_and_wandering_positions_together_are_no_force(
     kind: str, hull: str, seed: int
 ) -> None:
     # r was off by 0.68 and 1.16 of its largest where each input alone was right
-    from benchmarks.worlds.propulsion.cases import Case
-    from benchmarks.worlds.propulsion.score import INPUTS, score
-
     rms = {row.suite: row.rms for row in score(Case(kind, hull, 'calm', seed), INPUTS)}
     assert rms['both'] < 2.0 * max(rms['log'], rms['track'], 0.01)
