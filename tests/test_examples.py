@@ -123,13 +123,7 @@ def nmea(second: int) -> str:
         f'GPRMC,1200{second:02d}.00,A,4612.909,N,00610.158,E,05.0,003,280224,,,A',
         'VWVHW,,T,,M,5.0,N,,K',
     )
-    lines = []
-    for body in bodies:
-        check = 0
-        for byte in body.encode():
-            check ^= byte
-        lines.append(f'${body}*{check:02X}\r\n')
-    return ''.join(lines)
+    return ''.join(f'{log_samples.sentence(body)}\r\n' for body in bodies)
 
 
 @pytest.fixture

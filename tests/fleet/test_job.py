@@ -16,6 +16,7 @@ from shipdrag_ros.fleet.find import BagToRead, Beside
 from shipdrag_ros.fleet.job import _name, work
 from shipdrag_ros.fleet.rows import FROUDE, BagResult
 from shipdrag_ros.ship import Ship
+from tests.sources.log_samples import sentence
 
 from .conftest import SHIP, job_of, only_source
 
@@ -113,11 +114,8 @@ def test_a_log_and_a_table_are_read_without_options(tmp_path: Path) -> None:
     lines = []
     for t, v in zip(seconds.tolist(), speed, strict=True):
         clock = f'{12 + t // 3600:02d}{t // 60 % 60:02d}{t % 60:02d}.00'
-        for body in (f'GPZDA,{clock},01,03,2026,00,00', f'VWVHW,,T,,M,{v / 0.514444:.3f},N,,K'):
-            check = 0
-            for byte in body.encode():
-                check ^= byte
-            lines.append(f'${body}*{check:02X}')
+        lines.append(sentence(f'GPZDA,{clock},01,03,2026,00,00'))
+        lines.append(sentence(f'VWVHW,,T,,M,{v / 0.514444:.3f},N,,K'))
     (tmp_path / 'day.nmea').write_text('\r\n'.join(lines) + '\r\n')
     for name in ('log.csv', 'day.nmea'):
         result = done(tmp_path / name)

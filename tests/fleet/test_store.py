@@ -45,14 +45,6 @@ def result(ship: str | None, digest: str, *, many: int = 1, error: str | None = 
     return BagResult(bag, tuple(rows))
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob('*'))
-        if path.is_file()
-    }
-
-
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     store = Store(tmp_path)
     for number, ship in enumerate(SHIPS):
@@ -83,16 +75,6 @@ def test_other_tools_read_the_partitions(tmp_path: Path) -> None:
         'hive_partitioning=true) GROUP BY ship ORDER BY ship'
     )
     assert duckdb.sql(question).fetchall() == [('Alder', 2), ('Vitus Bering', 2)]
-
-
-def test_the_same_rows_are_the_same_bytes(tmp_path: Path) -> None:
-    for name in ('a', 'b'):
-        store = Store(tmp_path / name)
-        store.write(result('Vitus Bering', '0' * 64, many=3))
-    assert contents(tmp_path / 'a') == contents(tmp_path / 'b') != {}
-    before = contents(tmp_path / 'a')
-    Store(tmp_path / 'a').write(result('Vitus Bering', '0' * 64, many=3))
-    assert contents(tmp_path / 'a') == before
 
 
 def test_new_rows_of_a_bag_replace_the_former(tmp_path: Path) -> None:
