@@ -49,15 +49,15 @@ def test_names_sets_and_alarms_are_counted() -> None:
     unknown = _found('unknown', candidates=[(['unknown'], 1.0)])
     scores = scoring.scores(
         [
-            _trial(scoring, named, 'current'),
-            _trial(scoring, named, 'wind'),
-            _trial(scoring, _found('one_of', candidates=three), 'current'),
-            _trial(scoring, _found('one_of', candidates=four), 'current'),
-            _trial(scoring, _found('none', candidates=[([], 0.9)]), kind='none', shelf=0),
-            _trial(scoring, named, kind='none', shelf=0),
-            _trial(scoring, unknown, 'ice field', kind='outside', shelf=0),
-            _trial(scoring, named, 'ice field', kind='outside', shelf=0),
-            _trial(scoring, _found('one_of', candidates=pair), 'current', 'fouling', kind='pair'),
+            _trial(named, 'current'),
+            _trial(named, 'wind'),
+            _trial(_found('one_of', candidates=three), 'current'),
+            _trial(_found('one_of', candidates=four), 'current'),
+            _trial(_found('none', candidates=[([], 0.9)]), kind='none', shelf=0),
+            _trial(named, kind='none', shelf=0),
+            _trial(unknown, 'ice field', kind='outside', shelf=0),
+            _trial(named, 'ice field', kind='outside', shelf=0),
+            _trial(_found('one_of', candidates=pair), 'current', 'fouling', kind='pair'),
         ]
     )
     assert _share(scores, 'precision of a name') == (1, 2)
@@ -78,9 +78,9 @@ def test_parameters_and_held_out_runs_count_for_right_names_alone() -> None:
     far = {'current': {'along_track_m_s': 0.45}}
     scores = scoring.scores(
         [
-            _trial(scoring, found, 'current', parameters=near),
-            _trial(scoring, found, 'current', parameters=far),
-            _trial(scoring, found, 'wind', parameters={'wind': {'head_m_s': 4.0}}),
+            _trial(found, 'current', parameters=near),
+            _trial(found, 'current', parameters=far),
+            _trial(found, 'wind', parameters={'wind': {'head_m_s': 4.0}}),
         ]
     )
     assert _share(scores, 'parameters within 2 sd') == (1, 2)
@@ -96,9 +96,9 @@ def test_a_recommendation_counts_where_anything_resolves() -> None:
     named = _found('named', effects=['current'])
     scores = scoring.scores(
         [
-            _trial(scoring, one_of, 'current', followed=named, everything=named),
-            _trial(scoring, one_of, 'current', followed=one_of, everything=named),
-            _trial(scoring, one_of, 'current', followed=one_of, everything=one_of),
+            _trial(one_of, 'current', followed=named, everything=named),
+            _trial(one_of, 'current', followed=one_of, everything=named),
+            _trial(one_of, 'current', followed=one_of, everything=one_of),
         ]
     )
     name = 'recommended test resolves, of what anything resolves'
