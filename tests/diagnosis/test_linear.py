@@ -19,7 +19,9 @@ from tests.runs import coasted
 
 @pytest.fixture(scope='module')
 def seen() -> Observation:
-    run = coasted(heading_rad=0.7, seed=5)
+    context = ('speed_over_ground', 'heading', 'shaft', 'wind_apparent', 'depth')
+    inputs = ('speed_through_water', 'position', *context)
+    run = coasted(heading_rad=0.7, inputs=inputs, seed=5)
     return Observation.of(run.window, SHIP, Parameters(), name='run')
 
 
