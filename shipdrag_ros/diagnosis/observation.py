@@ -76,7 +76,7 @@ class Observation:
     stop_sd_s
         How well the time of the stop, at the end of the lead-in, is known.
     run_down_s, run_down_sd_s
-        Of the thrust: as the ship file states it, else as the shaft shows it.
+        Of the shaft: as the ship file states it, else as it was seen; 0: not known.
     heading_rad, heading_sd_rad
         Direction through water in the lead-in, from east, anticlockwise.
     speed_m_s
@@ -195,7 +195,7 @@ class Observation:
             lead_in_s,
             times,
             run_down.stop_sd_s,
-            *(_stated_run_down(ship) or (run_down.run_down_s, run_down.run_down_sd_s)),
+            *(_stated_run_down(ship) or (run_down.shaft_s, run_down.shaft_sd_s)),
             heading_rad,
             heading_sd,
             speed,
@@ -225,7 +225,7 @@ def _stopped(window: Window, run_down: RunDown, record: RunRows) -> RunDown:
                 np.asarray((both.time_ns - run_down.stop_ns) * 1e-9, np.float64),
                 both.value,
                 sd_m_s=record.white_sd[input_],
-                run_down_s=run_down.run_down_s,
+                run_down_s=run_down.shaft_s,
             )
             return replace(run_down, stop_ns=run_down.stop_ns + round(stop_s * 1e9))
     return run_down

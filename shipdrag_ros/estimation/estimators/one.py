@@ -150,7 +150,7 @@ def estimate(
         np.concatenate([record.steady_variance(), variance]),
         len(steady.time_s),
         ship,
-        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s),
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
         weather=weather,
