@@ -18,6 +18,7 @@ from shipdrag_ros.diagnosis.measured import Measured, damping_of, whitener_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.steady import BIN_S
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import POSITION, Rows
@@ -161,7 +162,8 @@ class Observation:
                 'that begins earlier'
             )
         speed_m_s = _speed(record.steady)
-        since_ns = run_down.stop_ns + round(float(record.steady.time_s[0]) * 1e9)
+        # the first mean is of as much time at most
+        since_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
         if run_down.stop_sd_s > _KNOWN_S:
             run_down = _stopped(window, run_down, record)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
