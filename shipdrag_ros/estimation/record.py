@@ -20,13 +20,14 @@ from shipdrag_ros.estimation.steady import (
     weighted_white_sd,
 )
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows, bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64, Int64
 
 LEAST_STAMPS = 12  # of an input: fewer do not show its noise
+_ALIKE_S = 12.0  # beyond which such errors are as good as independent
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 _WeightedRows = tuple[Float64, int, Float64, Float64]
 
@@ -196,7 +197,13 @@ def _condensed(
         both = _distance(both_s, both) if heading_rad is None else _ahead(both, heading_rad)
     before, value = both[: len(before_s)], both[len(before_s) :]
     weight = stated_weight(both_s, both, np.concatenate([variance, series.variance]))
-    white_sd = known_sd or max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
+    white_sd = max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
+    if not _is_place(name) and len(before_s):
+        # behind a filter, and in a swell, readings err alike for seconds
+        edges = np.arange(before_s[0], before_s[-1], _ALIKE_S)
+        _, means, counts = bin_means(before_s, before, edges)
+        white_sd = max(white_sd, weighted_white_sd(means, counts.astype(np.float64)))
+    white_sd = known_sd or white_sd
     steady: _WeightedRows | None = None
     if len(before_s):
         means = steady_means(before_s, before, weight[: len(before_s)], _FINE_S)
