@@ -201,8 +201,8 @@ def _condensed(
     if not _is_place(name) and len(before_s):
         # behind a filter, and in a swell, readings err alike for seconds
         edges = np.arange(before_s[0], before_s[-1], _ALIKE_S)
-        _, means, counts = bin_means(before_s, before, edges)
-        white_sd = max(white_sd, weighted_white_sd(means, counts.astype(np.float64)))
+        _, each, count = bin_means(before_s, before, edges)
+        white_sd = max(white_sd, weighted_white_sd(each, count.astype(np.float64)))
     white_sd = known_sd or white_sd
     steady: _WeightedRows | None = None
     if len(before_s):
