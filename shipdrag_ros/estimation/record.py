@@ -28,6 +28,7 @@ from shipdrag_ros.samples import Float64, Int64
 
 LEAST_STAMPS = 12  # of an input: fewer do not show its noise
 _ALIKE_S = 12.0  # beyond which such errors are as good as independent
+_LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 _WeightedRows = tuple[Float64, int, Float64, Float64]
 
@@ -154,14 +155,20 @@ class RunRows:
         quick
             Whether fewer means will do.
         """
-        hidden = np.zeros(len(CODES))
-        for name, sd in self.display_sd.items():  # a steady speed stays on one digit
-            hidden[CODES[name]] = sd**2
-        before = self._variance(self.steady, self.steady_weight) + hidden[self.steady.kind]
         white = self._variance(self.coast, self.coast_weight)
         coast, after = condense(self.coast, white, speed_m_s, halved_s, quick=quick)
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(self.steady, coast)))
-        return rows, np.concatenate([before, after])
+        before = self._variance(self.steady, self.steady_weight)
+        variance: Float64 = np.concatenate([before, after])
+        for name, hidden in self.display_sd.items():
+            own = rows.kind == CODES[name]
+            if hidden > _LEAST_DISPLAY * self.white_sd[name] and own.sum() > 1:
+                # rounding errs alike while a speed stays on one digit; as many errors are
+                # independent as digits are passed
+                count = self.white_sd[name] ** 2 / variance[own]
+                passed = np.abs(np.gradient(rows.value[own])) / math.sqrt(12.0) / hidden
+                variance[own] += hidden**2 / np.clip(passed**2, 1.0, np.maximum(count, 1.0))
+        return rows, variance
 
 
 class _InputRows(NamedTuple):
