@@ -27,7 +27,6 @@ class Shape(StrEnum):
 
     NORMAL = 'normal'
     HALF_NORMAL = 'half-normal'
-    HEAVY_TAILED = 'normal, in one case of ten three times wider'
     LOG_NORMAL = 'log-normal'
     EITHER_SIGN = 'log-normal in size, of either sign'
     UNIFORM = 'uniform'
@@ -48,7 +47,7 @@ class Prior:
     ----------
     shape
     first, second
-        Mean and sd of a normal one, heavy-tailed or not; 0 and sd of the normal
+        Mean and sd of a normal one; 0 and sd of the normal
         of a half-normal one; median and sd of the logarithm, of the size where
         either sign is alike; ends of a uniform one; the two values of a choice;
         origin and unit of a flat one.
@@ -68,10 +67,6 @@ class Prior:
                 return _log_normal((value - a) / b) - math.log(b)
             case Shape.HALF_NORMAL:
                 return math.log(2.0 / b) + _log_normal(value / b) if value >= 0.0 else -math.inf
-            case Shape.HEAVY_TAILED:
-                z = (value - a) / b
-                narrow = math.log(1.0 - WIDER_CHANCE) + _log_normal(z) - math.log(b)
-                return narrow + float(np.logaddexp(0.0, _log_odds_wider(z)))
             case Shape.LOG_NORMAL:
                 if value * a <= 0.0:
                     return -math.inf
@@ -100,9 +95,6 @@ class Prior:
                 return float(rng.normal(a, b))
             case Shape.HALF_NORMAL:
                 return float(abs(rng.normal(0.0, b)))
-            case Shape.HEAVY_TAILED:
-                wider = WIDER if rng.random() < WIDER_CHANCE else 1.0
-                return float(rng.normal(a, wider * b))
             case Shape.LOG_NORMAL:
                 return float(a * math.exp(b * rng.standard_normal()))
             case Shape.EITHER_SIGN:
@@ -172,31 +164,6 @@ class Prior:
             case _:
                 return b
 
-    def penalty(self, z: float) -> float:
-        """
-        Return -2 ln of the density of z, less a constant.
-        """
-        match self.shape:
-            case Shape.FLAT:
-                return 0.0
-            case Shape.HEAVY_TAILED:
-                return z * z - 2.0 * float(np.logaddexp(0.0, _log_odds_wider(z)))
-            case _:
-                return z * z
-
-    def weight(self, z: float) -> float:
-        """
-        Return the precision that gives the slope of the penalty at z.
-        """
-        match self.shape:
-            case Shape.FLAT:
-                return 0.0
-            case Shape.HEAVY_TAILED:
-                wider = 1.0 / (1.0 + math.exp(-min(_log_odds_wider(z), 700.0)))
-                return 1.0 - wider * (1.0 - 1.0 / WIDER**2)
-            case _:
-                return 1.0
-
     def scaled(self, factor: float) -> Prior:
         """
         Return the prior of a quantity that is so many times larger.
@@ -220,8 +187,6 @@ class Prior:
                 return f'normal, {a:g} ± {b:g}'
             case Shape.HALF_NORMAL:
                 return f'half-normal, 0 + {b:g}'
-            case Shape.HEAVY_TAILED:
-                return f'heavy-tailed normal, {a:g} ± {b:g}'
             case Shape.LOG_NORMAL:
                 return f'log-normal, median {a:g}, factor {math.exp(b):.2g}'
             case Shape.EITHER_SIGN:
@@ -246,13 +211,6 @@ def half_normal(sd: float) -> Prior:
     Expect 0 or more, small values most.
     """
     return Prior(Shape.HALF_NORMAL, 0.0, sd)
-
-
-def heavy_tailed(sd: float) -> Prior:
-    """
-    Expect either sign, and in one case of ten a size three times as large.
-    """
-    return Prior(Shape.HEAVY_TAILED, 0.0, sd)
 
 
 def log_normal(median: float, sd_of_log: float) -> Prior:
@@ -333,8 +291,6 @@ class Parameter:
         What may be given in place of a number.
     measured_in
         What value, prior and bounds are counted in; `of` makes them SI.
-    start
-        z that a fit begins from.
     """
 
     value: float = declare(number(-1e12, 1e12), 'value', default=math.nan)
@@ -347,7 +303,6 @@ class Parameter:
     high: float = field(default=math.inf, kw_only=True)
     words: Mapping[str, float] = field(default_factory=dict, kw_only=True, hash=False)
     measured_in: Scale = field(default=ABSOLUTE, kw_only=True)
-    start: float = field(default=0.0, kw_only=True)
 
     def of(self, ship: Any) -> Parameter:
         """
@@ -385,18 +340,5 @@ class Parameter:
         return self.low <= value <= self.high
 
 
-def free(name: str, prior: Prior) -> Parameter:
-    """
-    Return a parameter that is left to the data.
-    """
-    return Parameter(name=name, prior=prior)
-
-
 def _log_normal(standard: float) -> float:
     return -0.5 * standard * standard - 0.5 * math.log(2.0 * math.pi)
-
-
-def _log_odds_wider(z: float) -> float:
-    """Return the logarithm of the odds that what is z off is of the wider normal."""
-    before = math.log(WIDER_CHANCE / (WIDER * (1.0 - WIDER_CHANCE)))
-    return before + 0.5 * z * z * (1.0 - 1.0 / WIDER**2)

@@ -282,7 +282,7 @@ def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOut
         seen = [RunDown.of(window, case.ship) for window in windows]
         sd = {
             motion.STOP: [each.stop_sd_s for each in seen],
-            motion.TAU: [each.run_down_sd_s / max(each.run_down_s, 1e-3) for each in seen],
+            motion.TAU: [each.shaft_sd_s / max(each.shaft_s, 1e-3) for each in seen],
         }
         found.append((with_known(case.comparing, fits, outcomes, sd), values))
     (where_turning, values), (where_standing, _) = found

@@ -136,4 +136,4 @@ def _besides(force: DiagnosisResult) -> str:
         for each in force.candidates
         if each.names
     )
-    return f'in the force besides, compared with a form fitted to the runs: {likely}'
+    return f'in the force besides, compared with all hulls of her length and volume: {likely}'

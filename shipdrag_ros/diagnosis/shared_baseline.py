@@ -15,13 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit
 
 from shipdrag_ros.diagnosis.observation import CoastRun, Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.inference.linear import Factored
-from shipdrag_ros.parameter import heavy_tailed
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.samples import Float64
@@ -322,8 +323,10 @@ class SharedBaseline:
         """Return what runs share, with the prior of the baseline."""
         away = self.z(None) - self.mean
         weight = np.ones(len(away))
-        for i in range(len(self.names)):  # a baseline may be far worse than it says
-            weight[i] = heavy_tailed(1.0).weight(float(away[i]))
+        n = len(self.names)  # a baseline may be far worse than it says
+        log_odds = np.log(WIDER * (1.0 - WIDER_CHANCE) / WIDER_CHANCE)
+        wider = expit(0.5 * away[:n] ** 2 * (1.0 - WIDER**-2) - log_odds)
+        weight[:n] = 1.0 - wider * (1.0 - WIDER**-2)
         prior = Normal(np.diag(weight), -weight * away)
         return share(normals, prior, self.along, usual_scatter=float(self.unit[0]))
 

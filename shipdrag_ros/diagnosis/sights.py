@@ -86,10 +86,16 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     steady = int(np.searchsorted(along.rows.time_s, run.lead_in_s))
     stop = StopPrior(max(run.stop_sd_s, 1e-3), run.run_down_s, run.run_down_sd_s)
     own = replace(run.ship, baseline=ship.baseline)  # as heavy as she was in this run
-    model = RunModel.of(rows, along.variance, steady, own, stop, speed_m_s=top, low_m_s=low)
-    start = model.start.copy()
-    start[model.coefficients] = run.speed_m_s
-    model = replace(model, start=start, speed_m_s=run.speed_m_s)
+    model = RunModel.of(
+        rows,
+        along.variance,
+        steady,
+        own,
+        stop,
+        speed_m_s=run.speed_m_s,
+        low_m_s=low,
+        top_m_s=top,
+    )
     across = run.across
     value, blocks = [run.context.value], [run.context.whitener]
     if across is not None:

@@ -287,7 +287,7 @@ def model(found: DiagnosisResult) -> str:
         case _ if of_log_track(found):
             return 'log as it is'
         case 'fitted_here':
-            return 'a form fitted to these runs'
+            return 'all hulls of her length and volume'
         case _:
             return 'model as stated'
 

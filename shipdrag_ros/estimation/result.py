@@ -115,7 +115,7 @@ class Estimate:
     start_ns, end_ns
         First and last stamp used [ns].
     order
-        Number of coefficients; None where orders are averaged.
+        Number of coefficients; None without an order.
     orders
         The order table.
     samples

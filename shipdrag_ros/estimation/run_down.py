@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import MAD_TO_SD
-from shipdrag_ros.posterior.priors import STOP
+from shipdrag_ros.posterior.priors import RUN_DOWN, STOP
 from shipdrag_ros.samples import SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
@@ -272,22 +272,17 @@ class RunDown:
         Time of the stop [ns].
     stop_sd_s
         Its standard deviation; 0: not fitted.
-    run_down_s, run_down_sd_s
-        Time constant of the thrust and its standard deviation, for a thrust
-        that falls as an exponential; 0: the thrust ended at once. The fit of
-        the motion takes `shaft_s` instead.
-    shaft_s
-        Time constant of the shaft; how the thrust follows it is fitted. 0: the
-        thrust ended at once.
+    shaft_s, shaft_sd_s
+        Time constant of the shaft and its standard deviation; how the thrust follows it is
+        fitted. 0: not known.
     notes
         A sentence each.
     """
 
     stop_ns: int
     stop_sd_s: float
-    run_down_s: float
-    run_down_sd_s: float
     shaft_s: float
+    shaft_sd_s: float
     notes: tuple[str, ...]
 
     @classmethod
@@ -296,8 +291,7 @@ class RunDown:
         Learn of the stop from shafts and pitches, or else take what the ship file states.
 
         Of several propellers the stop is that of the last; of shaft speed and
-        pitch of one, whichever falls first. Without `propulsion` in the ship
-        file the thrust may end at any time up to the run-down of the shaft.
+        pitch of one, whichever falls first.
         """
         falls = list(_falls(window))
         others = tuple(_others(window, {number for number, _, _ in falls}))
@@ -305,52 +299,42 @@ class RunDown:
             _, seen, fall = max(falls, key=lambda one: one[2].stop_s)
             others += tuple(_kept(window, falls))
             if window.before is not None or fall.stop_s <= _AT_START * fall.run_down_s:
-                return cls._of_fall(window, ship, seen, fall, others)
+                return cls._of_fall(window, seen, fall, others)
             # nothing is known of the speed before it
             note = (
                 f'{seen} shows an engine stop {fall.stop_s:.3g} s after the start of the window: '
                 'r is off by the thrust before it; give a window that begins after it'
             )
-            return cls(window.start_ns, 0.0, 0.0, 0.0, 0.0, (note, *others))
+            return cls(window.start_ns, 0.0, 0.0, 0.0, (note, *others))
         if window.before is None:
             note = 'the thrust is taken to have ended before the window'
-            return cls(window.start_ns, 0.0, 0.0, 0.0, 0.0, others or (note,))
+            return cls(window.start_ns, 0.0, 0.0, 0.0, others or (note,))
         if ship.propulsion is None:
-            note = 'the thrust is taken to end at once'
-            return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, 0.0, (note, *others))
+            note = (
+                f'neither shaft nor ship file says how the thrust ends: fitted, about '
+                f'{RUN_DOWN.mean:g} s beforehand (propulsion: in the ship file would say it)'
+            )
+            return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, (note, *others))
         run_down_s = ship.propulsion.run_down_s
         note = (
             f'the thrust is taken to end within about {run_down_s:.3g} s, by the ship file: how '
             'it does is fitted'
         )
-        return cls(
-            window.start_ns,
-            ONSET_SD_S,
-            run_down_s,
-            ship.propulsion.sd,
-            run_down_s,
-            (note, *others),
-        )
+        return cls(window.start_ns, ONSET_SD_S, run_down_s, ship.propulsion.sd, (note, *others))
 
     @classmethod
-    def _of_fall(
-        cls, window: Window, ship: Ship, seen: str, fall: Fall, others: tuple[str, ...]
-    ) -> RunDown:
+    def _of_fall(cls, window: Window, seen: str, fall: Fall, others: tuple[str, ...]) -> RunDown:
         notes = [f'{seen} shows the time of the stop']
         if fall.run_down_s > 0.0:
             notes = [
                 f'{seen} shows the stop and runs down in {fall.run_down_s:.2g} s; the thrust may '
                 'be gone at once or follow it: that is fitted, and in the band'
             ]
-        run_down_s, run_down_sd_s = fall.run_down_s, fall.run_down_sd_s
-        if ship.propulsion is None:
-            run_down_s = run_down_sd_s = 0.5 * run_down_s
         return cls(
             window.start_ns + round(fall.stop_s * 1e9),
             fall.stop_sd_s,
-            run_down_s,
-            run_down_sd_s,
             fall.run_down_s,
+            fall.run_down_sd_s,
             (*notes, *others),
         )
 

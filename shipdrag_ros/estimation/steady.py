@@ -146,7 +146,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
 
 
 @compiled
-def condense(
+def steady_means(
     time_s: Float64, value: Float64, weight: Float64, fine_s: float
 ) -> tuple[Float64, Float64, Float64]:
     """

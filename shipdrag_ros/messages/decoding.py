@@ -75,9 +75,8 @@ def decode(source: Source, payloads: Sequence[bytes], receive_ns: ArrayLike) -> 
     Returns
     -------
     Decoded
-            The samples (n,), the place of each among the messages, and how many messages could
-        not be
-        read: a message that is damaged is counted, not raised.
+        The samples (n,), the place of each among the messages, and how many messages could
+        not be read: a message that is damaged is counted, not raised.
 
     Raises
     ------

@@ -591,7 +591,11 @@ class Comparing:
         for j, table in enumerate(nothing.tables):
             run = self.runs.runs[j]
             n, p = table.along.shape[1], len(table.along) - 1
-            smooth = [self.runs.smooth(j, where, nothing.at) for where in self.smooth[1:]]
+            smooth = [
+                self.runs.smooth(j, where, nothing.at)
+                for where in self.smooth
+                if where != IN_SPEED  # which is a prior of the hull
+            ]
             lines = np.vstack([table.along, responses[j][taught][:, :n], *smooth])
             q = len(lines) - 1 - p
             means, precisions = [], []

@@ -197,7 +197,7 @@ class RunTable(NamedTuple):
     Attributes
     ----------
     along : (1 + l, n)
-        RunResidual, then derivatives of the prediction; not whitened.
+        Residual, then derivatives of the prediction; not whitened.
     rest : (1 + l, q)
         The same of what is measured besides, whitened.
     place : (l,)

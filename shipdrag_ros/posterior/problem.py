@@ -132,13 +132,6 @@ class RunModel:
         states = math.prod(len(each.states) for each in self.weather)
         return replace(self, families=self.families[::states])
 
-    @property
-    def widest(self) -> Family:
-        """The family that holds the coefficients least."""
-        return min(
-            self.families, key=lambda each: float(each.precision[: self.coefficients].sum())
-        )
-
     @classmethod
     def of(
         cls,
@@ -150,6 +143,7 @@ class RunModel:
         *,
         speed_m_s: float,
         low_m_s: float,
+        top_m_s: float = 0.0,
         weather: Weather | None = None,
     ) -> RunModel:
         """
@@ -167,10 +161,12 @@ class RunModel:
         stop
         speed_m_s, low_m_s
             At the stop and at the end, roughly.
+        top_m_s
+            Up to which the law reaches besides, for other runs.
         weather
             None: wind and depth are part of r.
         """
-        law = HullLaw.of(ship, low_m_s, speed_m_s)
+        law = HullLaw.of(ship, low_m_s, max(top_m_s, speed_m_s))
         tau_s = _tau_s(stop)
         adds = () if weather is None else weather.influences(ship, law.speed_m_s)
         forces = law.forces(ship, tau_s, adds)

@@ -159,7 +159,7 @@ COUNTED_IN = {
     'weight of the ship': 'rho*g*nabla',
 }
 """What sizes may be counted in, so that one prior serves ships of all sizes."""
-_NO_FORM = (Shape.HEAVY_TAILED, Shape.CHOICE, Shape.FLAT)  # that a file may state
+_NO_FORM = (Shape.CHOICE, Shape.FLAT)  # that a file may state
 PRIORS = {each.name.lower().replace('_', '-'): each for each in Shape if each not in _NO_FORM}
 _ANY = (-math.inf, math.inf)
 _MOST = 1e9  # of a number

@@ -120,7 +120,7 @@ class TimeColumn:
     given
         Whether the unit was given.
     order
-        Of year, month and day in a date, see `dates.ORDERS`; '' to be found.
+        Of year, month and day in a date, see `cells.ORDERS`; '' to be found.
     zone
         Of dates that state none.
     """
