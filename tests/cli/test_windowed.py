@@ -114,14 +114,15 @@ def test_overlapping_windows_are_shown_and_not_combined(
     assert 'Not combined: windows of' in capsys.readouterr().out
 
 
+@pytest.mark.parametrize('window', ['0:2400', '300:2400'])
 def test_a_window_may_hold_the_steady_lead(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], window: str
 ) -> None:
     ship = str(ROOT / 'config' / 'vitus_bering.yaml')
     lead = tmp_path / 'lead.mcap'
     assert main(['simulate', '--ship', ship, '-o', str(lead), '--lead-in', '900']) == 0
     capsys.readouterr()
-    assert main(['diagnose', f'{lead}@0:2400', '--ship', ship, '--json']) == 0
+    assert main(['diagnose', f'{lead}@{window}', '--ship', ship, '--json']) == 0
     assert json.loads(capsys.readouterr().out)['coastdowns_used'] == 1
 
 
