@@ -31,7 +31,8 @@ from shipdrag_ros.replay import (
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.playback import SHIP_FILE
-from shipdrag_ros.replay.told_stop import StopTime
+from shipdrag_ros.replay.told_stop import StopTime, told_beside
+from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
 
@@ -106,7 +107,7 @@ def diagnose_runs(
         alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
     )
     unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
-    found = replace(found, notes=(*found.notes, *unused))
+    found = replace(found, notes=(*found.notes, *seen.warnings, *unused))
     if seen.whole:
         found = replace(found, no_coastdown=seen.no_coastdown, estimates=seen.estimates)
     return found, seen.ship
@@ -235,7 +236,8 @@ class _Coastdowns:
     The coastdowns of all bags, their estimates, and of each bag without one why.
 
     `whole` are all glides with the parts of them that are no coastdown, though no instrument
-    shows why; empty where no such part can be followed. `notes` says what these are.
+    shows why; empty where no such part can be followed. `notes` says what these are, `warnings`
+    what is wrong with the runs, and what was cut.
     """
 
     coasts: list[CoastRun]
@@ -245,6 +247,7 @@ class _Coastdowns:
     parameters: Parameters
     without: tuple[str, ...]
     estimates: tuple[Estimate, ...]
+    warnings: tuple[str, ...]
 
     @property
     def no_coastdown(self) -> str:
@@ -263,6 +266,7 @@ def _found(
     seen: list[_OfRun] = []
     without: list[str] = []
     estimates: list[Estimate] = []
+    warnings: list[str] = []
     ship, parameters = given, None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
@@ -276,7 +280,12 @@ def _found(
                 f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
                 'rejected; it is diagnosed all the same'
             )
-        _log_cuts(listener, result, window)
+        lines = [*_cuts(result, window), *run_warnings(result)]
+        if stop is not None:
+            lines.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+        for line in lines:
+            listener.log(f'{each.name}: {line}')
+            warnings.append(f'{each.name}: {line}')
         windows = coast_windows(result)
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
@@ -296,6 +305,7 @@ def _found(
         parameters,
         tuple(without),
         tuple(estimates),
+        tuple(warnings),
     )
 
 
@@ -352,14 +362,12 @@ def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | N
     return sheet, None if of_run == ship else of_run
 
 
-def _log_cuts(listener: Listener, result: ReplayResult, window: WindowSpan | None) -> None:
-    """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
-    name = result.run.name
+def _cuts(result: ReplayResult, window: WindowSpan | None) -> Iterator[str]:
+    """Yield what of the coastdowns was cut; a window of which nothing is left is an error."""
     for coastdown in result.coastdowns:
         if window is not None and coastdown.withdrawn:
             raise DiagnosisError(
-                f'{name!r}: no coastdown from {window[0]:g} to {window[1]:g} s: '
+                f'{result.run.name!r}: no coastdown from {window[0]:g} to {window[1]:g} s: '
                 f'{coastdown.failure}; give another window'
             )
-        for line in cut_lines(coastdown, result.run.span_ns):
-            listener.log(f'{name}: {line}')
+        yield from cut_lines(coastdown, result.run.span_ns)

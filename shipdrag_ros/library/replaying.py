@@ -12,14 +12,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.told_stop import StopTime
+from shipdrag_ros.replay.told_stop import StopTime, told_beside
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -153,11 +152,9 @@ def replay_run(
             )
         )
     if stop is not None:
-        begins = ', '.join(utc(one.start_ns) for one in result.coastdowns) or 'there is none'
-        listener.log(
-            f'{each.name}: the stop that is given is weighed by the regime filter; coastdowns '
-            f'begin at: {begins}'
-        )
+        beside = told_beside(each, stop, (one.start_ns for one in result.coastdowns))
+        listener.log(f'{each.name}: {beside}')
+        result = replace(result, warnings=(*result.warnings, beside))
     if not result.coastdowns:
         astern = _astern(each)
         if astern:
@@ -167,7 +164,7 @@ def replay_run(
             if coastdown.estimate is None:
                 raise EstimationError(
                     f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
-                    f'{coastdown.failure}; give another --window'
+                    f'{coastdown.failure}; give another window'
                 )
         beyond = _beyond(each, window[1])
         if beyond:

@@ -88,8 +88,11 @@ def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
     """
     Return when the thrust began to fall, and whether what comes before may be steady sailing.
     """
-    if coastdown.stop_ns is None:  # given, and whatever she did before was cut
-        cut = any(each.start_ns < coastdown.start_ns for each in coastdown.cuts)
+    if coastdown.stop_ns is None:  # given, and what she did before was cut: driven, she is steady
+        cut = any(
+            each.start_ns < coastdown.start_ns and each.reason is not Dismissal.THRUST
+            for each in coastdown.cuts
+        )
         return coastdown.start_ns, not cut
     return coastdown.stop_ns, True
 

@@ -42,6 +42,25 @@ def told_ns(run: Run, stop: StopTime) -> int:
     return start_ns + round(at_s * SECOND_NS)
 
 
+def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
+    """
+    Say where coastdowns begin, beside a stop that was told.
+
+    Parameters
+    ----------
+    run, stop
+        As of `told_ns`.
+    starts_ns
+        Of the coastdowns that were found.
+    """
+    told = told_ns(run, stop)
+    begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
+    return (
+        f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
+        f'at: {begins or "there is none"}'
+    )
+
+
 def with_stop(items: Iterable[Block | Mark], at_ns: int | None) -> Iterator[Block | Mark]:
     """
     Put a stop between the samples of a run.

@@ -110,14 +110,15 @@ def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
     refuse_overlaps([WindowedRun(run, (0.0, 430.0)), part])
 
 
+@pytest.mark.parametrize('window', ['0:2400', '300:2400'])
 def test_a_window_may_hold_the_steady_lead(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], window: str
 ) -> None:
     ship = str(ROOT / 'config' / 'vitus_bering.yaml')
     lead = tmp_path / 'lead.mcap'
     assert main(['simulate', '--ship', ship, '-o', str(lead), '--lead-in', '900']) == 0
     capsys.readouterr()
-    assert main(['diagnose', f'{lead}@0:2400', '--ship', ship, '--json']) == 0
+    assert main(['diagnose', f'{lead}@{window}', '--ship', ship, '--json']) == 0
     assert json.loads(capsys.readouterr().out)['coastdowns_used'] == 1
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -83,14 +84,16 @@ def test_a_window_beside_a_stop_is_refused(
 
 
 def test_what_a_bag_holds_is_not_denied_with_a_stop(
-    recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(['replay', str(recording[0]), '--stop', '400']) == 0
+    path = tmp_path / 'told.json'
+    assert main(['replay', str(recording[0]), '--stop', '400', '--json', str(path)]) == 0
     told = capsys.readouterr()
     assert 'or was replayed with another ship file' in told.out
-    assert (
-        'the stop that is given is weighed by the regime filter; coastdowns begin at: ' in told.err
-    )
+    words = ' is weighed by the regime filter; coastdowns begin at: '
+    assert words in told.err
+    assert words in told.out
+    assert any(words in each['warning'] for each in json.loads(path.read_text())['warnings'])
 
 
 def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
