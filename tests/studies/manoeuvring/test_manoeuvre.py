@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.manoeuvring.simulate import (
     Side,
     overshoots_rad,
     parse,
+    steer,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.manoeuvring.simulate import steer
 
 SHIP = mariner()
 

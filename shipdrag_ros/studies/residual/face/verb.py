@@ -22,15 +22,17 @@ from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.residual.fit import (
     AUTO,
     FORMS,
+    OPTIONAL,
+    REQUIRED,
+    Hulls,
     ResidualFit,
     fit_residual,
     leave_hulls_out,
 )
-from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
-from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.face.verb import (
     left_out_picture,
     prediction_documents,
+    predictions_table,
     residual_picture,
 )
 from shipdrag_ros.studies.surface.fit import Prediction
@@ -171,7 +173,7 @@ def shown(
             drawn.append((left_out_picture(error, leverage, target), caption))
         return {_FIT: drawn}
 
-    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    asked = [('Predictions', predictions_table(predictions))] if predictions else []
     tables = (
         *asked,
         ('Coefficients of the form', coefficients(found)),

@@ -11,8 +11,8 @@ from shipdrag_ros.cli.arguments import add_json, add_report
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.manoeuvring.manoeuvre import parse
 from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.manoeuvring.simulate import parse
 from shipdrag_ros.studies.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting, steering

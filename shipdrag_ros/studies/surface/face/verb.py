@@ -13,13 +13,12 @@ import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.display import Section
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.report.drawing import BLUE, VERMILION, new_figure, styled
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
 
 if TYPE_CHECKING:
@@ -277,10 +276,10 @@ def shown(
             )
         return {_FIT: drawn}
 
-    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    asked = [('Predictions', predictions_table(predictions))] if predictions else []
     tables = (
-        ('Degrees tried; F and p of the step from the degree before', fit_words.degrees(surface)),
-        ('Coefficients of raw powers', fit_words.coefficients(surface)),
+        ('Degrees tried; F and p of the step from the degree before', degrees_table(surface)),
+        ('Coefficients of raw powers', coefficients_table(surface)),
         *asked,
     )
     notes = 'What these data can and cannot show' if surface.notes else ''
@@ -310,3 +309,65 @@ def _check_names(names: Sequence[str]) -> None:
     ]
     if problems:
         raise DataError('--export', problems)
+
+
+def degrees_table(surface: Surface) -> Table:
+    """
+    Show all degrees tried, as the table of S5 with the test beside it.
+    """
+    table = surface.table
+    rows = []
+    for row, degree in enumerate(surface.degrees):
+        first = np.isnan(table.f[row])
+        rows.append(
+            (
+                f'{degree}',
+                f'{table.coefficients[row]}',
+                f'{table.sse[row]:.4g}',
+                f'{np.sqrt(table.variance[row]):.4g}',
+                '-' if first else f'{table.f[row]:.3g}',
+                '-' if first else f'{table.p[row]:.2g}',
+                'chosen' if degree == surface.degree else '',
+            )
+        )
+    return Table(('degree', 'terms', 'SSE', 'RMSE', 'F', 'p', ''), tuple(rows))
+
+
+def coefficients_table(surface: Surface) -> Table:
+    """
+    Show the coefficients of raw powers of the inputs.
+    """
+    return Table(
+        ('term', 'coefficient', 'sd'),
+        tuple(
+            (_term(surface.inputs, powers), f'{value:.6g}', f'{sd:.2g}')
+            for powers, value, sd in zip(
+                surface.polynomial.powers.tolist(), surface.coefficients, surface.sd
+            )
+        ),
+    )
+
+
+def predictions_table(found: Sequence[Prediction]) -> Table:
+    """
+    Show predictions and why some may not be used.
+    """
+    return Table(
+        ('row', 'value', 'sd', 'use'),
+        tuple(
+            (
+                f'{number}',
+                f'{each.value:.6g}',
+                f'{each.sd:.2g}' if np.isfinite(each.sd) else 'open',
+                'yes' if each.inside else 'NO: ' + '; '.join(each.reasons),
+            )
+            for number, each in enumerate(found, start=1)
+        ),
+    )
+
+
+def _term(inputs: Sequence[str], powers: Sequence[int]) -> str:
+    factors = [
+        name if power == 1 else f'{name}^{power}' for name, power in zip(inputs, powers) if power
+    ]
+    return ' '.join(factors) or '1'
