@@ -34,8 +34,7 @@ from shipdrag_ros.estimation.result import (
     ResistanceCurve,
     Track,
 )
-from shipdrag_ros.fleet.rows import FROUDE, BagResult
-from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
+from shipdrag_ros.fleet.store import FROUDE, BagResult, Store, bag_schema, coastdown_schema
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve

@@ -144,6 +144,17 @@ def private_opener(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW, 0o640)
 
 
+def sync_directory(path: Path) -> None:
+    """
+    Bring the names in a directory to the disk.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 class Compression(Enum):
     """How the chunks of a file are compressed."""
 

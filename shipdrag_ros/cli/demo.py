@@ -46,7 +46,7 @@ from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:  # help must not need ROS
-    from shipdrag_ros.node.rehearsal import LiveEstimate
+    from shipdrag_ros.node.spectator import LiveEstimate
 
 
 _CONNECT_S = 120.0  # the first start on a machine compiles the kernels
@@ -161,7 +161,7 @@ def sail(
     ShipdragError
         If the node is not ready in time, ends too early, or sends nothing.
     """
-    from shipdrag_ros.node.rehearsal import Rehearsal
+    from shipdrag_ros.node.spectator import Rehearsal
 
     with ended_by_sigterm(), node, Rehearsal(show) as rehearsal:
         rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)

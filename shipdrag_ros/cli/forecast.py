@@ -30,9 +30,15 @@ from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
-from shipdrag_ros.library.forecasts import AFTER_S, Forecasts, GlideForecast, forecast
+from shipdrag_ros.library.forecasts import (
+    AFTER_S,
+    Forecasts,
+    GlideForecast,
+    IfStopped,
+    forecast,
+    if_stopped_now,
+)
 from shipdrag_ros.library.replaying import WindowedRun, replay_run
-from shipdrag_ros.library.stopped import IfStopped, if_stopped_now
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 

@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
     """
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
-    from shipdrag_ros.library.learning import learn_from
+    from shipdrag_ros.library.diagnosis import learn_from
 
     output = Output(options.json)
     name = options.name or options.out.stem

@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
 def _write_pages(output: Output, options: argparse.Namespace) -> dict[tuple[str, int], str]:
     """Write a page for each coastdown, and return where each is from the report."""
     from shipdrag_ros.fleet.store import read_coastdowns
-    from shipdrag_ros.trend.coastdown_page import coastdown_page, links, page_name
+    from shipdrag_ros.trend.page import coastdown_page, links, page_name
 
     folder, report = options.pages.absolute(), options.report.absolute()
     try:

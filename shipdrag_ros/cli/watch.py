@@ -180,8 +180,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     from shipdrag_ros.fleet.store import read_coastdowns
     from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.live.app import FLEET, FleetPages
-    from shipdrag_ros.trend.coastdown_page import links
-    from shipdrag_ros.trend.page import fleet_text
+    from shipdrag_ros.trend.page import fleet_text, links
 
     rows = read_coastdowns(store).to_pylist()
     text = fleet_text(*trends_of(output, store), links=links(rows, f'{FLEET}/'))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.library.wording import in_python
+from shipdrag_ros.library.shown import in_python
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats

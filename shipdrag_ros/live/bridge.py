@@ -55,7 +55,7 @@ from shipdrag_ros.live.outputs import (
 )
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
-from shipdrag_ros.messages.heard import (
+from shipdrag_ros.messages.topics import (
     ERROR,
     OF_CONDITIONS,
     OK,

@@ -22,16 +22,18 @@ from typing import NamedTuple
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
-from shipdrag_ros.nmea.reading import (
+from shipdrag_ros.nmea.sentences import (
     DAY_NS,
+    READERS,
     START,
+    TIMED,
+    Mounting,
     Sentence,
     SentenceReader,
     SentenceSource,
     SentenceTime,
     best,
 )
-from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
 BEHIND_NS = SECOND_NS

@@ -24,7 +24,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
+from shipdrag_ros.messages.topics import ERROR, OK, WARN, Status
 from shipdrag_ros.node.background import Compiling
 from shipdrag_ros.node.health import InputState
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS

@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Block, concatenate
-from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader
+from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, RowClock
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
-from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.table import LogTable
 
 COLUMNS = {

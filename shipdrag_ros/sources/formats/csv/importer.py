@@ -29,6 +29,7 @@ from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
     BadCell,
     CellReader,
+    RowClock,
     are_in_minutes,
     combined,
     has_decimal_commas,
@@ -50,7 +51,6 @@ from shipdrag_ros.sources.formats.csv.guess import (
     is_table,
     with_dates,
 )
-from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     BASE_NS,

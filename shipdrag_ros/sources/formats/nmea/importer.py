@@ -25,8 +25,18 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError, reason_of
-from shipdrag_ros.nmea.reading import DAY_NS, START, Checksum, SentenceReader, checksum_of, days_of
-from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
+from shipdrag_ros.nmea.sentences import (
+    DAY_NS,
+    MAGNETIC,
+    READERS,
+    START,
+    TIMED,
+    Checksum,
+    Mounting,
+    SentenceReader,
+    checksum_of,
+    days_of,
+)
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS, Channel
 from shipdrag_ros.sources.format import (
