@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -64,7 +65,7 @@ _OWN = tuple(
     Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
     for name, summary in _SUMMARIES.items()
 )
-_EXAMPLES = '\n\nExamples\n--------\n'
+_SECTION = re.compile(r'^(\w+)\n-+\n', re.MULTILINE)
 _WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -179,14 +180,30 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            examples: Sequence[str] = known.examples
-            if not examples:
-                added.description, _, text = (module.__doc__ or known.summary).partition(_EXAMPLES)
-                examples = text.splitlines()
-            if examples:  # python -OO drops them
+            # python -OO drops them
+            about, *parts = _SECTION.split(module.__doc__ or known.summary)
+            sections = dict(zip(parts[::2], parts[1::2]))
+            added.description = about
+            if examples := known.examples or sections.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name not in _WITHOUT_EFFECTS:
                 add_effects(added)
             added.set_defaults(run=module.run)
+            _explain(added, sections.get('Options', ''))
     return top
+
+
+def _explain(parser: argparse.ArgumentParser, text: str) -> None:
+    """Give arguments without a help their texts in the docstring of their verb."""
+    helps = {
+        each.split()[0]: ' '.join(lines.split())
+        for each, lines in re.findall(r'^(\S.*)\n((?: .*\n?)+)', text, re.MULTILINE)
+    }
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                _explain(below, text)
+        elif action.help is None:
+            names = (*action.option_strings, str(action.metavar), action.dest)
+            action.help = next((helps[name] for name in names if name in helps), None)

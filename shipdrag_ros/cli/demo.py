@@ -3,6 +3,13 @@
 Simulate a coastdown, send its readings over ROS topics on this machine to the node, show the
 estimates as they come, replay what the node recorded and write a report.
 
+Options
+-------
+--out DIR
+    where everything is written; made if missing
+--speed-up N
+    seconds of the simulation in a second of life [-], 1 to 200
+
 Examples
 --------
 shipdrag demo
@@ -195,20 +202,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        '--out',
-        type=Path,
-        default=Path('demo'),
-        metavar='DIR',
-        help='where everything is written; made if missing',
-    )
-    parser.add_argument(
-        '--speed-up',
-        type=number(1.0, 200.0),
-        default=60.0,
-        metavar='N',
-        help='seconds of the simulation in a second of life [-], 1 to 200',
-    )
+    parser.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR')
+    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0, metavar='N')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,6 +7,15 @@ effects of the earth are stated along the first one. Without a baseline they are
 all hulls of her length and volume. In a record without a coastdown the log is compared with
 the way over ground, for which neither baseline nor ship file is needed.
 
+Options
+-------
+--write FILE
+    write a ship file with the effect added, where one is named; an existing file is not
+    overwritten
+--earlier FILE
+    what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: what was found
+    of hull and instruments counts, less the longer ago it was; water and weather do not
+
 Examples
 --------
 shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml
@@ -46,13 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
     add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
-    parser.add_argument(
-        '--write',
-        type=unused_file('.yaml'),
-        metavar='FILE',
-        help='write a ship file with the effect added, where one is named; an existing file is '
-        'not overwritten',
-    )
+    parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
     add_report(parser, of='diagnosis')
     add_window(
         parser,
@@ -69,16 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f'{usage()}; evidence that is wrong with probability RATE (default {RATE:g}). What is '
         'known of one run stands in run.yaml beside its bag, or in BAG.run.yaml',
     )
-    parser.add_argument(
-        '--earlier',
-        type=Path,
-        action='append',
-        default=[],
-        metavar='FILE',
-        help='what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: '
-        'what was found of hull and instruments counts, less the longer ago it was; water and '
-        'weather do not',
-    )
+    parser.add_argument('--earlier', type=Path, action='append', default=[], metavar='FILE')
     add_remap(parser)
     add_json(parser)
 

@@ -4,6 +4,12 @@ Find the coastdowns in bags and foretell the rest of each, from what was known s
 its stop: when she has each lower speed and how far on, with bands of 90 %, beside what
 followed.
 
+Options
+-------
+--if-stopped-now
+    the glide that would begin at the end of the last bag, from the hull as last known: the last
+    coastdown in the bags, or else the ship file; of BAG@START:END, now is END
+
 Examples
 --------
 shipdrag forecast run.mcap --after 120 300
@@ -59,12 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='when forecasts are made, from each stop on [s] (default: '
         f'{" ".join(f"{each:g}" for each in AFTER_S)})',
     )
-    when.add_argument(
-        '--if-stopped-now',
-        action='store_true',
-        help='the glide that would begin at the end of the last bag, from the hull as last known: '
-        'the last coastdown in the bags, or else the ship file; of BAG@START:END, now is END',
-    )
+    when.add_argument('--if-stopped-now', action='store_true')
     add_stop(parser)
     add_remap(parser)
     add_json(parser)

@@ -6,6 +6,11 @@ or time. It is written as a term with units, which --effects takes, where the ev
 runs is for it, beside something smooth without a formula, and each half of the runs shows it.
 Else nothing is written, and it is said what is known and which run would decide.
 
+Options
+-------
+--name NAME
+    what the effect is called, small letters, digits and _ (default: that of the file)
+
 Examples
 --------
 shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html
@@ -52,11 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'FILE',
         'file of the effect, where one is learnt; an existing one is not overwritten',
     )
-    parser.add_argument(
-        '--name',
-        metavar='NAME',
-        help='what the effect is called, small letters, digits and _ (default: that of the file)',
-    )
+    parser.add_argument('--name', metavar='NAME')
     add_report(parser, of='result')
     add_remap(parser)
     add_json(parser)

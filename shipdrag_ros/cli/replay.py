@@ -3,6 +3,11 @@
 Find the coastdowns in bags and estimate r(v) as the node would have. What the node itself
 recorded is compared bit by bit.
 
+Options
+-------
+--compare
+    rank the hulls, one a bag, by the Froude number of the steepest rise of r
+
 Examples
 --------
 shipdrag replay run.mcap --report report.html
@@ -64,11 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_stop(parser)
     add_remap(parser)
-    parser.add_argument(
-        '--compare',
-        action='store_true',
-        help='rank the hulls, one a bag, by the Froude number of the steepest rise of r',
-    )
+    parser.add_argument('--compare', action='store_true')
     parser.add_argument(
         '--out',
         type=Path,

@@ -6,6 +6,19 @@ drifts. Writes a folder a ship with ship.yaml, events.csv and the bags, each wit
 BAG.run.yaml, and beside them truth.yaml and truth.csv, which `fleet` does not read. A few
 files are lost, cut off, unreadable, or from a clock without a date.
 
+Options
+-------
+--ships N
+    how many ships
+--months M
+    how long [30 days]
+--every DAYS
+    between two runs of a ship [days]; 7 for weekly runs
+--seed S
+    the same seed gives the same files
+--sound
+    no file is lost, damaged or dated wrongly
+
 Examples
 --------
 shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4
@@ -61,33 +74,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     add_out(parser, Path, 'DIR', 'folder; must be empty or new')
+    parser.add_argument('--ships', type=whole(1, 1000), default=3, metavar='N')
     parser.add_argument(
-        '--ships', type=whole(1, 1000), default=3, metavar='N', help='how many ships'
+        '--months', type=number(0.0, 600.0, unit='months', above=True), default=12.0, metavar='M'
     )
     parser.add_argument(
-        '--months',
-        type=number(0.0, 600.0, unit='months', above=True),
-        default=12.0,
-        metavar='M',
-        help='how long [30 days]',
+        '--every', type=number(0.1, 1000.0, unit='days'), default=28.0, metavar='DAYS'
     )
-    parser.add_argument(
-        '--every',
-        type=number(0.1, 1000.0, unit='days'),
-        default=28.0,
-        metavar='DAYS',
-        help='between two runs of a ship [days]; 7 for weekly runs',
-    )
-    parser.add_argument(
-        '--seed',
-        type=whole(0),
-        default=0,
-        metavar='S',
-        help='the same seed gives the same files',
-    )
-    parser.add_argument(
-        '--sound', action='store_true', help='no file is lost, damaged or dated wrongly'
-    )
+    parser.add_argument('--seed', type=whole(0), default=0, metavar='S')
+    parser.add_argument('--sound', action='store_true')
     add_json(parser)
 
 

@@ -1,5 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag cable`: drag of a towed cable, and the line that may replace it."""
+"""
+Drag of a cable that is towed along the flow, 0.5 rho C0 l d V^2, and the range of speeds in which
+its tangent at V0 may replace it. C0 is that of a smooth cylinder of the same length over
+diameter, unless --rough or --c0 is given.
+
+Options
+-------
+--rough
+    C0 of a very rough cylinder (a log) in place of a smooth one
+--c0 X
+    C0 on length times diameter [-]; ropes have 0.01 to 0.04
+--tolerance X
+    relative error that the tangent may have [-]
+--density RHO
+    density of the water [kg/m^3]
+"""
 
 from __future__ import annotations
 
@@ -118,11 +133,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Drag of a cable that is towed along the flow, 0.5 rho C0 l d V^2, and the range of '
-        'speeds in which its tangent at V0 may replace it. C0 is that of a smooth cylinder of '
-        'the same length over diameter, unless --rough or --c0 is given.'
-    )
     for name, meaning, unit, most in (
         ('--length', 'length of the cable', 'm', 1e6),
         ('--diameter', 'diameter of the cable', 'm', 10.0),
@@ -142,28 +152,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=CableSurface.ROUGH,
         default=CableSurface.SMOOTH,
         dest='drag',
-        help='C0 of a very rough cylinder (a log) in place of a smooth one',
     )
-    surface.add_argument(
-        '--c0',
-        type=number(0.0, 10.0, above=True),
-        metavar='X',
-        dest='drag',
-        help='C0 on length times diameter [-]; ropes have 0.01 to 0.04',
+    surface.add_argument('--c0', type=number(0.0, 10.0, above=True), metavar='X', dest='drag')
+    parser.add_argument(
+        '--tolerance', type=number(0.0, 10.0, above=True), default=0.1, metavar='X'
     )
     parser.add_argument(
-        '--tolerance',
-        type=number(0.0, 10.0, above=True),
-        default=0.1,
-        metavar='X',
-        help='relative error that the tangent may have [-]',
-    )
-    parser.add_argument(
-        '--density',
-        type=number(900.0, 1100.0, unit='kg/m^3'),
-        default=1025.0,
-        metavar='RHO',
-        help='density of the water [kg/m^3]',
+        '--density', type=number(900.0, 1100.0, unit='kg/m^3'), default=1025.0, metavar='RHO'
     )
     add_report(parser, of='result')
     add_json(parser)

@@ -1,5 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag residual`: residual resistance from shape, and where it may not be used."""
+"""
+Fit a published form of the residual-resistance coefficient to tests of several hulls, and predict
+others. Such a form meets the hulls it was made from and misleads for others, so every prediction
+says whether it may be used: not outside the convex hull of the data, not beyond their leverage,
+not where the data leave it open, and not where a trend contradicts physics. Columns: L_B, B_T,
+Fr, and C_B or slenderness (L / V^(1/3)), the other follows; lcb (x_c / L) for Sakhnovsky.
+
+Options
+-------
+DATA.csv
+    table with a header
+--target COLUMN
+    column of the residual resistance: coefficient c_R, or force per weight
+--predict NEW.csv
+    table of hulls and Froude numbers
+--ship FILE
+    ship file with a baseline of coefficients, to which --write gives the fitted c_R as wave
+    resistance
+--lcb X
+    centre of buoyancy of that ship over L, as in the data
+--write FILE
+    ship file to write; holds the Froude numbers at which the hull is accepted, refused if there
+    are none
+"""
 
 from __future__ import annotations
 
@@ -47,50 +70,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Fit a published form of the residual-resistance coefficient to tests of several hulls, '
-        'and predict others. Such a form meets the hulls it was made from and misleads for '
-        'others, so every prediction says whether it may be used: not outside the convex hull '
-        'of the data, not beyond their leverage, not where the data leave it open, and not where '
-        'a trend contradicts physics. Columns: L_B, B_T, Fr, and C_B or slenderness '
-        '(L / V^(1/3)), the other follows; lcb (x_c / L) for Sakhnovsky.'
-    )
-    parser.add_argument('data', type=Path, metavar='DATA.csv', help='table with a header')
+    parser.add_argument('data', type=Path, metavar='DATA.csv')
     parser.add_argument(
         '--form',
         required=True,
         choices=(*FORMS, AUTO),
         help=f'{AUTO}: the one that predicts left-out hulls best',
     )
-    parser.add_argument(
-        '--target',
-        required=True,
-        metavar='COLUMN',
-        help='column of the residual resistance: coefficient c_R, or force per weight',
-    )
-    parser.add_argument(
-        '--predict', type=Path, metavar='NEW.csv', help='table of hulls and Froude numbers'
-    )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file with a baseline of coefficients, to which --write gives the fitted c_R '
-        'as wave resistance',
-    )
-    parser.add_argument(
-        '--lcb',
-        type=number(-0.2, 0.2),
-        metavar='X',
-        help='centre of buoyancy of that ship over L, as in the data',
-    )
-    parser.add_argument(
-        '--write',
-        type=unused_file('.yaml'),
-        metavar='FILE',
-        help='ship file to write; holds the Froude numbers at which the hull is accepted, '
-        'refused if there are none',
-    )
+    parser.add_argument('--target', required=True, metavar='COLUMN')
+    parser.add_argument('--predict', type=Path, metavar='NEW.csv')
+    parser.add_argument('--ship', type=Path, metavar='FILE')
+    parser.add_argument('--lcb', type=number(-0.2, 0.2), metavar='X')
+    parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
     add_report(parser, of='fit')
     add_json(parser)
 

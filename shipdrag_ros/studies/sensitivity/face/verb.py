@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag sensitivity`: which derivatives, or which values of a ship file, matter."""
+"""
+Change one number of a model at a time, by 10 and 50 per cent up and down, and show how far the
+motion moves: root mean square of its differences. With a manoeuvring model: which derivatives
+matter in a zigzag or a turning circle, a check of the model without the others, and which
+manoeuvre shows which derivative. With a ship file: which of its values must be known well for a
+coastdown to be judged right, and which effect a wrong one is taken for.
+
+Options
+-------
+--ship FILE
+    ship file with a baseline, in its place
+"""
 
 from __future__ import annotations
 
@@ -26,22 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Change one number of a model at a time, by 10 and 50 per cent up and down, and show how '
-        'far the motion moves: root mean square of its differences. With a manoeuvring model: '
-        'which derivatives matter in a zigzag or a turning circle, a check of the model without '
-        'the others, and which manoeuvre shows which derivative. With a ship file: which of its '
-        'values must be known well for a coastdown to be judged right, and which effect a wrong '
-        'one is taken for.'
-    )
     subject = parser.add_mutually_exclusive_group()
     # without a default of argparse, which would not say that both are given
     subject.add_argument(
         '--model', choices=list(_MODELS), help=f'manoeuvring model (default: {_MODEL})'
     )
-    subject.add_argument(
-        '--ship', type=Path, metavar='FILE', help='ship file with a baseline, in its place'
-    )
+    subject.add_argument('--ship', type=Path, metavar='FILE')
     parser.add_argument(
         '--manoeuvre',
         metavar='NAME',

@@ -1,5 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag surface`: a polynomial surface of measured coefficients, and its degree."""
+"""
+Fit a polynomial surface to a table of measured or computed coefficients, in any number of inputs.
+The degree is raised while that lowers the residual variance by more than chance: the rule of the
+order of a coastdown fit. Inputs are scaled inside; the coefficients are those of raw powers.
+
+Options
+-------
+DATA.csv
+    table with a header
+--inputs COLUMN[,COLUMN]...
+    columns that the surface is over, alpha,beta for instance
+--target COLUMN
+    column of what was measured
+--max-degree N
+    highest degree to try
+--predict NEW.csv
+    table with the same inputs, for which the surface is evaluated
+--export FILE.py
+    write the surface and its derivatives as plain Python functions of the inputs
+"""
 
 from __future__ import annotations
 
@@ -117,42 +136,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Fit a polynomial surface to a table of measured or computed coefficients, in any '
-        'number of inputs. The degree is raised while that lowers the residual variance by '
-        'more than chance: the rule of the order of a coastdown fit. Inputs are scaled inside; '
-        'the coefficients are those of raw powers.'
-    )
-    parser.add_argument('data', type=Path, metavar='DATA.csv', help='table with a header')
-    parser.add_argument(
-        '--inputs',
-        required=True,
-        type=_names,
-        metavar='COLUMN[,COLUMN]...',
-        help='columns that the surface is over, alpha,beta for instance',
-    )
-    parser.add_argument(
-        '--target', required=True, metavar='COLUMN', help='column of what was measured'
-    )
-    parser.add_argument(
-        '--max-degree',
-        type=whole(LOWEST),
-        default=MAX_DEGREE,
-        metavar='N',
-        help='highest degree to try',
-    )
-    parser.add_argument(
-        '--predict',
-        type=Path,
-        metavar='NEW.csv',
-        help='table with the same inputs, for which the surface is evaluated',
-    )
-    parser.add_argument(
-        '--export',
-        type=new_file('.py'),
-        metavar='FILE.py',
-        help='write the surface and its derivatives as plain Python functions of the inputs',
-    )
+    parser.add_argument('data', type=Path, metavar='DATA.csv')
+    parser.add_argument('--inputs', required=True, type=_names, metavar='COLUMN[,COLUMN]...')
+    parser.add_argument('--target', required=True, metavar='COLUMN')
+    parser.add_argument('--max-degree', type=whole(LOWEST), default=MAX_DEGREE, metavar='N')
+    parser.add_argument('--predict', type=Path, metavar='NEW.csv')
+    parser.add_argument('--export', type=new_file('.py'), metavar='FILE.py')
     add_report(parser, of='surface')
     add_json(parser)
 
