@@ -12,13 +12,15 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.arguments import Help, add_effects
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
@@ -180,30 +182,36 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            # python -OO drops them
-            about, *parts = _SECTION.split(module.__doc__ or known.summary)
-            sections = dict(zip(parts[::2], parts[1::2]))
-            added.description = about
+            sections = _sections(module)
+            added.description = sections.get('', known.summary)
             if examples := known.examples or sections.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name not in _WITHOUT_EFFECTS:
                 add_effects(added)
             added.set_defaults(run=module.run)
-            _explain(added, sections.get('Options', ''))
+            _explain(added, _helps(arguments) | _helps(module))
     return top
 
 
-def _explain(parser: argparse.ArgumentParser, text: str) -> None:
-    """Give arguments without a help their texts in the docstring of their verb."""
-    helps = {
-        each.split()[0]: ' '.join(lines.split())
-        for each, lines in re.findall(r'^(\S.*)\n((?: .*\n?)+)', text, re.MULTILINE)
-    }
+def _sections(module: ModuleType) -> dict[str, str]:
+    """Return the docstring of a module by its sections; python -OO drops it."""
+    parts = ['', *_SECTION.split(module.__doc__ or '')]
+    return dict(zip(parts[::2], parts[1::2])) if module.__doc__ else {}
+
+
+def _helps(module: ModuleType) -> dict[str, str]:
+    """Return what the docstring of a module says of arguments, names of the module filled in."""
+    text = _sections(module).get('Options', '').format_map(vars(arguments) | vars(module))
+    found = re.findall(r'^(\S+).*\n((?: .*\n?)+)', text, re.MULTILINE)
+    return {name: ' '.join(lines.split()) for name, lines in found}
+
+
+def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, str]) -> None:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for below in action.choices.values():
-                _explain(below, text)
+                _explain(below, helps)
         elif action.help is None:
             names = (*action.option_strings, str(action.metavar), action.dest)
             action.help = next((helps[name] for name in names if name in helps), None)

@@ -9,9 +9,16 @@ the way over ground, for which neither baseline nor ship file is needed.
 
 Options
 -------
+BAG
+    MCAP or rosbag2; {PART}
+--ship FILE
+    ship file with a baseline (default: the one attached to the first bag)
 --write FILE
     write a ship file with the effect added, where one is named; an existing file is not
     overwritten
+--window START END
+    the coastdown [s from the start of each bag without a window of its own], without looking for
+    one; what in it is no coastdown is cut
 --earlier FILE
     what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: what was found
     of hull and instruments counts, less the longer ago it was; water and weather do not
@@ -40,7 +47,7 @@ from shipdrag_ros.cli.arguments import (
     unused_file,
 )
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
@@ -53,15 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
-    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
+    add_bags(parser, windowed_bag)
+    add_ship(parser)
     parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
     add_report(parser, of='diagnosis')
-    add_window(
-        parser,
-        'the coastdown [s from the start of each bag without a window of its own], without '
-        'looking for one; what in it is no coastdown is cut',
-    )
+    add_window(parser)
     add_stop(parser)
     parser.add_argument(
         '--fact',

@@ -11,6 +11,8 @@ DIR_OR_URL
     folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): bags (MCAP,
     rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows without options,
     and logs that `shipdrag import` knows by their first bytes, whatever their names
+--out STORE
+    folder; made if missing
 --workers N
     processes on this machine (default: one a core)
 --scheduler ADDRESS
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('folders', nargs='+', metavar='DIR_OR_URL')
-    add_out(parser, Path, 'STORE', 'folder; made if missing')
+    add_out(parser, Path, 'STORE')
     engine = parser.add_mutually_exclusive_group()
     engine.add_argument('--workers', type=whole(1, 1024), metavar='N')
     engine.add_argument('--scheduler', metavar='ADDRESS')

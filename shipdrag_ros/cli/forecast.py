@@ -6,6 +6,8 @@ followed.
 
 Options
 -------
+BAG
+    bag; {PART}
 --if-stopped-now
     the glide that would begin at the end of the last bag, from the hull as last known: the last
     coastdown in the bags, or else the ship file; of BAG@START:END, now is END
@@ -32,7 +34,7 @@ from shipdrag_ros.cli.arguments import (
     number,
 )
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
@@ -53,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, f'bag; {HELP}')
+    add_bags(parser, windowed_bag)
     add_settings(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument(

@@ -6,6 +6,10 @@ is ever repaired. `replay` and `diagnose` read such files directly, where no opt
 
 Options
 -------
+--out BAG
+    MCAP file to make; an existing one is not overwritten
+--ship FILE
+    ship file (YAML) to attach, so that replay needs no --ship
 --format
     format of the sources (default: known by their content)
 
@@ -47,8 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are '
         'joined; where two hold the same input for the same time, the first file is taken',
     )
-    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
-    add_ship(parser, 'ship file (YAML) to attach, so that replay needs no --ship')
+    add_out(parser, Path, 'BAG')
+    add_ship(parser)
     parser.add_argument('--format', choices=[each.name for each in known])
     add_json(parser)
     added: set[str] = set()

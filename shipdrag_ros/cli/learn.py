@@ -8,6 +8,12 @@ Else nothing is written, and it is said what is known and which run would decide
 
 Options
 -------
+BAG_OR_STORE
+    bag, or a store of `shipdrag fleet`, of which all bags are taken; {PART}
+--ship FILE
+    ship file with a baseline (default: the one attached to the first bag)
+--out FILE
+    file of the effect, where one is learnt; an existing one is not overwritten
 --name NAME
     what the effect is called, small letters, digits and _ (default: that of the file)
 
@@ -33,7 +39,7 @@ from shipdrag_ros.cli.arguments import (
     unused_file,
 )
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
@@ -44,19 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(
-        parser,
-        windowed_bag,
-        f'bag, or a store of `shipdrag fleet`, of which all bags are taken; {HELP}',
-        metavar='BAG_OR_STORE',
-    )
-    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
-    add_out(
-        parser,
-        unused_file('.yaml'),
-        'FILE',
-        'file of the effect, where one is learnt; an existing one is not overwritten',
-    )
+    add_bags(parser, windowed_bag, metavar='BAG_OR_STORE')
+    add_ship(parser)
+    add_out(parser, unused_file('.yaml'), 'FILE')
     parser.add_argument('--name', metavar='NAME')
     add_report(parser, of='result')
     add_remap(parser)

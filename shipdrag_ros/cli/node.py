@@ -4,6 +4,8 @@ The onboard node: estimates live and records.
 
 Options
 -------
+--ship FILE
+    ship file (YAML)
 --out DIR
     where recordings are written; made if missing, nothing there is overwritten
 --nmea SOURCE
@@ -50,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, 'ship file (YAML)', required=True)
+    add_ship(parser, required=True)
     parser.add_argument('--out', required=True, type=Path, metavar='DIR')
     parser.add_argument('--nmea', action='append', default=[], metavar='SOURCE')
     parser.add_argument('--keep-days', type=number(0.0), metavar='N')

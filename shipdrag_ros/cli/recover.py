@@ -8,6 +8,8 @@ Options
 -------
 SOURCE
     MCAP file, or rosbag2 directory, whose files are joined
+--out BAG
+    MCAP file to make; an existing one is not overwritten
 
 Examples
 --------
@@ -32,9 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('source', type=bag, metavar='SOURCE')
-    add_out(
-        parser, new_file('.mcap'), 'BAG', 'MCAP file to make; an existing one is not overwritten'
-    )
+    add_out(parser, new_file('.mcap'), 'BAG')
     add_json(parser)
 
 

@@ -5,6 +5,13 @@ heading and shaft sensors read, with the truth attached as truth.yaml.
 
 Options
 -------
+--ship FILE
+    ship file with a baseline (YAML)
+--out BAG
+    MCAP file to make; an existing one is not overwritten
+--speed M_S
+    steady speed through water before the stop [m/s] (default:
+    {simulated.SPEED_FRACTION:g} of the highest speed that the baseline is given for)
 --duration S
     record from the stop on [s]
 --lead-in S
@@ -43,14 +50,7 @@ from pathlib import Path
 
 from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked, number, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.library.simulated import (
-    SPEED_FRACTION,
-    SimulationSettings,
-    make,
-    moment_ns,
-    usual_speed,
-    write_bag,
-)
+from shipdrag_ros.library import simulated
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
@@ -65,15 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, 'ship file with a baseline (YAML)', required=True)
-    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
-    parser.add_argument(
-        '--speed',
-        type=number(0.0, 40.0, unit='m/s', above=True),
-        metavar='M_S',
-        help='steady speed through water before the stop [m/s] (default: '
-        f'{SPEED_FRACTION:g} of the highest speed that the baseline is given for)',
-    )
+    add_ship(parser, required=True)
+    add_out(parser, Path, 'BAG')
+    parser.add_argument('--speed', type=number(0.0, 40.0, unit='m/s', above=True), metavar='M_S')
     parser.add_argument(
         '--duration',
         type=number(0.0, 1e6, unit='s', above=True),
@@ -102,7 +96,7 @@ def _add_day(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--first-heading', type=number(-2 * math.pi, 2 * math.pi, unit='rad'), metavar='RAD'
     )
-    parser.add_argument('--start', type=checked(moment_ns), metavar='DATE')
+    parser.add_argument('--start', type=checked(simulated.moment_ns), metavar='DATE')
 
 
 def _add_sensors(parser: argparse.ArgumentParser) -> None:
@@ -127,8 +121,8 @@ def run(options: argparse.Namespace) -> int:
     effects_of(ship)  # those that her file declares are known by name from here on
     speed_m_s = options.speed
     if speed_m_s is None:
-        speed_m_s = usual_speed(ship)
-    settings = SimulationSettings(
+        speed_m_s = simulated.usual_speed(ship)
+    settings = simulated.SimulationSettings(
         speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
@@ -141,8 +135,8 @@ def run(options: argparse.Namespace) -> int:
         first_heading_rad=options.first_heading,
         start_ns=START_NS if options.start is None else options.start,
     )
-    block, truth = make(ship, settings)
-    write_bag(options.out, block, ship, truth, output)
+    block, truth = simulated.make(ship, settings)
+    simulated.write_bag(options.out, block, ship, truth, output)
     counts = Counter(Channel(code).input for code in block.channel.tolist())
     output.say(
         f'{options.out}: {len(block)} messages; after {settings.lead_in_s:g} s at '

@@ -8,6 +8,8 @@ files are lost, cut off, unreadable, or from a clock without a date.
 
 Options
 -------
+--out DIR
+    folder; must be empty or new
 --ships N
     how many ships
 --months M
@@ -73,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_out(parser, Path, 'DIR', 'folder; must be empty or new')
+    add_out(parser, Path, 'DIR')
     parser.add_argument('--ships', type=whole(1, 1000), default=3, metavar='N')
     parser.add_argument(
         '--months', type=number(0.0, 600.0, unit='months', above=True), default=12.0, metavar='M'

@@ -11,6 +11,8 @@ BAG
     bag or log to play
 --speed X
     seconds of a bag in a second [-]
+--ship FILE
+    ship file, instead of that of the node or of the bag
 --earlier DIR
     folder of bags that this ship's nodes recorded: their coastdowns are listed
 --node NAME
@@ -25,6 +27,8 @@ BAG
     of the page, 0: any free one
 --listen ADDRESS
     address to listen on; any but that of this machine alone needs --token-file
+--token-file FILE
+    text of at least {SHORTEST_TOKEN} characters that a viewer must give
 
 Examples
 --------
@@ -69,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--speed', type=number(0.0, FASTEST, above=True), default=10.0, metavar='X'
     )
-    add_ship(parser, 'ship file, instead of that of the node or of the bag')
+    add_ship(parser)
     parser.add_argument('--earlier', type=Path, metavar='DIR')
     parser.add_argument('--node', default='', metavar='NAME')
     parser.add_argument('--signal-k', type=whole(0, 65535), metavar='PORT')
@@ -81,12 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--port', type=whole(0, 65535), default=8088)
     parser.add_argument('--listen', default=LOOPBACK, metavar='ADDRESS')
-    parser.add_argument(
-        '--token-file',
-        type=Path,
-        metavar='FILE',
-        help=f'text of at least {SHORTEST_TOKEN} characters that a viewer must give',
-    )
+    parser.add_argument('--token-file', type=Path, metavar='FILE')
 
 
 def run(options: argparse.Namespace) -> int:

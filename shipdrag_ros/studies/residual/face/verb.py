@@ -10,6 +10,8 @@ Options
 -------
 DATA.csv
     table with a header
+--form
+    {AUTO}: the one that predicts left-out hulls best
 --target COLUMN
     column of the residual resistance: coefficient c_R, or force per weight
 --predict NEW.csv
@@ -71,12 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('data', type=Path, metavar='DATA.csv')
-    parser.add_argument(
-        '--form',
-        required=True,
-        choices=(*FORMS, AUTO),
-        help=f'{AUTO}: the one that predicts left-out hulls best',
-    )
+    parser.add_argument('--form', required=True, choices=(*FORMS, AUTO))
     parser.add_argument('--target', required=True, metavar='COLUMN')
     parser.add_argument('--predict', type=Path, metavar='NEW.csv')
     parser.add_argument('--ship', type=Path, metavar='FILE')

@@ -8,8 +8,17 @@ coastdown to be judged right, and which effect a wrong one is taken for.
 
 Options
 -------
+--model
+    manoeuvring model (default: {_MODEL})
 --ship FILE
     ship file with a baseline, in its place
+--manoeuvre NAME
+    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {coast.KIND} or
+    {coast.KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {coast.KIND} from
+    {coast.SPEED_FRACTION:g} of the highest speed of the baseline)
+--keep N
+    how many to keep (default: {_KEEP} derivatives; with --ship those values of which 10 per cent
+    move the record beyond its noise)
 """
 
 from __future__ import annotations
@@ -24,7 +33,7 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.manoeuvring.ship import mariner
 from shipdrag_ros.studies.manoeuvring.simulate import parse
-from shipdrag_ros.studies.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
+from shipdrag_ros.studies.sensitivity import coast
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting, steering
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
@@ -39,24 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     subject = parser.add_mutually_exclusive_group()
     # without a default of argparse, which would not say that both are given
-    subject.add_argument(
-        '--model', choices=list(_MODELS), help=f'manoeuvring model (default: {_MODEL})'
-    )
+    subject.add_argument('--model', choices=list(_MODELS))
     subject.add_argument('--ship', type=Path, metavar='FILE')
-    parser.add_argument(
-        '--manoeuvre',
-        metavar='NAME',
-        help='zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship '
-        f'{KIND} or {KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {KIND} from '
-        f'{SPEED_FRACTION:g} of the highest speed of the baseline)',
-    )
-    parser.add_argument(
-        '--keep',
-        type=int,
-        metavar='N',
-        help=f'how many to keep (default: {_KEEP} derivatives; with --ship those values of which '
-        '10 per cent move the record beyond its noise)',
-    )
+    parser.add_argument('--manoeuvre', metavar='NAME')
+    parser.add_argument('--keep', type=int, metavar='N')
     add_report(parser, of='result')
     add_json(parser)
 
@@ -82,6 +77,8 @@ def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]
 
 def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = Ship.load(options.ship)
-    coast = parse_coast(ship, KIND if options.manoeuvre is None else options.manoeuvre)
-    found = study_coast(ship, coast, keep=options.keep)
+    sailed = coast.parse_coast(
+        ship, coast.KIND if options.manoeuvre is None else options.manoeuvre
+    )
+    found = study_coast(ship, sailed, keep=options.keep)
     return coasting.shown(found), found.to_dict()
