@@ -146,8 +146,7 @@ class Forecasts(Shown):
             if first[0].followed is not None:
                 seen = first[0].followed
                 axis.plot(seen.time_s / 60.0, seen.speed_m_s / unit, 'k.', ms=2, label='followed')
-            axis.set_xlabel('time from the stop [min]')
-            axis.set_ylabel(f'speed [{name}]')
+            axis.set(xlabel='time from the stop [min]', ylabel=f'speed [{name}]')
             axis.legend()
         return axis
 

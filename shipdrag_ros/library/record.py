@@ -300,8 +300,7 @@ class Record(Shown):
                     minutes = (part.stamp_ns - block.stamp_ns[0]) / (60.0 * SECOND_NS)
                     label = channel.input.replace('_', ' ')
                     axis.plot(minutes, part.value[:, 0] / unit, '.', markersize=2, label=label)
-            axis.set_xlabel('time [min]')
-            axis.set_ylabel(f'speed [{unit_name}]')
+            axis.set(xlabel='time [min]', ylabel=f'speed [{unit_name}]')
             if axis.lines:
                 axis.legend()
         return axis

@@ -262,8 +262,7 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Pic
         if row['clean_m_s2'] is not None:
             clean = mass_kg / unit * np.asarray(row['clean_m_s2'], dtype=float)
             axes.plot(knots[known], clean[known], color=VERMILION, ls='--', label='clean hull')
-        axes.set_xlabel('speed through water [knots]')
-        axes.set_ylabel(f'resistance [{name}]')
+        axes.set(xlabel='speed through water [knots]', ylabel=f'resistance [{name}]')
         axes.set_ylim(bottom=0.0)
         axes.legend(loc='upper left')
     return picture(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipdrag_ros.display import Section, Table
-from shipdrag_ros.report.drawing import BLUE, new_figure, styled
+from shipdrag_ros.report.drawing import BLUE, one_axis
 from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import WORST, CoastStudy
@@ -29,9 +29,7 @@ def particulars_picture(found: CoastStudy) -> Figure:
     order = (*found.selection.kept, *found.selection.dropped)
     table = found.losses.table[[found.losses.names.index(name) for name in order]]
     places = np.arange(len(order))[::-1]
-    with styled():
-        figure = new_figure(9.0, 0.8 + 0.28 * len(order))
-        axis = figure.subplots()
+    with one_axis(9.0, 0.8 + 0.28 * len(order)) as (figure, axis):
         axis.barh(
             places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
         )
@@ -56,9 +54,7 @@ def mimic_picture(found: CoastStudy) -> Figure:
     Draw how much of each effect is left when a value is blamed for it.
     """
     places = np.arange(len(found.mimics))[::-1]
-    with styled():
-        figure = new_figure(9.0, 0.8 + 0.28 * len(places))
-        axis = figure.subplots()
+    with one_axis(9.0, 0.8 + 0.28 * len(places)) as (figure, axis):
         left = [mimic.left for mimic in found.mimics]
         axis.barh(places, left, color=BLUE, height=0.65)
         for place, mimic in zip(places, found.mimics):

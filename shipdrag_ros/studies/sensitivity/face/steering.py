@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipdrag_ros.display import Section, Table
-from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, styled
+from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.manoeuvring.simulate import ManoeuvreMotion
@@ -36,9 +36,7 @@ def ranking_picture(found: SteeringStudy) -> Figure:
     losses, order = found.losses, found.losses.ranking
     places = np.arange(len(order))[::-1]
     chosen = [losses.names.index(name) for name in order]
-    with styled():
-        figure = new_figure(9.0, 0.8 + 0.2 * len(order))
-        axis = figure.subplots()
+    with one_axis(9.0, 0.8 + 0.2 * len(order)) as (figure, axis):
         count = len(found.selection.kept)
         for part, color, label in (
             (slice(0, count), BLUE, 'kept'),
@@ -57,8 +55,7 @@ def ranking_picture(found: SteeringStudy) -> Figure:
             axis.axvline(found.selection.threshold, color='#555555', linewidth=0.8)
         axis.set_xscale('log')
         axis.set_yticks(places, [f'{meaning(name)}  {name}' for name in order], fontsize=8)
-        axis.set_ylim(-0.7, len(order) - 0.3)
-        axis.set_xlabel('mean loss [of the speed: 0.1 is a tenth]')
+        axis.set(ylim=(-0.7, len(order) - 0.3), xlabel='mean loss [of the speed: 0.1 is a tenth]')
         axis.grid(visible=False, axis='y')
         axis.legend(loc='lower right')
     return figure
@@ -101,9 +98,7 @@ def design_picture(shown: Experiment) -> Figure:
     from matplotlib.colors import LogNorm
 
     manoeuvres = [manoeuvre.name for manoeuvre in shown.manoeuvres]
-    with styled({'axes.grid': False}):
-        figure = new_figure(9.0, 3.0)
-        axis = figure.subplots()
+    with one_axis(9.0, 3.0, {'axes.grid': False}) as (figure, axis):
         largest = float(np.max(shown.loss))
         image = axis.imshow(
             np.maximum(shown.loss.T, 1e-5 * largest),
@@ -117,8 +112,7 @@ def design_picture(shown: Experiment) -> Figure:
         )
         axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
         axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
-        axis.set_xlabel('derivative')
-        axis.set_ylabel('manoeuvre')
+        axis.set(xlabel='derivative', ylabel='manoeuvre')
         figure.colorbar(image, label='loss of 10 %\n[of the speed]')
     return figure
 

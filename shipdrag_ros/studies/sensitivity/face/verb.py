@@ -77,8 +77,6 @@ def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]
 
 def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = Ship.load(options.ship)
-    sailed = coast.parse_coast(
-        ship, coast.KIND if options.manoeuvre is None else options.manoeuvre
-    )
-    found = study_coast(ship, sailed, keep=options.keep)
+    asked = coast.KIND if options.manoeuvre is None else options.manoeuvre
+    found = study_coast(ship, coast.parse_coast(ship, asked), keep=options.keep)
     return coasting.shown(found), found.to_dict()

@@ -34,7 +34,7 @@ from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.report.drawing import BLUE, VERMILION, new_figure, styled
+from shipdrag_ros.report.drawing import BLUE, VERMILION, one_axis
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
@@ -50,9 +50,7 @@ def degree_picture(surface: Surface) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    with styled():
-        figure = new_figure(9.0, 2.8)
-        axis = figure.subplots()
+    with one_axis(9.0, 2.8) as (figure, axis):
         axis.plot(surface.degrees, np.sqrt(surface.table.variance), color=BLUE, marker='o')
         if np.all(surface.table.variance > 0.0):
             axis.set_yscale('log')
@@ -60,8 +58,7 @@ def degree_picture(surface: Surface) -> Figure:
             surface.degree, color=VERMILION, linestyle='--', label=f'chosen: {surface.degree}'
         )
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axis.set_xlabel('degree')
-        axis.set_ylabel('RMSE')
+        axis.set(xlabel='degree', ylabel='RMSE')
         axis.legend()
     return figure
 
@@ -70,13 +67,10 @@ def residual_picture(fitted: Float64, measured: Float64, target: str) -> Figure:
     """
     Draw what a fit leaves, against what it says.
     """
-    with styled():
-        figure = new_figure(9.0, 2.8)
-        axis = figure.subplots()
+    with one_axis(9.0, 2.8) as (figure, axis):
         axis.plot(fitted, measured - fitted, '.', color='#888888', markersize=4, rasterized=True)
         axis.axhline(0.0, color=BLUE, linewidth=1.0)
-        axis.set_xlabel(f'{target}, fitted')
-        axis.set_ylabel('measured - fitted')
+        axis.set(xlabel=f'{target}, fitted', ylabel='measured - fitted')
     return figure
 
 
@@ -87,14 +81,11 @@ def contour_picture(surface: Surface, points: Float64, target: str) -> Figure:
     low, high = surface.domain.lower, surface.domain.upper
     x, y = np.meshgrid(np.linspace(low[0], high[0], 61), np.linspace(low[1], high[1], 61))
     value = surface.polynomial(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-    with styled():
-        figure = new_figure(6.5, 4.6)
-        axis = figure.subplots()
+    with one_axis(6.5, 4.6) as (figure, axis):
         drawn = axis.contourf(x, y, value, levels=16, cmap='cividis')
         figure.colorbar(drawn, label=target)
         axis.plot(points[:, 0], points[:, 1], '.', color='white', markersize=2, rasterized=True)
-        axis.set_xlabel(surface.inputs[0])
-        axis.set_ylabel(surface.inputs[1])
+        axis.set(xlabel=surface.inputs[0], ylabel=surface.inputs[1])
     return figure
 
 
@@ -112,9 +103,7 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
     from matplotlib.ticker import NullFormatter, ScalarFormatter
 
     inside = leverage <= 1.0
-    with styled():
-        figure = new_figure(9.0, 3.0)
-        axis = figure.subplots()
+    with one_axis(9.0, 3.0) as (figure, axis):
         axis.semilogx(leverage[inside], error[inside], '.', color=BLUE, label='within')
         axis.semilogx(
             leverage[~inside], error[~inside], 'x', color=VERMILION, label='beyond the data'
