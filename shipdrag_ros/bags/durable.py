@@ -20,32 +20,12 @@ from time import monotonic
 from uuid import uuid4
 
 from isal.isal_zlib import crc32
+from mcap import records as mcap_records
 from mcap.data_stream import RecordBuilder
-from mcap.records import (
-    Channel,
-    Chunk,
-    DataEnd,
-    Footer,
-    Header,
-    Message,
-    Metadata,
-    Schema,
-)
 
+from shipdrag_ros.bags import writer
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.recover import compact
-from shipdrag_ros.bags.writer import (
-    LIBRARY,
-    METADATA,
-    PROFILE,
-    as_bytes,
-    attachment,
-    channel,
-    metadata,
-    private_opener,
-    schema,
-    sync_directory,
-)
 from shipdrag_ros.errors import BagError, reason_of
 from shipdrag_ros.messages import EncodedMessage
 
@@ -91,12 +71,12 @@ class LiveFile:
         self.size_bytes = self.synced_bytes = self.synced_messages = 0
         self.first_log_ns: int | None = None
         self._messages = 0
-        self._schemas: dict[str, Schema] = {}
-        self._channels: dict[tuple[str, str], Channel] = {}
+        self._schemas: dict[str, mcap_records.Schema] = {}
+        self._channels: dict[tuple[str, str], mcap_records.Channel] = {}
         self._declared_at = 0
         try:
             # unbuffered: what could not be written must not be tried again on closing
-            self._file = open(path, 'xb', buffering=0, opener=private_opener)  # noqa: SIM115
+            self._file = open(path, 'xb', buffering=0, opener=writer.private_opener)  # noqa: SIM115
             with suppress(OSError):  # not every file system has locks
                 flock(self._file, LOCK_EX | LOCK_NB)
         except FileExistsError:
@@ -106,14 +86,14 @@ class LiveFile:
         try:
             self._write(
                 MAGIC
-                + as_bytes(
-                    Header(PROFILE, LIBRARY),
-                    Metadata(METADATA, metadata(recording_id, part)),
+                + writer.as_bytes(
+                    mcap_records.Header(writer.PROFILE, writer.LIBRARY),
+                    mcap_records.Metadata(writer.METADATA, writer.metadata(recording_id, part)),
                 )
-                + as_bytes(*starmap(attachment, attachments.items()))
+                + writer.as_bytes(*starmap(writer.attachment, attachments.items()))
             )
             self.sync()
-            sync_directory(path.parent)
+            writer.sync_directory(path.parent)
         except BagError:
             self.abandon()
             raise
@@ -132,11 +112,11 @@ class LiveFile:
         """
         new = [record for message in messages for record in self._declare(message)]
         if new:
-            self._write(as_bytes(*new))
+            self._write(writer.as_bytes(*new))
         if self.size_bytes - self._declared_at > DECLARE_BYTES:
-            self._write(as_bytes(*self._schemas.values(), *self._channels.values()))
+            self._write(writer.as_bytes(*self._schemas.values(), *self._channels.values()))
             self._declared_at = self.size_bytes
-        self._write(as_bytes(self._chunk(messages)))
+        self._write(writer.as_bytes(self._chunk(messages)))
         self._messages += len(messages)
         if self.first_log_ns is None:
             self.first_log_ns = messages[0].log_ns
@@ -183,7 +163,7 @@ class LiveFile:
         BagError
             If the disk does not take it.
         """
-        self._write(as_bytes(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
+        self._write(writer.as_bytes(mcap_records.DataEnd(0), mcap_records.Footer(0, 0, 0)) + MAGIC)
         self.sync()
 
     def abandon(self) -> None:
@@ -205,25 +185,27 @@ class LiveFile:
         with suppress(OSError):
             self._file.close()
 
-    def _declare(self, message: EncodedMessage) -> list[Schema | Channel]:
+    def _declare(
+        self, message: EncodedMessage
+    ) -> list[mcap_records.Schema | mcap_records.Channel]:
         """Return what must be said before this message can be understood."""
-        new: list[Schema | Channel] = []
+        new: list[mcap_records.Schema | mcap_records.Channel] = []
         key = (message.topic, message.type)
         if key not in self._channels:
             if message.type not in self._schemas:
                 number = len(self._schemas) + 1
-                self._schemas[message.type] = schema(number, message.type)
+                self._schemas[message.type] = writer.schema(number, message.type)
                 new.append(self._schemas[message.type])
-            self._channels[key] = channel(
+            self._channels[key] = writer.channel(
                 len(self._channels) + 1, *key, schema_id=self._schemas[message.type].id
             )
             new.append(self._channels[key])
         return new
 
-    def _chunk(self, messages: Sequence[EncodedMessage]) -> Chunk:
+    def _chunk(self, messages: Sequence[EncodedMessage]) -> mcap_records.Chunk:
         builder = RecordBuilder()
         for message in messages:
-            Message(
+            mcap_records.Message(
                 channel_id=self._channels[message.topic, message.type].id,
                 sequence=0,
                 log_time=message.log_ns,
@@ -232,7 +214,7 @@ class LiveFile:
                 data=message.payload,
             ).write(builder)
         data = builder.end()
-        return Chunk(
+        return mcap_records.Chunk(
             compression='',
             data=data,
             message_start_time=min(message.log_ns for message in messages),

@@ -36,16 +36,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_remap,
-    add_report,
-    add_ship,
-    add_stop,
-    add_window,
-    unused_file,
-)
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.errors import DiagnosisError
@@ -60,12 +51,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag)
-    add_ship(parser)
-    parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
-    add_report(parser, of='diagnosis')
-    add_window(parser)
-    add_stop(parser)
+    arguments.add_bags(parser, windowed_bag)
+    arguments.add_ship(parser)
+    parser.add_argument('--write', type=arguments.unused_file('.yaml'), metavar='FILE')
+    arguments.add_report(parser, of='diagnosis')
+    arguments.add_window(parser)
+    arguments.add_stop(parser)
     parser.add_argument(
         '--fact',
         action='append',
@@ -76,8 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'known of one run stands in run.yaml beside its bag, or in BAG.run.yaml',
     )
     parser.add_argument('--earlier', type=Path, action='append', default=[], metavar='FILE')
-    add_remap(parser)
-    add_json(parser)
+    arguments.add_remap(parser)
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -29,15 +29,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_out,
-    add_remap,
-    add_report,
-    add_ship,
-    unused_file,
-)
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
@@ -50,13 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, metavar='BAG_OR_STORE')
-    add_ship(parser)
-    add_out(parser, unused_file('.yaml'), 'FILE')
+    arguments.add_bags(parser, windowed_bag, metavar='BAG_OR_STORE')
+    arguments.add_ship(parser)
+    arguments.add_out(parser, arguments.unused_file('.yaml'), 'FILE')
     parser.add_argument('--name', metavar='NAME')
-    add_report(parser, of='result')
-    add_remap(parser)
-    add_json(parser)
+    arguments.add_report(parser, of='result')
+    arguments.add_remap(parser)
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

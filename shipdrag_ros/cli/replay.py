@@ -28,16 +28,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_remap,
-    add_report,
-    add_settings,
-    add_stop,
-    add_window,
-)
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.coastdown.events import EndedCoastdown
@@ -63,15 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag)
-    add_settings(parser)
-    add_window(parser)
-    add_stop(parser)
-    add_remap(parser)
+    arguments.add_bags(parser, windowed_bag)
+    arguments.add_settings(parser)
+    arguments.add_window(parser)
+    arguments.add_stop(parser)
+    arguments.add_remap(parser)
     parser.add_argument('--compare', action='store_true')
     parser.add_argument('--out', type=Path, metavar='DIR')
-    add_report(parser, of='report')
-    add_json(parser)
+    arguments.add_report(parser, of='report')
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

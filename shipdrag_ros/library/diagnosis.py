@@ -17,16 +17,9 @@ from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
+from shipdrag_ros.library import replaying
 from shipdrag_ros.library.diagnosing import coasts_of, diagnose_runs
 from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.replaying import (
-    Listener,
-    Notes,
-    WindowedRun,
-    WindowSpan,
-    refuse_overlaps,
-    refuse_two_ships,
-)
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
 from shipdrag_ros.progress import Progress, silent
@@ -239,7 +232,7 @@ def diagnose(
     ship: Ship | None = None,
     facts: Sequence[str] = (),
     earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
-    window: WindowSpan | None = None,
+    window: replaying.WindowSpan | None = None,
 ) -> Diagnosis:
     """
     Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.
@@ -290,11 +283,11 @@ def diagnose(
     'none'
     """
     parts = records_of(records)
-    runs = [WindowedRun(run, window) for record in parts for run in record.runs]
-    refuse_overlaps(runs)
+    runs = [replaying.WindowedRun(run, window) for record in parts for run in record.runs]
+    replaying.refuse_overlaps(runs)
     if ship is None:
-        refuse_two_ships((run, record.given) for record in parts for run in record.runs)
-    listener = Notes()
+        replaying.refuse_two_ships((run, record.given) for record in parts for run in record.runs)
+    listener = replaying.Notes()
     given: Sequence[Fact] = [
         parse_fact(text) for text in ([facts] if isinstance(facts, str) else facts)
     ]
@@ -347,13 +340,13 @@ def learn(
     None
     """
     parts = records_of(records)
-    runs = [WindowedRun(run, None) for record in parts for run in record.runs]
-    return learn_from(Notes(), runs, ship or parts[0].given, name)
+    runs = [replaying.WindowedRun(run, None) for record in parts for run in record.runs]
+    return learn_from(replaying.Notes(), runs, ship or parts[0].given, name)
 
 
 def learn_from(
-    listener: Listener,
-    runs: Sequence[WindowedRun],
+    listener: replaying.Listener,
+    runs: Sequence[replaying.WindowedRun],
     given: Ship | None,
     name: str,
     progress: Progress = silent,
@@ -375,9 +368,9 @@ def learn_from(
         Called with each stage, how much of it is done, and of how much.
     """
     check_name(name)
-    refuse_overlaps(runs)
+    replaying.refuse_overlaps(runs)
     if given is None:
-        refuse_two_ships((run, None) for run, _ in runs)
+        replaying.refuse_two_ships((run, None) for run, _ in runs)
     coasts, ship, parameters = coasts_of(listener, runs, given, progress, whole=True)
     coasts = sorted(coasts, key=lambda coast: coast.window.start_ns)
     return learn_runs(coasts, ship, parameters, name=name, progress=progress)

@@ -38,18 +38,7 @@ from shipdrag_ros.messages import (
     decode,
     encode,
     input_type,
-)
-from shipdrag_ros.messages.topics import (
-    DIAGNOSTICS,
-    RESISTANCE,
-    RESISTANCE_CURVE,
-    SPEED,
-    Health,
-    Heard,
-    NodeMessage,
-    Samples,
-    ShipFile,
-    health_of,
+    topics,
 )
 from shipdrag_ros.messages.topics import read_health as decode_health
 from shipdrag_ros.messages.types import stamp_ns
@@ -86,7 +75,7 @@ class Spectator:
     """
 
     def __init__(
-        self, hear: Callable[[Heard], None], *, node: str = '', marks: bool = False
+        self, hear: Callable[[topics.Heard], None], *, node: str = '', marks: bool = False
     ) -> None:
         self.node = ''
         self.others: tuple[str, ...] = ()
@@ -106,7 +95,11 @@ class Spectator:
         self._of_inputs: dict[str, tuple[str, str, Any]] = {}
         self._last_s: dict[str, float] = {}
         self._ros.create_subscription(
-            message_class(DIAGNOSTICS), '/diagnostics', self._on_diagnostics, _RELIABLE, raw=True
+            message_class(topics.DIAGNOSTICS),
+            '/diagnostics',
+            self._on_diagnostics,
+            _RELIABLE,
+            raw=True,
         )
         self._ros.create_timer(LOOK_S, self._look)
         self._thread = threading.Thread(target=self._spin, name='spectator', daemon=True)
@@ -150,12 +143,12 @@ class Spectator:
 
     def _look(self) -> None:
         """Find the node by the curve that it offers, and hear it."""
-        ending = f'/{RESISTANCE_CURVE.name}'
+        ending = f'/{topics.RESISTANCE_CURVE.name}'
         found = sorted(
             topic.removesuffix(ending)
             for topic, kinds in self._ros.get_topic_names_and_types()
             if topic.endswith(ending)
-            and RESISTANCE_CURVE.type in kinds
+            and topics.RESISTANCE_CURVE.type in kinds
             and self._ros.count_publishers(topic)
         )
         if self._wanted:
@@ -178,7 +171,7 @@ class Spectator:
             self._ros.create_subscription(
                 message_class(topic.type),
                 topic.under(node),
-                lambda payload, name=topic.name: self._hear(NodeMessage(name, payload)),
+                lambda payload, name=topic.name: self._hear(topics.NodeMessage(name, payload)),
                 LATCHED if topic.latched else _RELIABLE,
                 raw=True,
             )
@@ -188,7 +181,7 @@ class Spectator:
             self._ros.create_subscription(
                 String,
                 f'{node}/ship',
-                lambda message: self._hear(ShipFile(message.data)),
+                lambda message: self._hear(topics.ShipFile(message.data)),
                 LATCHED,
             )
         )
@@ -203,13 +196,13 @@ class Spectator:
             self._hear_inputs(own[0])
             self._hear(own[0])
 
-    def _is_own(self, health: Health) -> bool:
+    def _is_own(self, health: topics.Health) -> bool:
         """Whether it is of the node heard; a status may give its name with or without place."""
         name = health.statuses[0].node.strip('/')
         full = (self._wanted or self.node).strip('/')
         return not full or name == full or full.endswith(f'/{name}')
 
-    def _hear_inputs(self, health: Health) -> None:
+    def _hear_inputs(self, health: topics.Health) -> None:
         """Hear the topics that the node hears, in the types that it hears."""
         for status in health.inputs:
             topic, kind = status.values.get('topic', ''), status.values.get('type', '')
@@ -238,7 +231,7 @@ class Spectator:
         self._last_s[source.input] = now_s
         block = decode(source, [payload], [time.time_ns()]).block
         if len(block):
-            self._hear(Samples(block))
+            self._hear(topics.Samples(block))
 
 
 QOS = QoSProfile(depth=1000)
@@ -394,7 +387,10 @@ class Rehearsal:
         self._player = Player(self._node, self._executor)
         self._ready = False
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
-        for topic, callback in ((SPEED, self._hear_speed), (RESISTANCE, self._hear_resistance)):
+        for topic, callback in (
+            (topics.SPEED, self._hear_speed),
+            (topics.RESISTANCE, self._hear_resistance),
+        ):
             self._node.create_subscription(
                 message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
             )
@@ -457,7 +453,7 @@ class Rehearsal:
         rclpy.try_shutdown(context=self._context)
 
     def _hear_health(self, message: DiagnosticArray) -> None:
-        for health in health_of(message.status):
+        for health in topics.health_of(message.status):
             state = health.of('state')
             assert state is not None  # by which a node is known
             compiling = 'compiling [s]' in state.values

@@ -7,20 +7,13 @@ from math import pi, sqrt
 
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal
 from shipdrag_ros.ship import GRAVITY_M_S2
+from shipdrag_ros.simulation import effect
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    DENIES,
-    WEIGHTS,
-    Effect,
-    Frame,
-    Measure,
-    Scope,
-)
 
 _LENGTHS = 0.5  # of a wave, in lengths of the ship: shorter ones than those that heave her
 
 
-def _act(frame: Frame, force_n: float, side: float) -> Action:
+def _act(frame: effect.Frame, force_n: float, side: float) -> Action:
     frequency = sqrt(2.0 * pi * GRAVITY_M_S2 / (_LENGTHS * frame.ship.length_m))
     return Action(
         wave_force_n=frame.earth(-side * force_n, 0.0),
@@ -28,9 +21,9 @@ def _act(frame: Frame, force_n: float, side: float) -> Action:
     )
 
 
-EFFECT = Effect(
+EFFECT = effect.Effect(
     name='waves',
-    scope=Scope.EARTH,
+    scope=effect.Scope.EARTH,
     parameters=(
         Parameter(
             name='force_n',
@@ -40,7 +33,7 @@ EFFECT = Effect(
             prior=log_normal(2e-4, 0.8),
             low=0.0,
             high=0.02,
-            measured_in=WEIGHTS,
+            measured_in=effect.WEIGHTS,
         ),
         Parameter(
             name='from',
@@ -60,9 +53,9 @@ EFFECT = Effect(
     formula_sd=0.3,
     act=_act,
     confounders={
-        'fouling': (Measure.RECIPROCAL_RUN,),
-        'locked_propeller': (Measure.RECIPROCAL_RUN,),
-        'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
+        'fouling': (effect.Measure.RECIPROCAL_RUN,),
+        'locked_propeller': (effect.Measure.RECIPROCAL_RUN,),
+        'residual_thrust': (effect.Measure.RECIPROCAL_RUN, effect.Measure.SHAFT),
     },
-    facts={'no_waves': DENIES, 'calm': DENIES},
+    facts={'no_waves': effect.DENIES, 'calm': effect.DENIES},
 )

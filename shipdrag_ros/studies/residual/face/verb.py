@@ -43,23 +43,9 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.fit import (
-    AUTO,
-    FORMS,
-    OPTIONAL,
-    REQUIRED,
-    Hulls,
-    ResidualFit,
-    fit_residual,
-    leave_hulls_out,
-)
-from shipdrag_ros.studies.surface.face.verb import (
-    left_out_picture,
-    prediction_documents,
-    predictions_table,
-    residual_picture,
-)
+from shipdrag_ros.studies.surface.face import verb
 from shipdrag_ros.studies.surface.fit import Prediction
 
 if TYPE_CHECKING:
@@ -73,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('data', type=Path, metavar='DATA.csv')
-    parser.add_argument('--form', required=True, choices=(*FORMS, AUTO))
+    parser.add_argument('--form', required=True, choices=(*fit.FORMS, fit.AUTO))
     parser.add_argument('--target', required=True, metavar='COLUMN')
     parser.add_argument('--predict', type=Path, metavar='NEW.csv')
     parser.add_argument('--ship', type=Path, metavar='FILE')
@@ -91,18 +77,18 @@ def run(options: argparse.Namespace) -> int:
     if (options.ship is None) != (options.write is None):
         raise DataError('--write', ['--ship FILE and --write FILE belong together; give both'])
     ship = None if options.ship is None else Ship.load(options.ship)
-    needed: tuple[str, ...] = REQUIRED
-    if options.form != AUTO and FORMS[options.form].needs_lcb:
-        needed = (*REQUIRED, 'lcb')
-    if options.target in (*REQUIRED, *OPTIONAL):
+    needed: tuple[str, ...] = fit.REQUIRED
+    if options.form != fit.AUTO and fit.FORMS[options.form].needs_lcb:
+        needed = (*fit.REQUIRED, 'lcb')
+    if options.target in (*fit.REQUIRED, *fit.OPTIONAL):
         raise DataError(
             '--target',
             [f'{options.target!r} is a ratio of the hull; name the column of its resistance'],
         )
-    table = read_numbers(options.data, (*needed, options.target), optional=OPTIONAL)
-    hulls = Hulls.of(str(options.data), table.names, table.values)
+    table = read_numbers(options.data, (*needed, options.target), optional=fit.OPTIONAL)
+    hulls = fit.Hulls.of(str(options.data), table.names, table.values)
     values = table.column(options.target)
-    found = fit_residual(hulls, values, form=options.form)
+    found = fit.fit_residual(hulls, values, form=options.form)
     predictions = [] if options.predict is None else _predictions(options.predict, found)
     source = f'{options.data.name}, {len(values)} rows'
     seen = shown(found, predictions, values, target=options.target, source=source)
@@ -111,18 +97,18 @@ def run(options: argparse.Namespace) -> int:
         written = with_residual(ship, found, lcb=options.lcb)
         options.write.write_text(written.to_yaml(), encoding='utf-8')
         output.log(f'ship file with the fitted wave resistance in {options.write}')
-    output.json({**found.to_dict(), 'predictions': prediction_documents(predictions)})
+    output.json({**found.to_dict(), 'predictions': verb.prediction_documents(predictions)})
     return 0
 
 
-def _predictions(path: Path, found: ResidualFit) -> list[Prediction]:
-    needed = (*REQUIRED, 'lcb') if found.form.needs_lcb else REQUIRED
-    table = read_numbers(path, needed, optional=OPTIONAL)
-    return found.predict(Hulls.of(str(path), table.names, table.values))
+def _predictions(path: Path, found: fit.ResidualFit) -> list[Prediction]:
+    needed = (*fit.REQUIRED, 'lcb') if found.form.needs_lcb else fit.REQUIRED
+    table = read_numbers(path, needed, optional=fit.OPTIONAL)
+    return found.predict(fit.Hulls.of(str(path), table.names, table.values))
 
 
 def shown(
-    found: ResidualFit,
+    found: fit.ResidualFit,
     predictions: Sequence[Prediction],
     values: Float64,
     *,
@@ -146,22 +132,22 @@ def shown(
     def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
         drawn = [
             (
-                residual_picture(values - found.fit.residuals, values, target),
+                verb.residual_picture(values - found.fit.residuals, values, target),
                 'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
                 'the line everywhere; a bow or a slope shows a term that the form lacks.',
             )
         ]
-        error, _, leverage = leave_hulls_out(found.form, found.hulls, values)
+        error, _, leverage = fit.leave_hulls_out(found.form, found.hulls, values)
         if np.any(np.isfinite(error)):
             caption = (
                 'Each hull predicted from the others, so the error to expect of a new one. To the '
                 'right of 1 a hull is more unusual (leverage) than any of the others: there the '
                 'form goes beyond its data, and its predictions are marked as not to be used.'
             )
-            drawn.append((left_out_picture(error, leverage, target), caption))
+            drawn.append((verb.left_out_picture(error, leverage, target), caption))
         return {_FIT: drawn}
 
-    asked = [('Predictions', predictions_table(predictions))] if predictions else []
+    asked = [('Predictions', verb.predictions_table(predictions))] if predictions else []
     tables = (
         *asked,
         ('Coefficients of the form', coefficients(found)),
@@ -182,7 +168,7 @@ def shown(
     )
 
 
-def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
+def sentence(found: fit.ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
     """
     Say in words what was found.
     """
@@ -198,7 +184,7 @@ def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction])
     return said
 
 
-def technical(found: ResidualFit) -> str:
+def technical(found: fit.ResidualFit) -> str:
     """
     Say how well the data determine the form.
     """
@@ -228,7 +214,7 @@ def what_it_is(target: str) -> str:
     )
 
 
-def coefficients(found: ResidualFit) -> Table:
+def coefficients(found: fit.ResidualFit) -> Table:
     """
     Show the coefficients of the form, by the terms that they stand before.
     """
@@ -243,7 +229,7 @@ def coefficients(found: ResidualFit) -> Table:
     )
 
 
-def domain(found: ResidualFit) -> Table:
+def domain(found: fit.ResidualFit) -> Table:
     """
     Show the ranges of the data.
     """
