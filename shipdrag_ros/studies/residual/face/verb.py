@@ -11,7 +11,7 @@ Options
 DATA.csv
     table with a header
 --form
-    {AUTO}: the one that predicts left-out hulls best
+    {fit.AUTO}: the one that predicts left-out hulls best
 --target COLUMN
     column of the residual resistance: coefficient c_R, or force per weight
 --predict NEW.csv
