@@ -18,21 +18,16 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import FURTHER, Block
 
+_SPEEDS = (
+    types.TWIST_WITH_COVARIANCE,
+    types.TWIST,
+    types.VELOCITY,
+    types.ODOMETRY,
+    types.DVL,
+)
 _FIRST: Mapping[str, tuple[str, ...]] = {
-    'speed_through_water': (
-        types.TWIST_WITH_COVARIANCE,
-        types.TWIST,
-        types.VELOCITY,
-        types.ODOMETRY,
-        types.DVL,
-    ),
-    'speed_over_ground': (
-        types.TWIST_WITH_COVARIANCE,
-        types.TWIST,
-        types.VELOCITY,
-        types.ODOMETRY,
-        types.DVL,
-    ),
+    'speed_through_water': _SPEEDS,
+    'speed_over_ground': _SPEEDS,
     'position': (
         types.POSE_WITH_COVARIANCE,
         types.POSE,

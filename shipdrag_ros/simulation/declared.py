@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
-from shipdrag_ros.parameter import ABSOLUTE, Parameter, Scale
+from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
@@ -60,6 +61,50 @@ def effects_in(file: Traversable) -> Iterator[effect.Effect]:
         term = LearntTerm(**{key: value for key, value in given.items() if key in of_term})
         more = {key: value for key, value in given.items() if key in of_effect}
         yield replace(effect_of(term), **more)
+
+
+def stated(name: str, act: Callable[..., Action]) -> effect.Effect:
+    """
+    Return an effect of which a module says what it does, and a file of the library all else.
+    """
+    entry = _of_modules()[name]
+    of_effect, problems = keys_of(effect.Effect), list[str]()
+    more = read_keys(
+        of_effect, {key: entry[key] for key in entry if key in of_effect}, name, problems
+    )
+    if problems:
+        raise EffectFileError(name, problems)
+    return effect.Effect(
+        name=name,
+        scope=effect.Scope(entry['scope']),
+        parameters=tuple(_stated(*each) for each in entry['parameters'].items()),
+        act=act,
+        nameless_at=entry.get('nameless_at', {}),
+        **more,
+    )
+
+
+@cache
+def _of_modules() -> dict[str, Any]:
+    file = resources.files('shipdrag_ros') / 'data' / 'effects_of_modules.yaml'
+    content = file.read_text(encoding='utf-8')
+    found: dict[str, Any] = parse(content, subject=file.name, error=EffectFileError)
+    return found
+
+
+def _stated(name: str, about: Mapping[str, Any]) -> Parameter:
+    shape, *numbers = about['prior']
+    return Parameter(
+        about.get('value', math.nan),
+        name=name,
+        unit=about.get('unit', ''),
+        meaning=about['meaning'],
+        prior=Prior(Shape(shape), *numbers),
+        low=about['bounds'][0],
+        high=about['bounds'][1],
+        words=about.get('words', {}),
+        measured_in=_SCALES[about.get('counted_in', '')],
+    )
 
 
 def effect_of(term: LearntTerm) -> effect.Effect:
