@@ -21,7 +21,7 @@ from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, Form, TimeColumn
-from shipdrag_ros.sources.log import LIMIT_NS
+from shipdrag_ros.sources.log import BASE_NS, LIMIT_NS
 from shipdrag_ros.sources.table import Cells, LogTable, texts_of
 
 _PLAIN = frozenset('0123456789+-.eE')
@@ -307,7 +307,7 @@ def is_midnight(clock: str) -> bool:
     return not clock or _MIDNIGHT.fullmatch(clock) is not None
 
 
-def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:
+def order_of(texts: Iterable[str], table: LogTable) -> tuple[str, str]:
     """
     Find the order of year, month and day.
 
@@ -315,8 +315,8 @@ def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:
     ----------
     texts
         Cells.
-    hints
-        Titles of the table and name of the file, which may hold the date as 20170311.
+    table
+        Its titles and the name of its file may hold the date as 20170311.
 
     Returns
     -------
@@ -329,14 +329,16 @@ def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:
     possible = [order for order in ORDERS if all(_fits(day, order) for day in days)]
     if len(possible) == 1:
         return possible[0], 'the dates themselves'
-    for hint in hints:
+    for hint in (*table.titles, table.path.name):
         for found in _IN_TITLE.finditer(hint):
             date = (int(found[1]), int(found[2]), int(found[3]))
             fitting = [order for order in possible if _numbers(days[0], order, '') == date]
             if len(fitting) == 1:
                 return fitting[0], f'{found[0]} in {hint.strip("- ")!r}'
     if not possible:
-        raise ImportDataError(f'the dates, {days[0]!r} for instance, are in no order known here')
+        raise ImportDataError(
+            f'{str(table.path)!r}: the dates, {days[0]!r} for instance, are in no order known here'
+        )
     return '', f'{days[0]!r} is {" or ".join(possible)}'
 
 
@@ -427,8 +429,7 @@ class RowClock:
         What was assumed, a sentence each.
     """
 
-    def __init__(self, start_ns: int) -> None:
-        self._start_ns = start_ns
+    def __init__(self) -> None:
         self._row_ns: Fraction | None = None
         self._unit_ns = NANOSECONDS['s']
         self._dates: DateForm | None = None
@@ -444,7 +445,6 @@ class RowClock:
         cls,
         time: TimeColumn | None,
         rate_hz: float | None,
-        start_ns: int,
         cells: Sequence[str],
         table: LogTable,
     ) -> RowClock:
@@ -454,9 +454,7 @@ class RowClock:
         Parameters
         ----------
         time, rate_hz
-            One of the two; see `read_csv`.
-        start_ns
-            Date of time 0, for times that count from the start of a test [ns].
+            One of the two: the column of the time, or rows a second.
         cells
             Of the time, in the first rows.
         table
@@ -467,7 +465,7 @@ class RowClock:
         ImportDataError
             If the rate is none, or day and month are ambiguous.
         """
-        clock = cls(start_ns)
+        clock = cls()
         if time is None:
             assert rate_hz is not None
             if not (isfinite(rate_hz) and rate_hz > 0.0):
@@ -475,7 +473,7 @@ class RowClock:
                     f'--rate {rate_hz!r}: expected a number of rows a second above 0'
                 )
             clock._row_ns = SECOND_NS / Fraction(rate_hz)
-            clock.base_ns = start_ns
+            clock.base_ns = BASE_NS
             return clock
         texts = [cell.strip() for cell in cells if cell.strip()]
         if len(time.names) == 2 or (texts and is_date(texts[0])):
@@ -487,7 +485,7 @@ class RowClock:
     def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
         order, known_by = time.order, ''
         if not order:
-            order, known_by = order_of(texts, (*table.titles, table.path.name))
+            order, known_by = order_of(texts, table)
             if not order and texts and parts(texts[0])[0]:
                 raise ImportDataError(
                     f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
@@ -495,7 +493,7 @@ class RowClock:
                 )
         self._dates = DateForm(order, time.zone)
         if not order:
-            self.base_ns = self._start_ns
+            self.base_ns = BASE_NS
             self.notes.append('The times are times of day without a date.')
             return
         if known_by and order != 'ymd':
@@ -537,7 +535,7 @@ class RowClock:
         """
         if self._row_ns is not None:
             parts = range(first, first + len(cells))
-            times = [self._start_ns + round(number * self._row_ns) for number in parts]
+            times = [BASE_NS + round(number * self._row_ns) for number in parts]
             return np.array(times, np.int64)
         if self._dates is None and isinstance(cells, np.ndarray):
             return self._counted(cells, bad)
@@ -573,7 +571,7 @@ class RowClock:
     def _begin(self, time_ns: int) -> None:
         """Say by the first count whether they count from 1970 or from a start."""
         if not self._known:
-            self.base_ns = self._start_ns if time_ns < _RELATIVE_BELOW_NS else None
+            self.base_ns = BASE_NS if time_ns < _RELATIVE_BELOW_NS else None
             self._known = True
 
     def _counted(self, counts: NDArray[Any], bad: dict[int, BadCell]) -> Int64:
@@ -601,7 +599,7 @@ class RowClock:
         elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
             self._midnights -= 1  # a row from before the midnight behind one from after it
         self._last_of_day_ns = of_day_ns
-        return self._start_ns + self._midnights * _DAY_NS + of_day_ns
+        return BASE_NS + self._midnights * _DAY_NS + of_day_ns
 
 
 def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.bool_]]:

@@ -197,7 +197,7 @@ class FirstRows:
         places = [self.table.column(name) for name in time.names]
         texts = self._rows.joined(places)
         try:
-            clock = RowClock.of(time, None, 0, texts, self.table)
+            clock = RowClock.of(time, None, texts, self.table)
         except ImportDataError:
             return None
         bad: dict[int, BadCell] = {}
