@@ -20,10 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
-    from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
-    from shipdrag_ros.library.learning import learn
-    from shipdrag_ros.library.reading import read
-    from shipdrag_ros.library.record import Coastdown, Record
+    from shipdrag_ros.library.diagnosis import Diagnosis, diagnose, learn
+    from shipdrag_ros.library.record import Coastdown, Record, read
     from shipdrag_ros.library.resistance import Resistance, estimate
     from shipdrag_ros.library.simulated import simulate
     from shipdrag_ros.library.trends import Trends, trends
@@ -64,8 +62,8 @@ _HOME = {
     'Trends': 'library.trends',
     'diagnose': 'library.diagnosis',
     'estimate': 'library.resistance',
-    'learn': 'library.learning',
-    'read': 'library.reading',
+    'learn': 'library.diagnosis',
+    'read': 'library.record',
     'simulate': 'library.simulated',
     'trends': 'library.trends',
 }

@@ -24,9 +24,14 @@ from hypothesis import HealthCheck, settings
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.estimation import estimators
-from shipdrag_ros.estimation.result import Estimate, FroudeMax, OrderTrial, ResistanceCurve, Track
-from shipdrag_ros.fleet.rows import FROUDE, BagResult
-from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
+from shipdrag_ros.estimation.result import (
+    Estimate,
+    FroudeMax,
+    OrderTrial,
+    ResistanceCurve,
+    Track,
+)
+from shipdrag_ros.fleet.store import FROUDE, BagResult, Store, bag_schema, coastdown_schema
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve

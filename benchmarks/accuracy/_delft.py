@@ -13,8 +13,7 @@ from benchmarks._tables import table
 from benchmarks.accuracy._regressions import CUBE, CUBIC, WRONG, gauss, rms, shown
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import FORMS, fit_form
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import FORMS, Hulls, fit_form
 
 
 def yachts(path: Path, froude_max: float) -> tuple[Hulls, Float64]:

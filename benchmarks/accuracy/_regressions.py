@@ -11,9 +11,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import RegressionForm
-from shipdrag_ros.studies.residual.hulls import Hulls
-from shipdrag_ros.studies.surface.polynomial import monomials, terms_up_to
+from shipdrag_ros.studies.residual.fit import Hulls, RegressionForm
+from shipdrag_ros.studies.surface.fit import monomials, terms_up_to
 
 WRONG = 0.15  # a prediction this far off, relative, is a bad one
 SHAPES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')

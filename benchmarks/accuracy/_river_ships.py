@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import Hulls
 
 NAMES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 PROTOTYPE = (8.18, 4.0, 0.851, 0.005)  # the ship of project 507; its lcb is not stated

@@ -33,19 +33,18 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
+from shipdrag_ros.studies.manoeuvring.simulate import (
     ManoeuvreMotion,
     Side,
     overshoots_rad,
+    steer,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import steer
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
-from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
@@ -285,11 +284,11 @@ def main() -> None:
     time_s = found.check.full.time_s
     for name, figure in (
         ('surge', _surge_picture(time_s, surge())),
-        ('ranking', sensitivity_pictures.ranking_picture(found)),
-        ('check', sensitivity_pictures.check_picture(found)),
-        ('design', sensitivity_pictures.design_picture(shown)),
-        ('particulars', sensitivity_pictures.particulars_picture(coast)),
-        ('mimics', sensitivity_pictures.mimic_picture(coast)),
+        ('ranking', steering_words.ranking_picture(found)),
+        ('check', steering_words.check_picture(found)),
+        ('design', steering_words.design_picture(shown)),
+        ('particulars', coasting_words.particulars_picture(coast)),
+        ('mimics', coasting_words.mimic_picture(coast)),
     ):
         save(figure, DOCS / 'pictures' / f's3_{name}.png', pixels_per_inch=100)
 

@@ -38,8 +38,7 @@ from benchmarks.accuracy._river_ships import (
 )
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import FORMS, ResidualFit, fit_form
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import FORMS, Hulls, ResidualFit, fit_form
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / 'docs' / 's4_residual.md'

@@ -29,8 +29,13 @@ from shipdrag_ros.regression.order import OrderTable
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.surface.face.verb import contour_picture, degree_picture
-from shipdrag_ros.studies.surface.fit import SIGNIFICANCE, Surface, fit_surface
-from shipdrag_ros.studies.surface.polynomial import monomials, terms_up_to
+from shipdrag_ros.studies.surface.fit import (
+    SIGNIFICANCE,
+    Surface,
+    fit_surface,
+    monomials,
+    terms_up_to,
+)
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / 'docs' / 's5_surfaces.md'

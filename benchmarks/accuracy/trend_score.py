@@ -23,8 +23,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shipdrag_ros.trend.change_points import search
-from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps
+from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps, search
 
 WEEK = 7.0 / 365.25
 MONTH = 31.0 / 365.25

@@ -26,9 +26,8 @@ import numpy as np
 from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Onset
-from shipdrag_ros.messages.heard import OK
-from shipdrag_ros.node.health import InputStates
-from shipdrag_ros.node.judging import Counts, InputFacts
+from shipdrag_ros.messages.topics import OK
+from shipdrag_ros.node.health import Counts, InputFacts, InputStates
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     MOTION_INPUTS,

@@ -21,7 +21,7 @@ from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.serve import listen, serve
 from shipdrag_ros.live.source import BagSource, NodeSource, PictureFeed
 from shipdrag_ros.live.trace import LATE_S, LONGEST_S
-from shipdrag_ros.messages.heard import Samples
+from shipdrag_ros.messages.topics import Samples
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 

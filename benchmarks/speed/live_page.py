@@ -26,7 +26,7 @@ import psutil
 from shipdrag_ros.live.app import PAGE, LivePage
 from shipdrag_ros.live.serve import CONNECTIONS, listen, serve
 from shipdrag_ros.live.source import NodeSource
-from shipdrag_ros.messages.heard import Health, Samples, Status
+from shipdrag_ros.messages.topics import Health, Samples, Status
 from shipdrag_ros.samples import Block, Channel
 
 ASK = b'GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n'

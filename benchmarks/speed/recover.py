@@ -38,7 +38,7 @@ from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.records import MAGIC, Place, unpack, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError

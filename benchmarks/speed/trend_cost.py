@@ -22,8 +22,7 @@ import numpy as np
 
 from benchmarks.accuracy.trend_score import World, ship
 from shipdrag_ros.ship.sections import Economics
-from shipdrag_ros.trend.change_points import search
-from shipdrag_ros.trend.hull_state import Growth, Mixture, Runs, Steps
+from shipdrag_ros.trend.hull_state import Growth, Mixture, Runs, Steps, search
 from shipdrag_ros.trend.ship_trend import CleaningDate, cleaning_date
 
 YEARS = 5.0

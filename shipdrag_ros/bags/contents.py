@@ -17,18 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from isal.isal_zlib import crc32
+from mcap import records as mcap_records
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    Footer,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
 from mcap.stream_reader import StreamReader
 
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
@@ -114,17 +104,17 @@ class Contents:
         Take note of a schema, a channel, an attachment or metadata.
         """
         match record:
-            case Schema():
+            case mcap_records.Schema():
                 self._schemas[record.id] = record.name
-            case Channel():
+            case mcap_records.Channel():
                 self.channels[record.id] = FileChannel(
                     record.topic,
                     _full_name(self._schemas.get(record.schema_id, '')),
                     record.message_encoding,
                 )
-            case Attachment():
+            case mcap_records.Attachment():
                 self.attachments[record.name] = record.data
-            case Metadata():
+            case mcap_records.Metadata():
                 self.metadata[record.name] = record.metadata
 
 
@@ -153,7 +143,7 @@ def _by_index(data: Buffer) -> Contents | None:
     if end < len(MAGIC) + _FOOTER_BYTES or data[end:] != MAGIC:
         raise _BadIndexError('the file was not closed, or it is cut off')
     footer = read(data, Place(data[end - _FOOTER_BYTES], 0, end - 20, end))
-    if not isinstance(footer, Footer):
+    if not isinstance(footer, mcap_records.Footer):
         raise _BadIndexError('the footer is damaged')
     if footer.summary_start == 0:
         return None
@@ -172,34 +162,39 @@ def _by_index(data: Buffer) -> Contents | None:
     if not _says_all(summary):
         return None
     contents = Contents()
-    for record in summary.get(Schema, []) + summary.get(Channel, []):
+    for record in summary.get(mcap_records.Schema, []) + summary.get(mcap_records.Channel, []):
         contents.add(record)
     for kind, opcode in _INDEXED.items():
         for index in summary.get(kind, []):
             contents.add(_indexed(data, index.offset, opcode))
     at = 0
-    for chunk in sorted(summary.get(ChunkIndex, []), key=attrgetter('chunk_start_offset')):
+    for chunk in sorted(
+        summary.get(mcap_records.ChunkIndex, []), key=attrgetter('chunk_start_offset')
+    ):
         contents.segments.append(_segment(data, chunk, at))
         contents.compressions.add(chunk.compression)
         at = contents.segments[-1].end
-    contents.counts.update(summary[Statistics][0].channel_message_counts)
+    contents.counts.update(summary[mcap_records.Statistics][0].channel_message_counts)
     return contents
 
 
-_INDEXED = {AttachmentIndex: Opcode.ATTACHMENT, MetadataIndex: Opcode.METADATA}
+_INDEXED = {
+    mcap_records.AttachmentIndex: Opcode.ATTACHMENT,
+    mcap_records.MetadataIndex: Opcode.METADATA,
+}
 
 
 def _says_all(summary: Mapping[type, list[Any]]) -> bool:
     """Say whether everything that the statistics count is indexed."""
-    if Statistics not in summary:
+    if mcap_records.Statistics not in summary:
         return False
-    statistics = summary[Statistics][0]
+    statistics = summary[mcap_records.Statistics][0]
     counts = {
-        Schema: statistics.schema_count,
-        Channel: statistics.channel_count,
-        ChunkIndex: statistics.chunk_count,
-        AttachmentIndex: statistics.attachment_count,
-        MetadataIndex: statistics.metadata_count,
+        mcap_records.Schema: statistics.schema_count,
+        mcap_records.Channel: statistics.channel_count,
+        mcap_records.ChunkIndex: statistics.chunk_count,
+        mcap_records.AttachmentIndex: statistics.attachment_count,
+        mcap_records.MetadataIndex: statistics.metadata_count,
     }
     # messages outside chunks have no index
     unchunked = statistics.chunk_count == 0 and statistics.message_count > 0
@@ -221,7 +216,7 @@ def _indexed(data: Buffer, offset: int, opcode: int) -> Any:
     return read(data, place)
 
 
-def _segment(data: Buffer, chunk: ChunkIndex, least: int) -> FileSegment:
+def _segment(data: Buffer, chunk: mcap_records.ChunkIndex, least: int) -> FileSegment:
     offset, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
     late = max(chunk.message_start_time, chunk.message_end_time) >= TIME_LIMIT_NS
     if late or offset < least or _place(data, offset, Opcode.CHUNK).end != end:

@@ -24,7 +24,6 @@ from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.live import sync_directory
 from shipdrag_ros.bags.mcap_file import BagFiles, locate, unpack_file
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
 from shipdrag_ros.bags.records import (
@@ -46,7 +45,7 @@ from shipdrag_ros.bags.records import (
     unpack_zstd,
     walk,
 )
-from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes
+from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes, sync_directory
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 

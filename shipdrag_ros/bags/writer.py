@@ -25,22 +25,9 @@ import lz4.frame
 import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
+from mcap import records as mcap_records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
 from numpy.typing import NDArray
 
 from shipdrag_ros import __version__
@@ -77,15 +64,17 @@ def metadata(recording_id: str, part: int) -> dict[str, str]:
     return {'version': __version__, 'recording_id': recording_id, 'part': str(part)}
 
 
-def attachment(name: str, text: str) -> Attachment:
+def attachment(name: str, text: str) -> mcap_records.Attachment:
     """
     Return the record of an attached text.
     """
     kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
-    return Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
+    return mcap_records.Attachment(
+        create_time=0, log_time=0, name=name, media_type=kind, data=text.encode()
+    )
 
 
-def schema(number: int, type_name: str) -> Schema:
+def schema(number: int, type_name: str) -> mcap_records.Schema:
     """
     Return the schema record of a type.
 
@@ -97,15 +86,15 @@ def schema(number: int, type_name: str) -> Schema:
     if not types.is_known(type_name):
         raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
     text = types.definition(type_name).encode()
-    return Schema(id=number, name=type_name, encoding='ros2msg', data=text)
+    return mcap_records.Schema(id=number, name=type_name, encoding='ros2msg', data=text)
 
 
-def channel(number: int, topic: str, type_name: str, *, schema_id: int) -> Channel:
+def channel(number: int, topic: str, type_name: str, *, schema_id: int) -> mcap_records.Channel:
     """
     Return the channel record of a topic.
     """
     latched = (topic.rpartition('/')[2], type_name) in _LATCHED
-    return Channel(
+    return mcap_records.Channel(
         id=number,
         topic=topic,
         message_encoding='cdr',
@@ -142,6 +131,17 @@ def private_opener(path: str, flags: int) -> int:
         As `open` hands them to its `opener`.
     """
     return os.open(path, flags | os.O_NOFOLLOW, 0o640)
+
+
+def sync_directory(path: Path) -> None:
+    """
+    Bring the names in a directory to the disk.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 class Compression(Enum):
@@ -196,8 +196,10 @@ class RecordWriter:
         self._chunk = bytearray()
         self._times = [0, 0]  # first and last of the chunk [ns]
         self._entries: dict[int, list[int]] = {}  # of its index: time and offset, by channel
-        self._declared: dict[bytes, Schema | Channel] = {}
-        self._indexes: list[ChunkIndex | AttachmentIndex | MetadataIndex] = []
+        self._declared: dict[bytes, mcap_records.Schema | mcap_records.Channel] = {}
+        self._indexes: list[
+            mcap_records.ChunkIndex | mcap_records.AttachmentIndex | mcap_records.MetadataIndex
+        ] = []
         self._counts: Counter[int] = Counter()
         self._unpacked = self._at = 0
         try:
@@ -209,9 +211,9 @@ class RecordWriter:
                 f'{str(path)!r} cannot be made: {error.strerror}; '
                 'give a name in a folder that is there and may be written'
             ) from error
-        self._write(MAGIC + as_bytes(Header(profile, LIBRARY)))
+        self._write(MAGIC + as_bytes(mcap_records.Header(profile, LIBRARY)))
 
-    def declare(self, channel: Channel, schema: Schema | None) -> int:
+    def declare(self, channel: mcap_records.Channel, schema: mcap_records.Schema | None) -> int:
         """
         Write a channel and its schema, unless they are there; return its number.
 
@@ -223,13 +225,13 @@ class RecordWriter:
         number = 0 if schema is None else self._number(schema)
         return self._number(replace(channel, schema_id=number))
 
-    def says(self, record: Schema | Channel) -> bool:
+    def says(self, record: mcap_records.Schema | mcap_records.Channel) -> bool:
         """
         Say whether exactly this was declared, with its number.
         """
         return self._declared.get(as_bytes(replace(record, id=0))) == record
 
-    def _number(self, record: Schema | Channel) -> int:
+    def _number(self, record: mcap_records.Schema | mcap_records.Channel) -> int:
         """Keep the number of a record where it is free, and give it another where not."""
         key = as_bytes(replace(record, id=0))
         if key not in self._declared:
@@ -285,14 +287,14 @@ class RecordWriter:
         if len(chunk) >= self._room:
             self._end_chunk()
 
-    def add_attachment(self, attached: Attachment) -> None:
+    def add_attachment(self, attached: mcap_records.Attachment) -> None:
         """
         Write an attachment, before the first message if it is to survive a crash.
         """
         about = attached.name, attached.media_type
         times, record = (attached.log_time, attached.create_time), as_bytes(attached)
         self._indexes.append(
-            AttachmentIndex(self._at, len(record), *times, len(attached.data), *about)
+            mcap_records.AttachmentIndex(self._at, len(record), *times, len(attached.data), *about)
         )
         self._write(record)
 
@@ -300,8 +302,8 @@ class RecordWriter:
         """
         Write metadata.
         """
-        record = as_bytes(Metadata(name, dict(values)))
-        self._indexes.append(MetadataIndex(self._at, len(record), name))
+        record = as_bytes(mcap_records.Metadata(name, dict(values)))
+        self._indexes.append(mcap_records.MetadataIndex(self._at, len(record), name))
         self._write(record)
 
     def close(self) -> None:
@@ -317,11 +319,11 @@ class RecordWriter:
             return
         try:
             self._end_chunk()
-            self._write(as_bytes(DataEnd(0)))
+            self._write(as_bytes(mcap_records.DataEnd(0)))
             summary = as_bytes(*self._declared.values(), *self._indexes, self._statistics())
             start = self._at
             # its checksum covers the footer too, up to itself
-            covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
+            covered = summary + as_bytes(mcap_records.Footer(start, 0, 0))[:-4]
             self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
             with self._errors_named():
                 self._file.flush()
@@ -336,7 +338,7 @@ class RecordWriter:
         records = bytes(self._chunk)
         name, pack = _PACKERS[self._compression]
         first, last = self._times
-        chunk = Chunk(
+        chunk = mcap_records.Chunk(
             compression=name,
             data=pack(records),
             message_end_time=last,
@@ -349,7 +351,9 @@ class RecordWriter:
         self._entries.clear()
         self.add_chunk(chunk, entries)
 
-    def add_chunk(self, chunk: Chunk, entries: Mapping[int, NDArray[np.uint64]]) -> None:
+    def add_chunk(
+        self, chunk: mcap_records.Chunk, entries: Mapping[int, NDArray[np.uint64]]
+    ) -> None:
         """
         Write a chunk as it is, behind what was added before.
 
@@ -371,7 +375,7 @@ class RecordWriter:
             self._write(head + struct.pack('<HI', number, len(listed)) + listed)
             self._counts[number] += each.size // 2
         self._indexes.append(
-            ChunkIndex(
+            mcap_records.ChunkIndex(
                 chunk_length=len(record),
                 chunk_start_offset=at,
                 compression=chunk.compression,
@@ -387,19 +391,19 @@ class RecordWriter:
         least, most = CHUNK_RANGE
         self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
 
-    def _statistics(self) -> Statistics:
+    def _statistics(self) -> mcap_records.Statistics:
         kinds = Counter(map(type, chain(self._declared.values(), self._indexes)))
-        chunks = [it for it in self._indexes if isinstance(it, ChunkIndex)]
-        return Statistics(
-            attachment_count=kinds[AttachmentIndex],
-            channel_count=kinds[Channel],
+        chunks = [it for it in self._indexes if isinstance(it, mcap_records.ChunkIndex)]
+        return mcap_records.Statistics(
+            attachment_count=kinds[mcap_records.AttachmentIndex],
+            channel_count=kinds[mcap_records.Channel],
             channel_message_counts=dict(self._counts),
-            chunk_count=kinds[ChunkIndex],
+            chunk_count=kinds[mcap_records.ChunkIndex],
             message_count=self._counts.total(),
             message_end_time=max((it.message_end_time for it in chunks), default=0),
             message_start_time=min((it.message_start_time for it in chunks), default=0),
-            metadata_count=kinds[MetadataIndex],
-            schema_count=kinds[Schema],
+            metadata_count=kinds[mcap_records.MetadataIndex],
+            schema_count=kinds[mcap_records.Schema],
         )
 
     def _write(self, data: bytes) -> None:

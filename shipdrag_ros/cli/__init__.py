@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.arguments import Help, add_effects
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
@@ -64,7 +67,7 @@ _OWN = tuple(
     Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
     for name, summary in _SUMMARIES.items()
 )
-_EXAMPLES = '\n\nExamples\n--------\n'
+_SECTION = re.compile(r'^(\w+)\n-+\n', re.MULTILINE)
 _WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -179,14 +182,36 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            examples: Sequence[str] = known.examples
-            if not examples:
-                added.description, _, text = (module.__doc__ or known.summary).partition(_EXAMPLES)
-                examples = text.splitlines()
-            if examples:  # python -OO drops them
+            sections = _sections(module)
+            added.description = sections.get('', known.summary)
+            if examples := known.examples or sections.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name not in _WITHOUT_EFFECTS:
                 add_effects(added)
             added.set_defaults(run=module.run)
+            _explain(added, _helps(arguments) | _helps(module))
     return top
+
+
+def _sections(module: ModuleType) -> dict[str, str]:
+    """Return the docstring of a module by its sections; python -OO drops it."""
+    parts = ['', *_SECTION.split(module.__doc__ or '')]
+    return dict(zip(parts[::2], parts[1::2])) if module.__doc__ else {}
+
+
+def _helps(module: ModuleType) -> dict[str, str]:
+    """Return what the docstring of a module says of arguments, names of the module filled in."""
+    text = _sections(module).get('Options', '').format_map(vars(arguments) | vars(module))
+    found = re.findall(r'^(\S+).*\n((?: .*\n?)+)', text, re.MULTILINE)
+    return {name: ' '.join(lines.split()) for name, lines in found}
+
+
+def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, str]) -> None:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                _explain(below, helps)
+        elif action.help is None:
+            names = (*action.option_strings, str(action.metavar), action.dest)
+            action.help = next((helps[name] for name in names if name in helps), None)

@@ -1,5 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments that several verbs share, checked where they are given."""
+"""
+Arguments that several verbs share, checked where they are given.
+
+Options
+-------
+--json FILE
+    write the result as JSON, NaN as null, to FILE; without FILE: JSON alone on stdout and the
+    readable result on stderr
+--ship FILE
+    ship file (YAML) (default: the one attached to the bag)
+--parameters FILE
+    parameters as `name: value` (YAML) (default: those attached to the bag)
+--stop TIME
+    the engine was stopped then, within some seconds [s from the start of the bag, or ISO 8601
+    with its zone]: evidence that the regimes weigh with the rest
+STORE
+    folder that `shipdrag fleet` has written
+--remap FROM:=TO
+    read topic FROM of the bag as input TO; may be given more than once
+--effects DIR
+    folder of effects as `shipdrag learn` writes them (.yaml), which count beside those of the
+    library; may be repeated
+"""
 
 from __future__ import annotations
 
@@ -14,6 +36,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import need
 
 STDOUT = '-'
+PART = 'BAG@START:END takes this part alone [s from its start], as --window does'
 REPORT = ('matplotlib', 'jinja2')
 """Modules that a page with pictures needs."""
 
@@ -36,15 +59,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     """
     Add `--json [FILE]`.
     """
-    parser.add_argument(
-        '--json',
-        nargs='?',
-        const=STDOUT,
-        type=_json_file,
-        metavar='FILE',
-        help='write the result as JSON, NaN as null, to FILE; without FILE: JSON alone on '
-        'stdout and the readable result on stderr',
-    )
+    parser.add_argument('--json', nargs='?', const=STDOUT, type=_json_file, metavar='FILE')
 
 
 def stop_time(text: str) -> float | datetime:
@@ -73,67 +88,53 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     """
     Add `--ship FILE` and `--parameters FILE`, in place of what is attached to a bag.
     """
-    add_ship(parser, 'ship file (YAML) (default: the one attached to the bag)')
-    parser.add_argument(
-        '--parameters',
-        type=Path,
-        metavar='FILE',
-        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
-    )
+    add_ship(parser)
+    parser.add_argument('--parameters', type=Path, metavar='FILE')
 
 
-def add_ship(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
+def add_ship(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
     """
     Add `--ship FILE`, with what its help says.
     """
-    parser.add_argument('--ship', required=required, type=Path, metavar='FILE', help=text)
+    parser.add_argument('--ship', required=required, type=Path, metavar='FILE')
 
 
-def add_out(
-    parser: argparse.ArgumentParser, kind: Callable[[str], Path], metavar: str, text: str
-) -> None:
+def add_out(parser: argparse.ArgumentParser, kind: Callable[[str], Path], metavar: str) -> None:
     """
     Add `-o`, `--out`, which must be given: what is written.
     """
-    parser.add_argument('-o', '--out', required=True, type=kind, metavar=metavar, help=text)
+    parser.add_argument('-o', '--out', required=True, type=kind, metavar=metavar)
 
 
 def add_bags(
-    parser: argparse.ArgumentParser, kind: Callable[[str], Any], text: str, metavar: str = 'BAG'
+    parser: argparse.ArgumentParser, kind: Callable[[str], Any], metavar: str = 'BAG'
 ) -> None:
     """
     Add one bag or several, each read by `kind`.
     """
-    parser.add_argument('bags', nargs='+', type=kind, metavar=metavar, help=text)
+    parser.add_argument('bags', nargs='+', type=kind, metavar=metavar)
 
 
 def add_store(parser: argparse.ArgumentParser) -> None:
     """
     Add the store of a fleet.
     """
-    text = 'folder that `shipdrag fleet` has written'
-    parser.add_argument('store', type=Path, metavar='STORE', help=text)
+    parser.add_argument('store', type=Path, metavar='STORE')
 
 
-def add_window(parser: argparse.ArgumentParser, text: str) -> None:
+def add_window(parser: argparse.ArgumentParser) -> None:
     """
     Add `--window START END`.
     """
     ends = ('START', 'END')
-    parser.add_argument('--window', nargs=2, type=number(0.0, unit='s'), metavar=ends, help=text)
+    parser.add_argument('--window', nargs=2, type=number(0.0, unit='s'), metavar=ends)
 
 
 def add_stop(parser: argparse.ArgumentParser) -> None:
     """
     Add `--stop TIME`.
     """
-    parser.add_argument(
-        '--stop',
-        type=stop_time,
-        metavar='TIME',
-        help='the engine was stopped then, within some seconds [s from the start of the bag, or '
-        'ISO 8601 with its zone]: evidence that the regimes weigh with the rest',
-    )
+    parser.add_argument('--stop', type=stop_time, metavar='TIME')
 
 
 def number(
@@ -180,14 +181,7 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
     """
     Add `--remap FROM:=TO`.
     """
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        type=remap,
-        metavar='FROM:=TO',
-        help='read topic FROM of the bag as input TO; may be given more than once',
-    )
+    parser.add_argument('--remap', action='append', default=[], type=remap, metavar='FROM:=TO')
 
 
 def add_effects(parser: argparse.ArgumentParser) -> None:
@@ -195,14 +189,7 @@ def add_effects(parser: argparse.ArgumentParser) -> None:
     Add `--effects DIR`.
     """
     parser.add_argument(
-        '--effects',
-        dest='effects_from',
-        action='append',
-        default=[],
-        type=Path,
-        metavar='DIR',
-        help='folder of effects as `shipdrag learn` writes them (.yaml), which count beside those '
-        'of the library; may be repeated',
+        '--effects', dest='effects_from', action='append', default=[], type=Path, metavar='DIR'
     )
 
 

@@ -6,6 +6,15 @@ for a further run: what the runs leave open, and by how much they differ from ea
 runs show that well; with one or two the stated relative_sd is kept. Without a baseline in the
 ship file, r(v) of the runs is written as a table.
 
+Options
+-------
+BAG
+    MCAP or rosbag2; {PART}
+--ship FILE
+    ship file (YAML); the baseline in it is taken for what was known before
+--out FILE
+    ship file to write, with the learnt baseline
+
 Examples
 --------
 shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml
@@ -22,7 +31,7 @@ import numpy as np
 
 from shipdrag_ros.cli.arguments import add_bags, add_json, add_out, add_remap, add_ship, new_file
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Ship
@@ -35,13 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
-    add_ship(
-        parser,
-        'ship file (YAML); the baseline in it is taken for what was known before',
-        required=True,
-    )
-    add_out(parser, new_file('.yaml'), 'FILE', 'ship file to write, with the learnt baseline')
+    add_bags(parser, windowed_bag)
+    add_ship(parser, required=True)
+    add_out(parser, new_file('.yaml'), 'FILE')
     add_remap(parser)
     add_json(parser)
 

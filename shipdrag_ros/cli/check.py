@@ -4,6 +4,11 @@ Say whether bags are sound: checksums, lengths, references, index and statistics
 file, each damage with its offset [bytes]. Exit status: 0 all sound, 1 not. What is whole in a
 damaged bag is saved by `shipdrag recover`.
 
+Options
+-------
+BAG
+    MCAP file or rosbag2 directory
+
 Examples
 --------
 shipdrag check run.mcap
@@ -30,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, bag, 'MCAP file or rosbag2 directory')
+    add_bags(parser, bag)
     add_json(parser)
 
 

@@ -4,6 +4,13 @@ Print the script that completes verbs, options and files. Where a shell looks fo
 ~/.local/share/bash-completion/completions/shipdrag; zsh: a file _shipdrag in a folder of
 $fpath; fish: ~/.config/fish/completions/shipdrag.fish.
 
+Options
+-------
+shell
+    for which shell
+--out FILE
+    write it there (default: to stdout)
+
 Examples
 --------
 shipdrag completion bash -o shipdrag.bash
@@ -28,10 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add what the verb takes.
     """
-    parser.add_argument('shell', choices=SHELLS, help='for which shell')
-    parser.add_argument(
-        '-o', '--out', type=Path, metavar='FILE', help='write it there (default: to stdout)'
-    )
+    parser.add_argument('shell', choices=SHELLS)
+    parser.add_argument('-o', '--out', type=Path, metavar='FILE')
 
 
 def run(options: argparse.Namespace) -> int:

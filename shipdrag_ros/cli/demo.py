@@ -3,6 +3,13 @@
 Simulate a coastdown, send its readings over ROS topics on this machine to the node, show the
 estimates as they come, replay what the node recorded and write a report.
 
+Options
+-------
+--out DIR
+    where everything is written; made if missing
+--speed-up N
+    seconds of the simulation in a second of life [-], 1 to 200
+
 Examples
 --------
 shipdrag demo
@@ -46,7 +53,7 @@ from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:  # help must not need ROS
-    from shipdrag_ros.node.rehearsal import LiveEstimate
+    from shipdrag_ros.node.spectator import LiveEstimate
 
 
 _CONNECT_S = 120.0  # the first start on a machine compiles the kernels
@@ -161,7 +168,7 @@ def sail(
     ShipdragError
         If the node is not ready in time, ends too early, or sends nothing.
     """
-    from shipdrag_ros.node.rehearsal import Rehearsal
+    from shipdrag_ros.node.spectator import Rehearsal
 
     with ended_by_sigterm(), node, Rehearsal(show) as rehearsal:
         rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
@@ -195,20 +202,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        '--out',
-        type=Path,
-        default=Path('demo'),
-        metavar='DIR',
-        help='where everything is written; made if missing',
-    )
-    parser.add_argument(
-        '--speed-up',
-        type=number(1.0, 200.0),
-        default=60.0,
-        metavar='N',
-        help='seconds of the simulation in a second of life [-], 1 to 200',
-    )
+    parser.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR')
+    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0, metavar='N')
 
 
 def run(options: argparse.Namespace) -> int:

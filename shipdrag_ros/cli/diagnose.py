@@ -7,6 +7,22 @@ effects of the earth are stated along the first one. Without a baseline they are
 all hulls of her length and volume. In a record without a coastdown the log is compared with
 the way over ground, for which neither baseline nor ship file is needed.
 
+Options
+-------
+BAG
+    MCAP or rosbag2; {PART}
+--ship FILE
+    ship file with a baseline (default: the one attached to the first bag)
+--write FILE
+    write a ship file with the effect added, where one is named; an existing file is not
+    overwritten
+--window START END
+    the coastdown [s from the start of each bag without a window of its own], without looking for
+    one; what in it is no coastdown is cut
+--earlier FILE
+    what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: what was found
+    of hull and instruments counts, less the longer ago it was; water and weather do not
+
 Examples
 --------
 shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml
@@ -20,18 +36,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_remap,
-    add_report,
-    add_ship,
-    add_stop,
-    add_window,
-    unused_file,
-)
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
@@ -44,22 +51,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, f'MCAP or rosbag2; {HELP}')
-    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
-    parser.add_argument(
-        '--write',
-        type=unused_file('.yaml'),
-        metavar='FILE',
-        help='write a ship file with the effect added, where one is named; an existing file is '
-        'not overwritten',
-    )
-    add_report(parser, of='diagnosis')
-    add_window(
-        parser,
-        'the coastdown [s from the start of each bag without a window of its own], without '
-        'looking for one; what in it is no coastdown is cut',
-    )
-    add_stop(parser)
+    arguments.add_bags(parser, windowed_bag)
+    arguments.add_ship(parser)
+    parser.add_argument('--write', type=arguments.unused_file('.yaml'), metavar='FILE')
+    arguments.add_report(parser, of='diagnosis')
+    arguments.add_window(parser)
+    arguments.add_stop(parser)
     parser.add_argument(
         '--fact',
         action='append',
@@ -69,18 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f'{usage()}; evidence that is wrong with probability RATE (default {RATE:g}). What is '
         'known of one run stands in run.yaml beside its bag, or in BAG.run.yaml',
     )
-    parser.add_argument(
-        '--earlier',
-        type=Path,
-        action='append',
-        default=[],
-        metavar='FILE',
-        help='what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: '
-        'what was found of hull and instruments counts, less the longer ago it was; water and '
-        'weather do not',
-    )
-    add_remap(parser)
-    add_json(parser)
+    parser.add_argument('--earlier', type=Path, action='append', default=[], metavar='FILE')
+    arguments.add_remap(parser)
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

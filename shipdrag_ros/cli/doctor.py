@@ -3,6 +3,14 @@
 Look at the installation: Python, packages, ROS 2, where compiled code is kept, the port of
 the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 something is broken.
 
+Options
+-------
+--out DIR
+    where recordings would go (default: this folder)
+--run
+    also sail a simulated ship past the node over ROS topics, replay what it records and compare
+    with the truth: PASS, or what failed
+
 Examples
 --------
 shipdrag doctor
@@ -76,20 +84,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        '--out',
-        type=Path,
-        default=Path(),
-        metavar='DIR',
-        help='where recordings would go (default: this folder)',
-    )
-    parser.add_argument(
-        '--run',
-        dest='sails',
-        action='store_true',
-        help='also sail a simulated ship past the node over ROS topics, replay what it records '
-        'and compare with the truth: PASS, or what failed',
-    )
+    parser.add_argument('--out', type=Path, default=Path(), metavar='DIR')
+    parser.add_argument('--run', dest='sails', action='store_true')
     add_json(parser)
 
 

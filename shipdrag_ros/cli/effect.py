@@ -4,6 +4,11 @@ A learnt effect is data: a formula with units, which is read and never run. `che
 wrong units, names that are not known, poles inside the valid range and all that is no
 formula; `list` shows the effects of the library and of the folders given.
 
+Options
+-------
+FILE
+    learnt effect (YAML)
+
 Examples
 --------
 shipdrag effect check effects/weed.yaml
@@ -32,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         title='what to do', metavar='WHAT', dest='what', required=True, help='check or list'
     )
     check = verbs.add_parser('check', help='may a file be used, and if not, why')
-    check.add_argument('files', nargs='+', type=Path, metavar='FILE', help='learnt effect (YAML)')
+    check.add_argument('files', nargs='+', type=Path, metavar='FILE')
     add_json(check)
     every = verbs.add_parser('list', help='the effects of the library, and those learnt')
     add_effects(every)

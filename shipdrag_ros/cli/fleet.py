@@ -5,6 +5,20 @@ coastdown into a data set of Parquet files. The ship file of a bag is the neares
 upwards, or the one attached. What is done already is not done again. Bags that cannot be read
 are skipped and listed, and the exit status is then 1.
 
+Options
+-------
+DIR_OR_URL
+    folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): bags (MCAP,
+    rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows without options,
+    and logs that `shipdrag import` knows by their first bytes, whatever their names
+--out STORE
+    folder; made if missing
+--workers N
+    processes on this machine (default: one a core)
+--scheduler ADDRESS
+    a Dask cluster that exists, as tcp://host:8786; its workers have one thread each, this version
+    of the program, and see the folders under the same paths
+
 Examples
 --------
 shipdrag fleet records -o store --workers 1
@@ -39,29 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        'folders',
-        nargs='+',
-        metavar='DIR_OR_URL',
-        help='folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): '
-        'bags (MCAP, rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows '
-        'without options, and logs that `shipdrag import` knows by their first bytes, whatever '
-        'their names',
-    )
-    add_out(parser, Path, 'STORE', 'folder; made if missing')
+    parser.add_argument('folders', nargs='+', metavar='DIR_OR_URL')
+    add_out(parser, Path, 'STORE')
     engine = parser.add_mutually_exclusive_group()
-    engine.add_argument(
-        '--workers',
-        type=whole(1, 1024),
-        metavar='N',
-        help='processes on this machine (default: one a core)',
-    )
-    engine.add_argument(
-        '--scheduler',
-        metavar='ADDRESS',
-        help='a Dask cluster that exists, as tcp://host:8786; its workers have one thread each, '
-        'this version of the program, and see the folders under the same paths',
-    )
+    engine.add_argument('--workers', type=whole(1, 1024), metavar='N')
+    engine.add_argument('--scheduler', metavar='ADDRESS')
     add_json(parser)
 
 

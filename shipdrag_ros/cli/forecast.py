@@ -4,6 +4,14 @@ Find the coastdowns in bags and foretell the rest of each, from what was known s
 its stop: when she has each lower speed and how far on, with bands of 90 %, beside what
 followed.
 
+Options
+-------
+BAG
+    bag; {PART}
+--if-stopped-now
+    the glide that would begin at the end of the last bag, from the hull as last known: the last
+    coastdown in the bags, or else the ship file; of BAG@START:END, now is END
+
 Examples
 --------
 shipdrag forecast run.mcap --after 120 300
@@ -17,22 +25,14 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_remap,
-    add_settings,
-    add_stop,
-    number,
-)
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
-from shipdrag_ros.library.forecasts import AFTER_S, Forecasts, GlideForecast, forecast
+from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.replaying import WindowedRun, replay_run
-from shipdrag_ros.library.stopped import IfStopped, if_stopped_now
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
@@ -41,32 +41,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag, f'bag; {HELP}')
-    add_settings(parser)
+    arguments.add_bags(parser, windowed_bag)
+    arguments.add_settings(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument(
         '--after',
         nargs='+',
         type=_after,
-        default=AFTER_S,
+        default=forecasts.AFTER_S,
         metavar='S',
         help='when forecasts are made, from each stop on [s] (default: '
-        f'{" ".join(f"{each:g}" for each in AFTER_S)})',
+        f'{" ".join(f"{each:g}" for each in forecasts.AFTER_S)})',
     )
-    when.add_argument(
-        '--if-stopped-now',
-        action='store_true',
-        help='the glide that would begin at the end of the last bag, from the hull as last known: '
-        'the last coastdown in the bags, or else the ship file; of BAG@START:END, now is END',
-    )
-    add_stop(parser)
-    add_remap(parser)
-    add_json(parser)
+    when.add_argument('--if-stopped-now', action='store_true')
+    arguments.add_stop(parser)
+    arguments.add_remap(parser)
+    arguments.add_json(parser)
 
 
 def _after(text: str) -> float:
     try:
-        return number(0.0, unit='s', above=True)(text)
+        return arguments.number(0.0, unit='s', above=True)(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(
             f'{error}; a bag stands before --after or behind --, as in --after 60 300 -- BAG'
@@ -88,13 +83,13 @@ def run(options: argparse.Namespace) -> int:
         for each, own in given
     ]
     if options.if_stopped_now:
-        stopped = if_stopped_now(results)
+        stopped = forecasts.if_stopped_now(results)
         output.heading(stopped.bag)
         output.say(stopped.summary())
         output.table(stopped.table())
         output.json(document_of_stop(stopped))
         return 0
-    found = forecast(results, options.after)
+    found = forecasts.forecast(results, options.after)
     for each in found.made:
         _show(output, each)
     for bag, why in found.without:
@@ -104,8 +99,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _show(output: Output, each: GlideForecast) -> None:
-    one = Forecasts((each,))
+def _show(output: Output, each: forecasts.GlideForecast) -> None:
+    one = forecasts.Forecasts((each,))
     output.heading(f'{each.bag}, {words.clock(each.after_s)} after the stop')
     for line in one.summary().splitlines():
         output.say(line)
@@ -113,7 +108,7 @@ def _show(output: Output, each: GlideForecast) -> None:
         output.table(words.table(each.checked.milestones, each.ship.mass_kg))
 
 
-def document(found: Forecasts) -> dict[str, Any]:
+def document(found: forecasts.Forecasts) -> dict[str, Any]:
     """
     Return the document of the verb; a forecast that was not made says why under `not_made`.
     """
@@ -144,7 +139,7 @@ def document(found: Forecasts) -> dict[str, Any]:
     }
 
 
-def document_of_stop(found: IfStopped) -> dict[str, Any]:
+def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
     """
     Return the document of `--if-stopped-now`: a forecast of which nothing has followed.
     """

@@ -4,6 +4,15 @@ Write the measurements of logs or tables as a bag for replay. The format is know
 content of a file. What was understood is printed, and what was not used is counted. No value
 is ever repaired. `replay` and `diagnose` read such files directly, where no option is needed.
 
+Options
+-------
+--out BAG
+    MCAP file to make; an existing one is not overwritten
+--ship FILE
+    ship file (YAML) to attach, so that replay needs no --ship
+--format
+    format of the sources (default: known by their content)
+
 Examples
 --------
 shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml
@@ -42,13 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are '
         'joined; where two hold the same input for the same time, the first file is taken',
     )
-    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
-    add_ship(parser, 'ship file (YAML) to attach, so that replay needs no --ship')
-    parser.add_argument(
-        '--format',
-        choices=[each.name for each in known],
-        help='format of the sources (default: known by their content)',
-    )
+    add_out(parser, Path, 'BAG')
+    add_ship(parser)
+    parser.add_argument('--format', choices=[each.name for each in known])
     add_json(parser)
     added: set[str] = set()
     for each in known:

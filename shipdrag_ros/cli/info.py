@@ -4,6 +4,11 @@ Show what is in bags: length, topics with their rates, which of them are inputs,
 attached, and what is wrong. Of a log that is no bag: what a bag of it holds. Estimates
 nothing.
 
+Options
+-------
+BAG
+    MCAP file, rosbag2 directory, or log
+
 Examples
 --------
 shipdrag info run.mcap
@@ -27,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, bag, 'MCAP file, rosbag2 directory, or log')
+    add_bags(parser, bag)
     add_remap(parser)
     add_json(parser)
 

@@ -6,6 +6,17 @@ or time. It is written as a term with units, which --effects takes, where the ev
 runs is for it, beside something smooth without a formula, and each half of the runs shows it.
 Else nothing is written, and it is said what is known and which run would decide.
 
+Options
+-------
+BAG_OR_STORE
+    bag, or a store of `shipdrag fleet`, of which all bags are taken; {PART}
+--ship FILE
+    ship file with a baseline (default: the one attached to the first bag)
+--out FILE
+    file of the effect, where one is learnt; an existing one is not overwritten
+--name NAME
+    what the effect is called, small letters, digits and _ (default: that of the file)
+
 Examples
 --------
 shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html
@@ -18,17 +29,9 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_out,
-    add_remap,
-    add_report,
-    add_ship,
-    unused_file,
-)
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
@@ -39,27 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(
-        parser,
-        windowed_bag,
-        f'bag, or a store of `shipdrag fleet`, of which all bags are taken; {HELP}',
-        metavar='BAG_OR_STORE',
-    )
-    add_ship(parser, 'ship file with a baseline (default: the one attached to the first bag)')
-    add_out(
-        parser,
-        unused_file('.yaml'),
-        'FILE',
-        'file of the effect, where one is learnt; an existing one is not overwritten',
-    )
-    parser.add_argument(
-        '--name',
-        metavar='NAME',
-        help='what the effect is called, small letters, digits and _ (default: that of the file)',
-    )
-    add_report(parser, of='result')
-    add_remap(parser)
-    add_json(parser)
+    arguments.add_bags(parser, windowed_bag, metavar='BAG_OR_STORE')
+    arguments.add_ship(parser)
+    arguments.add_out(parser, arguments.unused_file('.yaml'), 'FILE')
+    parser.add_argument('--name', metavar='NAME')
+    arguments.add_report(parser, of='result')
+    arguments.add_remap(parser)
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     """
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
-    from shipdrag_ros.library.learning import learn_from
+    from shipdrag_ros.library.diagnosis import learn_from
 
     output = Output(options.json)
     name = options.name or options.out.stem

@@ -2,6 +2,27 @@
 """
 The onboard node: estimates live and records.
 
+Options
+-------
+--ship FILE
+    ship file (YAML)
+--out DIR
+    where recordings are written; made if missing, nothing there is overwritten
+--nmea SOURCE
+    receive NMEA 0183 beside topics: udp://ADDRESS:PORT, tcp://HOST:PORT or serial:DEVICE:BAUD;
+    may be given several times
+--keep-days N
+    remove recordings that are older, unless they hold a coastdown (default: keep all)
+--keep-bytes N
+    remove the oldest recordings when all are larger together, those that hold a coastdown last,
+    for instance 2e10 (default: half of the disk, and none that holds a coastdown; 1e15: keep all)
+--network
+    be found by ROS on the whole network; without it, and without a ROS environment variable that
+    says so, on this machine alone
+--ros-args ...
+    last: the rest goes to ROS, for instance -p window_s:=1800.0 or -r position:=/gps or
+    --params-file parameters.yaml; --ship and --out hold whatever stands there
+
 Examples
 --------
 shipdrag node --ship ship.yaml --out records
@@ -31,50 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, 'ship file (YAML)', required=True)
-    parser.add_argument(
-        '--out',
-        required=True,
-        type=Path,
-        metavar='DIR',
-        help='where recordings are written; made if missing, nothing there is overwritten',
-    )
-    parser.add_argument(
-        '--nmea',
-        action='append',
-        default=[],
-        metavar='SOURCE',
-        help='receive NMEA 0183 beside topics: udp://ADDRESS:PORT, tcp://HOST:PORT or '
-        'serial:DEVICE:BAUD; may be given several times',
-    )
-    parser.add_argument(
-        '--keep-days',
-        type=number(0.0),
-        metavar='N',
-        help='remove recordings that are older, unless they hold a coastdown (default: keep all)',
-    )
-    parser.add_argument(
-        '--keep-bytes',
-        type=number(0.0),
-        metavar='N',
-        help='remove the oldest recordings when all are larger together, those that hold a '
-        'coastdown last, for instance 2e10 (default: half of the disk, and none that holds a '
-        'coastdown; 1e15: keep all)',
-    )
-    parser.add_argument(
-        '--network',
-        action='store_true',
-        help='be found by ROS on the whole network; without it, and without a ROS environment '
-        'variable that says so, on this machine alone',
-    )
-    parser.add_argument(
-        '--ros-args',
-        nargs=argparse.REMAINDER,
-        default=[],
-        metavar='...',
-        help='last: the rest goes to ROS, for instance -p window_s:=1800.0 or -r position:=/gps '
-        'or --params-file parameters.yaml; --ship and --out hold whatever stands there',
-    )
+    add_ship(parser, required=True)
+    parser.add_argument('--out', required=True, type=Path, metavar='DIR')
+    parser.add_argument('--nmea', action='append', default=[], metavar='SOURCE')
+    parser.add_argument('--keep-days', type=number(0.0), metavar='N')
+    parser.add_argument('--keep-bytes', type=number(0.0), metavar='N')
+    parser.add_argument('--network', action='store_true')
+    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='...')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,6 +4,13 @@ Save every whole message of a damaged bag into a sound one, and say what was los
 chunks that are cut off or have a wrong checksum, and of unknown topics, go into a bag of
 their own beside it, NAME.quarantine.mcap. The source is not touched.
 
+Options
+-------
+SOURCE
+    MCAP file, or rosbag2 directory, whose files are joined
+--out BAG
+    MCAP file to make; an existing one is not overwritten
+
 Examples
 --------
 shipdrag recover damaged.mcap -o saved.mcap
@@ -26,15 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument(
-        'source',
-        type=bag,
-        metavar='SOURCE',
-        help='MCAP file, or rosbag2 directory, whose files are joined',
-    )
-    add_out(
-        parser, new_file('.mcap'), 'BAG', 'MCAP file to make; an existing one is not overwritten'
-    )
+    parser.add_argument('source', type=bag, metavar='SOURCE')
+    add_out(parser, new_file('.mcap'), 'BAG')
     add_json(parser)
 
 

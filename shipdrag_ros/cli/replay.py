@@ -3,6 +3,19 @@
 Find the coastdowns in bags and estimate r(v) as the node would have. What the node itself
 recorded is compared bit by bit.
 
+Options
+-------
+BAG
+    MCAP file or rosbag2 directory; each is a run of its own, parts of one recording are joined;
+    {PART}
+--window START END
+    estimate from this part [s from the start of the bag], without looking for a coastdown, of
+    each bag without a window of its own; what in it is no coastdown is cut
+--compare
+    rank the hulls, one a bag, by the Froude number of the steepest rise of r
+--out DIR
+    write {REPORT}, {JSON} and {CURVES} there; made if missing
+
 Examples
 --------
 shipdrag replay run.mcap --report report.html
@@ -15,18 +28,10 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import (
-    add_bags,
-    add_json,
-    add_remap,
-    add_report,
-    add_settings,
-    add_stop,
-    add_window,
-)
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -50,33 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(
-        parser,
-        windowed_bag,
-        'MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
-        f'are joined; {HELP}',
-    )
-    add_settings(parser)
-    add_window(
-        parser,
-        'estimate from this part [s from the start of the bag], without looking for a '
-        'coastdown, of each bag without a window of its own; what in it is no coastdown is cut',
-    )
-    add_stop(parser)
-    add_remap(parser)
-    parser.add_argument(
-        '--compare',
-        action='store_true',
-        help='rank the hulls, one a bag, by the Froude number of the steepest rise of r',
-    )
-    parser.add_argument(
-        '--out',
-        type=Path,
-        metavar='DIR',
-        help=f'write {REPORT}, {JSON} and {CURVES} there; made if missing',
-    )
-    add_report(parser, of='report')
-    add_json(parser)
+    arguments.add_bags(parser, windowed_bag)
+    arguments.add_settings(parser)
+    arguments.add_window(parser)
+    arguments.add_stop(parser)
+    arguments.add_remap(parser)
+    parser.add_argument('--compare', action='store_true')
+    parser.add_argument('--out', type=Path, metavar='DIR')
+    arguments.add_report(parser, of='report')
+    arguments.add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

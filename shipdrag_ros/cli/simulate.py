@@ -3,6 +3,36 @@
 Sail steadily, stop the engine and let a simulated ship coast; write what log, position,
 heading and shaft sensors read, with the truth attached as truth.yaml.
 
+Options
+-------
+--ship FILE
+    ship file with a baseline (YAML)
+--out BAG
+    MCAP file to make; an existing one is not overwritten
+--speed M_S
+    steady speed through water before the stop [m/s] (default:
+    {simulated.SPEED_FRACTION:g} of the highest speed that the baseline is given for)
+--duration S
+    record from the stop on [s]
+--lead-in S
+    steady sailing before the stop [s]
+--heading RAD
+    heading [rad], anticlockwise from east as in REP-103: 1.5708 is north
+--first-heading RAD
+    heading of the first run [rad], to which current, wind and waves are stated; give it to
+    simulate another run of the same day (default: this run is the first)
+--start DATE
+    date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or
+    2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)
+--rate HZ
+    readings of each sensor [Hz]
+--noise FACTOR
+    factor [-] on the white noise of the sensors: 0.05 m/s of the log, 10 m of the position, 0.5
+    deg of heading and rudder, 0.02 rad/s of the shaft, 0.1 m/s of the speed over ground, 0.5 m/s
+    of the wind, 0.2 m of the depth; 0: exact readings
+--seed N
+    seed of the noise: the same seed gives the same readings
+
 Examples
 --------
 shipdrag simulate --ship ship.yaml -o calm.mcap --lead-in 1800
@@ -20,14 +50,7 @@ from pathlib import Path
 
 from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked, number, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.library.simulated import (
-    SPEED_FRACTION,
-    SimulationSettings,
-    make,
-    moment_ns,
-    usual_speed,
-    write_bag,
-)
+from shipdrag_ros.library import simulated
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
@@ -42,35 +65,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, 'ship file with a baseline (YAML)', required=True)
-    add_out(parser, Path, 'BAG', 'MCAP file to make; an existing one is not overwritten')
-    parser.add_argument(
-        '--speed',
-        type=number(0.0, 40.0, unit='m/s', above=True),
-        metavar='M_S',
-        help='steady speed through water before the stop [m/s] (default: '
-        f'{SPEED_FRACTION:g} of the highest speed that the baseline is given for)',
-    )
+    add_ship(parser, required=True)
+    add_out(parser, Path, 'BAG')
+    parser.add_argument('--speed', type=number(0.0, 40.0, unit='m/s', above=True), metavar='M_S')
     parser.add_argument(
         '--duration',
         type=number(0.0, 1e6, unit='s', above=True),
         default=1500.0,
         metavar='S',
-        help='record from the stop on [s]',
     )
+    parser.add_argument('--lead-in', type=number(0.0, 1e6, unit='s'), default=600.0, metavar='S')
     parser.add_argument(
-        '--lead-in',
-        type=number(0.0, 1e6, unit='s'),
-        default=600.0,
-        metavar='S',
-        help='steady sailing before the stop [s]',
-    )
-    parser.add_argument(
-        '--heading',
-        type=number(-2 * math.pi, 2 * math.pi, unit='rad'),
-        default=0.0,
-        metavar='RAD',
-        help='heading [rad], anticlockwise from east as in REP-103: 1.5708 is north',
+        '--heading', type=number(-2 * math.pi, 2 * math.pi, unit='rad'), default=0.0, metavar='RAD'
     )
     _add_day(parser)
     _add_sensors(parser)
@@ -88,19 +94,9 @@ def _add_day(parser: argparse.ArgumentParser) -> None:
         + '. docs/effects.md says what each does',
     )
     parser.add_argument(
-        '--first-heading',
-        type=number(-2 * math.pi, 2 * math.pi, unit='rad'),
-        metavar='RAD',
-        help='heading of the first run [rad], to which current, wind and waves are stated; give '
-        'it to simulate another run of the same day (default: this run is the first)',
+        '--first-heading', type=number(-2 * math.pi, 2 * math.pi, unit='rad'), metavar='RAD'
     )
-    parser.add_argument(
-        '--start',
-        type=checked(moment_ns),
-        metavar='DATE',
-        help='date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or '
-        '2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)',
-    )
+    parser.add_argument('--start', type=checked(simulated.moment_ns), metavar='DATE')
 
 
 def _add_sensors(parser: argparse.ArgumentParser) -> None:
@@ -111,29 +107,9 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
         metavar='INPUT[,INPUT]...',
         help=f'sensors on board, of {", ".join(channel.input for channel in STANDARD_SD)}',
     )
-    parser.add_argument(
-        '--rate',
-        type=number(0.001, 1000.0, unit='Hz'),
-        default=1.0,
-        metavar='HZ',
-        help='readings of each sensor [Hz]',
-    )
-    parser.add_argument(
-        '--noise',
-        type=number(0.0, 1000.0),
-        default=1.0,
-        metavar='FACTOR',
-        help='factor [-] on the white noise of the sensors: 0.05 m/s of the log, 10 m of the '
-        'position, 0.5 deg of heading and rudder, 0.02 rad/s of the shaft, 0.1 m/s of the speed '
-        'over ground, 0.5 m/s of the wind, 0.2 m of the depth; 0: exact readings',
-    )
-    parser.add_argument(
-        '--seed',
-        type=whole(0),
-        default=0,
-        metavar='N',
-        help='seed of the noise: the same seed gives the same readings',
-    )
+    parser.add_argument('--rate', type=number(0.001, 1000.0, unit='Hz'), default=1.0, metavar='HZ')
+    parser.add_argument('--noise', type=number(0.0, 1000.0), default=1.0, metavar='FACTOR')
+    parser.add_argument('--seed', type=whole(0), default=0, metavar='N')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -145,8 +121,8 @@ def run(options: argparse.Namespace) -> int:
     effects_of(ship)  # those that her file declares are known by name from here on
     speed_m_s = options.speed
     if speed_m_s is None:
-        speed_m_s = usual_speed(ship)
-    settings = SimulationSettings(
+        speed_m_s = simulated.usual_speed(ship)
+    settings = simulated.SimulationSettings(
         speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
@@ -159,8 +135,8 @@ def run(options: argparse.Namespace) -> int:
         first_heading_rad=options.first_heading,
         start_ns=START_NS if options.start is None else options.start,
     )
-    block, truth = make(ship, settings)
-    write_bag(options.out, block, ship, truth, output)
+    block, truth = simulated.make(ship, settings)
+    simulated.write_bag(options.out, block, ship, truth, output)
     counts = Counter(Channel(code).input for code in block.channel.tolist())
     output.say(
         f'{options.out}: {len(block)} messages; after {settings.lead_in_s:g} s at '

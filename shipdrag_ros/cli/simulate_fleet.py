@@ -6,6 +6,21 @@ drifts. Writes a folder a ship with ship.yaml, events.csv and the bags, each wit
 BAG.run.yaml, and beside them truth.yaml and truth.csv, which `fleet` does not read. A few
 files are lost, cut off, unreadable, or from a clock without a date.
 
+Options
+-------
+--out DIR
+    folder; must be empty or new
+--ships N
+    how many ships
+--months M
+    how long [30 days]
+--every DAYS
+    between two runs of a ship [days]; 7 for weekly runs
+--seed S
+    the same seed gives the same files
+--sound
+    no file is lost, damaged or dated wrongly
+
 Examples
 --------
 shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4
@@ -32,16 +47,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
-from shipdrag_ros.simulation.voyages import (
-    DAY_NS,
-    FLEET_START_NS,
-    SCATTER,
-    Fate,
-    HullChange,
-    PlannedRun,
-    PlannedShip,
-    plan_fleet,
-)
+from shipdrag_ros.simulation import voyages
 
 TRUTH = 'truth'
 _PATTERN = 'vitus_bering.yaml'
@@ -60,34 +66,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_out(parser, Path, 'DIR', 'folder; must be empty or new')
+    add_out(parser, Path, 'DIR')
+    parser.add_argument('--ships', type=whole(1, 1000), default=3, metavar='N')
     parser.add_argument(
-        '--ships', type=whole(1, 1000), default=3, metavar='N', help='how many ships'
+        '--months', type=number(0.0, 600.0, unit='months', above=True), default=12.0, metavar='M'
     )
     parser.add_argument(
-        '--months',
-        type=number(0.0, 600.0, unit='months', above=True),
-        default=12.0,
-        metavar='M',
-        help='how long [30 days]',
+        '--every', type=number(0.1, 1000.0, unit='days'), default=28.0, metavar='DAYS'
     )
-    parser.add_argument(
-        '--every',
-        type=number(0.1, 1000.0, unit='days'),
-        default=28.0,
-        metavar='DAYS',
-        help='between two runs of a ship [days]; 7 for weekly runs',
-    )
-    parser.add_argument(
-        '--seed',
-        type=whole(0),
-        default=0,
-        metavar='S',
-        help='the same seed gives the same files',
-    )
-    parser.add_argument(
-        '--sound', action='store_true', help='no file is lost, damaged or dated wrongly'
-    )
+    parser.add_argument('--seed', type=whole(0), default=0, metavar='S')
+    parser.add_argument('--sound', action='store_true')
     add_json(parser)
 
 
@@ -101,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
     if any(out.iterdir()):
         raise SimulationError(f'{str(out)!r} is not empty; give a new folder')
     text = files('shipdrag_ros').joinpath('data', _PATTERN).read_text(encoding='utf-8')
-    plan = plan_fleet(
+    plan = voyages.plan_fleet(
         replace(Ship.from_yaml(text, subject=_PATTERN), economics=_PRICES),
         ships=options.ships,
         months=options.months,
@@ -130,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _write_ship(folder: Path, planned: PlannedShip) -> None:
+def _write_ship(folder: Path, planned: voyages.PlannedShip) -> None:
     folder.mkdir()
     (folder / 'ship.yaml').write_text(planned.ship.to_yaml(), encoding='utf-8')
     known = [change for change in planned.history.changes if change.known]
@@ -138,16 +126,16 @@ def _write_ship(folder: Path, planned: PlannedShip) -> None:
     (folder / 'events.csv').write_text('\n'.join(lines) + '\n', encoding='utf-8')
 
 
-def _write_run(folder: Path, planned: PlannedRun, *, recording: str) -> None:
-    if planned.fate is Fate.LOST:
+def _write_run(folder: Path, planned: voyages.PlannedRun, *, recording: str) -> None:
+    if planned.fate is voyages.Fate.LOST:
         return
     path = folder / _file(planned)
     with BagWriter(path, recording_id=recording) as bag:
         bag.write_samples(planned.samples())
-    if planned.fate is Fate.CUT:
+    if planned.fate is voyages.Fate.CUT:
         content = path.read_bytes()
         path.write_bytes(content[: int(_CUT * len(content))])
-    elif planned.fate is Fate.UNREADABLE:
+    elif planned.fate is voyages.Fate.UNREADABLE:
         path.write_bytes(bytes(len(path.read_bytes())))
     about = {
         'draught_m': planned.ship.draught_m,
@@ -160,7 +148,9 @@ def _write_run(folder: Path, planned: PlannedRun, *, recording: str) -> None:
     path.with_name(f'{path.name}.run.yaml').write_text(strict_yaml.dump(about), encoding='utf-8')
 
 
-def _truth_row(folder: str, planned: PlannedShip, each: PlannedRun) -> dict[str, Any]:
+def _truth_row(
+    folder: str, planned: voyages.PlannedShip, each: voyages.PlannedRun
+) -> dict[str, Any]:
     speed_m_s = _REFERENCE * planned.ship.baseline_range_m_s[1]
     clean = float(each.ship.resistance_n(speed_m_s))
     scattered = float(each.fouled().resistance_n(speed_m_s))
@@ -184,14 +174,14 @@ def _truth_row(folder: str, planned: PlannedShip, each: PlannedRun) -> dict[str,
     }
 
 
-def _added(each: PlannedRun, speed_m_s: float) -> float:
+def _added(each: voyages.PlannedRun, speed_m_s: float) -> float:
     """Return the added resistance of the hull alone, a fraction of the clean one's."""
     fouled = replace(each, scatter=1.0).fouled().resistance_n(speed_m_s)
     return float(np.asarray(fouled / each.ship.resistance_n(speed_m_s))) - 1.0
 
 
 def _write_truth(
-    out: Path, plan: tuple[PlannedShip, ...], rows: list[dict[str, Any]], *, seed: int
+    out: Path, plan: tuple[voyages.PlannedShip, ...], rows: list[dict[str, Any]], *, seed: int
 ) -> None:
     ships = [
         {
@@ -200,7 +190,7 @@ def _write_truth(
             'growth_per_year': each.history.growth_per_year,
             'changes': [
                 {
-                    'time_ns': FLEET_START_NS + round(change.day * DAY_NS),
+                    'time_ns': voyages.FLEET_START_NS + round(change.day * voyages.DAY_NS),
                     'kind': change.kind,
                     'known': change.known,
                     'keeps': change.keeps,
@@ -212,7 +202,7 @@ def _write_truth(
         }
         for each in plan
     ]
-    about = {'seed': seed, 'scatter': SCATTER, 'ships': ships}
+    about = {'seed': seed, 'scatter': voyages.SCATTER, 'ships': ships}
     (out / f'{TRUTH}.yaml').write_text(strict_yaml.dump(about), encoding='utf-8')
     with (out / f'{TRUTH}.csv').open('w', encoding='utf-8', newline='') as file:
         writer = csv.DictWriter(file, list(rows[0]))
@@ -220,12 +210,12 @@ def _write_truth(
         writer.writerows(rows)
 
 
-def _file(planned: PlannedRun) -> str:
+def _file(planned: voyages.PlannedRun) -> str:
     moment = datetime.fromtimestamp(planned.start_ns // 1_000_000_000, UTC)
     return moment.strftime('%Y-%m-%d-%H%M.mcap')
 
 
-def _date(change: HullChange) -> str:
+def _date(change: voyages.HullChange) -> str:
     return datetime.fromtimestamp(
-        FLEET_START_NS // 1_000_000_000 + round(change.day * 86_400), UTC
+        voyages.FLEET_START_NS // 1_000_000_000 + round(change.day * 86_400), UTC
     ).strftime('%Y-%m-%d')

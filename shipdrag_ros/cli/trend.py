@@ -4,6 +4,18 @@ Added resistance of each ship against time from the store of `shipdrag fleet`: h
 grows, cleanings and dockings that are known and steps that are not, outliers, when cleaning
 pays (with `economics` in the ship file), and which hull comes first.
 
+Options
+-------
+--sql QUERY
+    put a question to the store instead: runs (date, added percent, kN, USD), ships (the ranking),
+    coastdowns and bags (docs/trend.md)
+--csv FILE.csv
+    write a row a coastdown, for a spreadsheet
+--parquet FILE.parquet
+    the same as Parquet, for a data frame
+--pages DIR
+    with --report: write a page a coastdown there, to which the rows of the report lead
+
 Examples
 --------
 shipdrag trend store --json trend.json
@@ -40,31 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     add_store(parser)
-    parser.add_argument(
-        '--sql',
-        metavar='QUERY',
-        help='put a question to the store instead: runs (date, added percent, kN, USD), ships '
-        '(the ranking), coastdowns and bags (docs/trend.md)',
-    )
-    parser.add_argument(
-        '--csv',
-        type=new_file('.csv'),
-        metavar='FILE.csv',
-        help='write a row a coastdown, for a spreadsheet',
-    )
-    parser.add_argument(
-        '--parquet',
-        type=new_file('.parquet'),
-        metavar='FILE.parquet',
-        help='the same as Parquet, for a data frame',
-    )
+    parser.add_argument('--sql', metavar='QUERY')
+    parser.add_argument('--csv', type=new_file('.csv'), metavar='FILE.csv')
+    parser.add_argument('--parquet', type=new_file('.parquet'), metavar='FILE.parquet')
     add_report(parser, of='trend')
-    parser.add_argument(
-        '--pages',
-        type=Path,
-        metavar='DIR',
-        help='with --report: write a page a coastdown there, to which the rows of the report lead',
-    )
+    parser.add_argument('--pages', type=Path, metavar='DIR')
     add_json(parser)
 
 
@@ -101,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 def _write_pages(output: Output, options: argparse.Namespace) -> dict[tuple[str, int], str]:
     """Write a page for each coastdown, and return where each is from the report."""
     from shipdrag_ros.fleet.store import read_coastdowns
-    from shipdrag_ros.trend.coastdown_page import coastdown_page, links, page_name
+    from shipdrag_ros.trend.page import coastdown_page, links, page_name
 
     folder, report = options.pages.absolute(), options.report.absolute()
     try:

@@ -5,6 +5,31 @@ hull, inputs, checklist and verdict. Without a bag it shows the node that runs o
 network, which may come and go; with bags or logs it plays them. It only reads, but for
 --allow-marks.
 
+Options
+-------
+BAG
+    bag or log to play
+--speed X
+    seconds of a bag in a second [-]
+--ship FILE
+    ship file, instead of that of the node or of the bag
+--earlier DIR
+    folder of bags that this ship's nodes recorded: their coastdowns are listed
+--node NAME
+    full name of the node (default: the first)
+--signal-k PORT
+    send Signal K deltas, a line each, to who connects to this TCP port of this machine
+--store STORE
+    store of `shipdrag fleet`: the page of the fleet stands under /fleet
+--allow-marks
+    a button tells the node that the engine was stopped just now: who sees the page may press it
+--port
+    of the page, 0: any free one
+--listen ADDRESS
+    address to listen on; any but that of this machine alone needs --token-file
+--token-file FILE
+    text of at least {SHORTEST_TOKEN} characters that a viewer must give
+
 Examples
 --------
 shipdrag watch --port 8090 --earlier records
@@ -43,62 +68,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
+    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG')
     _add_server(parser)
     parser.add_argument(
-        '--speed',
-        type=number(0.0, FASTEST, above=True),
-        default=10.0,
-        metavar='X',
-        help='seconds of a bag in a second [-]',
+        '--speed', type=number(0.0, FASTEST, above=True), default=10.0, metavar='X'
     )
-    add_ship(parser, 'ship file, instead of that of the node or of the bag')
-    parser.add_argument(
-        '--earlier',
-        type=Path,
-        metavar='DIR',
-        help="folder of bags that this ship's nodes recorded: their coastdowns are listed",
-    )
-    parser.add_argument(
-        '--node', default='', metavar='NAME', help='full name of the node (default: the first)'
-    )
-    parser.add_argument(
-        '--signal-k',
-        type=whole(0, 65535),
-        metavar='PORT',
-        help='send Signal K deltas, a line each, to who connects to this TCP port of this machine',
-    )
-    parser.add_argument(
-        '--store',
-        type=Path,
-        metavar='STORE',
-        help='store of `shipdrag fleet`: the page of the fleet stands under /fleet',
-    )
-    parser.add_argument(
-        '--allow-marks',
-        action='store_true',
-        help='a button tells the node that the engine was stopped just now: who sees the page '
-        'may press it',
-    )
+    add_ship(parser)
+    parser.add_argument('--earlier', type=Path, metavar='DIR')
+    parser.add_argument('--node', default='', metavar='NAME')
+    parser.add_argument('--signal-k', type=whole(0, 65535), metavar='PORT')
+    parser.add_argument('--store', type=Path, metavar='STORE')
+    parser.add_argument('--allow-marks', action='store_true')
     add_remap(parser)
 
 
 def _add_server(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--port', type=whole(0, 65535), default=8088, help='of the page, 0: any free one'
-    )
-    parser.add_argument(
-        '--listen',
-        default=LOOPBACK,
-        metavar='ADDRESS',
-        help='address to listen on; any but that of this machine alone needs --token-file',
-    )
-    parser.add_argument(
-        '--token-file',
-        type=Path,
-        metavar='FILE',
-        help=f'text of at least {SHORTEST_TOKEN} characters that a viewer must give',
-    )
+    parser.add_argument('--port', type=whole(0, 65535), default=8088)
+    parser.add_argument('--listen', default=LOOPBACK, metavar='ADDRESS')
+    parser.add_argument('--token-file', type=Path, metavar='FILE')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -180,8 +167,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     from shipdrag_ros.fleet.store import read_coastdowns
     from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.live.app import FLEET, FleetPages
-    from shipdrag_ros.trend.coastdown_page import links
-    from shipdrag_ros.trend.page import fleet_text
+    from shipdrag_ros.trend.page import fleet_text, links
 
     rows = read_coastdowns(store).to_pylist()
     text = fleet_text(*trends_of(output, store), links=links(rows, f'{FLEET}/'))

@@ -17,8 +17,6 @@ from shipdrag_ros.cli.output import Output
 if TYPE_CHECKING:
     from shipdrag_ros.library.replaying import WindowedRun, WindowSpan
 
-HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
-
 
 def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, str]) -> list[Run]:
     """

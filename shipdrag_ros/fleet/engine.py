@@ -69,7 +69,7 @@ class Engine:
         self._at_most = at_most
         self._scheduler = scheduler
         self._open = ExitStack()
-        self._client: Client | None = None
+        self._client: Client  # once it is entered
 
     def __enter__(self) -> Self:
         import dask
@@ -102,7 +102,6 @@ class Engine:
     @property
     def address(self) -> str:
         """Of the scheduler, for other programs."""
-        assert self._client is not None
         return str(self._client.scheduler_info()['address'])
 
     def on_each(self, function: Callable[[], Result]) -> dict[str, Result]:
@@ -111,7 +110,6 @@ class Engine:
 
         A worker that dies meanwhile is left out.
         """
-        assert self._client is not None
         found: dict[str, Result] = self._client.run(function, on_error='ignore')
         return found
 
@@ -152,7 +150,6 @@ class Engine:
         """Yield results as they come; that no worker is left to give any is an error."""
         from distributed import as_completed
 
-        assert self._client is not None
         without = 0
         while futures:
             try:
@@ -172,7 +169,6 @@ class Engine:
     def _submit(
         self, function: Callable[[Item], Result], key: str, item: Item, *, again: bool = False
     ) -> Future[Result]:
-        assert self._client is not None
         name = f'{function.__name__}{"-again" if again else ""}-{key}'
         return self._client.submit(function, item, key=name, pure=False)
 
@@ -208,7 +204,6 @@ class Engine:
         return self._open.enter_context(Client(cluster, set_as_default=False))
 
     def _check_versions(self) -> None:
-        assert self._client is not None
         if self._scheduler is None:
             return
         if not self._client.scheduler_info()['workers']:

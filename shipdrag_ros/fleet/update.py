@@ -20,13 +20,15 @@ from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, failed, identify, work
-from shipdrag_ros.fleet.rows import BagResult, bag_row, same_time
 from shipdrag_ros.fleet.store import (
+    BagResult,
     Done,
     HullEvent,
     Store,
+    bag_row,
     read_coastdowns,
     read_events,
+    same_time,
     write_events,
 )
 from shipdrag_ros.progress import Progress

@@ -15,19 +15,16 @@ from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, read_earlier
 from shipdrag_ros.diagnosis.result import Candidate, Compared, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.library.diagnosing import diagnose_runs
+from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.learning.search import learn as learn_runs
+from shipdrag_ros.library import replaying
+from shipdrag_ros.library.diagnosing import coasts_of, diagnose_runs
 from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.replaying import (
-    Notes,
-    WindowedRun,
-    WindowSpan,
-    refuse_overlaps,
-    refuse_two_ships,
-)
 from shipdrag_ros.library.resistance import records_of
-from shipdrag_ros.library.shown import Shown, drawing, writing
-from shipdrag_ros.library.wording import says_it_in_python
+from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, parse_fact
+from shipdrag_ros.ship.term import check_name
 from shipdrag_ros.simulation.effects import find
 
 if TYPE_CHECKING:
@@ -235,7 +232,7 @@ def diagnose(
     ship: Ship | None = None,
     facts: Sequence[str] = (),
     earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
-    window: WindowSpan | None = None,
+    window: replaying.WindowSpan | None = None,
 ) -> Diagnosis:
     """
     Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.
@@ -286,11 +283,11 @@ def diagnose(
     'none'
     """
     parts = records_of(records)
-    runs = [WindowedRun(run, window) for record in parts for run in record.runs]
-    refuse_overlaps(runs)
+    runs = [replaying.WindowedRun(run, window) for record in parts for run in record.runs]
+    replaying.refuse_overlaps(runs)
     if ship is None:
-        refuse_two_ships((run, record.given) for record in parts for run in record.runs)
-    listener = Notes()
+        replaying.refuse_two_ships((run, record.given) for record in parts for run in record.runs)
+    listener = replaying.Notes()
     given: Sequence[Fact] = [
         parse_fact(text) for text in ([facts] if isinstance(facts, str) else facts)
     ]
@@ -298,3 +295,82 @@ def diagnose(
     known = [_earlier(each, place) for place, each in enumerate(before, start=1)]
     found, used = diagnose_runs(listener, runs, ship or parts[0].given, given, earlier=known)
     return Diagnosis(found, used, tuple(listener.lines))
+
+
+@says_it_in_python
+def learn(
+    records: Record | Sequence[Record], *, ship: Ship | None = None, name: str = 'learnt'
+) -> Learnt:
+    """
+    Learn the effect that several runs of a ship share and the library has no name for.
+
+    Parameters
+    ----------
+    records
+        Of one ship; with one run nothing is written.
+    ship
+        With a baseline; None: the one attached to the first record.
+    name
+        Of the effect: small letters, digits and _.
+
+    Returns
+    -------
+    Learnt
+        Its `term` is None where nothing may be written, and `reason` says why;
+        `term.to_yaml()` is the text of a file.
+
+    Raises
+    ------
+    BagError
+        If the same part of a recording is given twice, or the runs are of two ships.
+    DiagnosisError
+        If no coastdown is found, or the ship has no baseline.
+    EffectFileError
+        If the name cannot be one.
+
+    Notes
+    -----
+    Source: docs/learn.md.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=600.0, lead_in_s=400.0)
+    >>> print(sd.learn(record).term)
+    None
+    """
+    parts = records_of(records)
+    runs = [replaying.WindowedRun(run, None) for record in parts for run in record.runs]
+    return learn_from(replaying.Notes(), runs, ship or parts[0].given, name)
+
+
+def learn_from(
+    listener: replaying.Listener,
+    runs: Sequence[replaying.WindowedRun],
+    given: Ship | None,
+    name: str,
+    progress: Progress = silent,
+) -> Learnt:
+    """
+    Learn from runs that are open; what the verb and a script share.
+
+    Parameters
+    ----------
+    listener
+        Called with what is found on the way.
+    runs
+        Of one ship.
+    given
+        The ship; None: the one attached to the first run.
+    name
+        Of the effect.
+    progress
+        Called with each stage, how much of it is done, and of how much.
+    """
+    check_name(name)
+    replaying.refuse_overlaps(runs)
+    if given is None:
+        replaying.refuse_two_ships((run, None) for run, _ in runs)
+    coasts, ship, parameters = coasts_of(listener, runs, given, progress, whole=True)
+    coasts = sorted(coasts, key=lambda coast: coast.window.start_ns)
+    return learn_runs(coasts, ship, parameters, name=name, progress=progress)

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.library.wording import in_python
+from shipdrag_ros.library.shown import in_python
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
-from shipdrag_ros.sources.formats.csv.importer import read_table
+from shipdrag_ros.sources.formats.csv.importer import read_csv
 from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.reading import LogRun, format_of, job_of, join
 from shipdrag_ros.sources.table import Cells, LogTable, TableRows, texts_of
@@ -364,7 +364,7 @@ def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_P
         declared = how.format_of(path, {'map': (), **options})
         if declared.name != TABLE.name:
             raise ImportDataError(f'a frame is a table, and not {declared.kind}; leave format out')
-        found: ImportResult = read_table(source, log, job_of(declared, path, options).options)
+        found: ImportResult = read_csv(source, log, job_of(declared, path, options).options)
     else:
         name, path = str(source), source
         options = how.options(path, alone=alone)

@@ -13,11 +13,10 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.library import forecasts, stopped
+from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.record import Coastdown, Record, force_columns
 from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
-from shipdrag_ros.library.shown import ShownResistance, writing
-from shipdrag_ros.library.wording import says_it_in_python
+from shipdrag_ros.library.shown import ShownResistance, says_it_in_python, writing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
@@ -123,7 +122,7 @@ class Resistance(ShownResistance):
         """
         return forecasts.forecast(self.runs, after)
 
-    def if_stopped_now(self) -> stopped.IfStopped:
+    def if_stopped_now(self) -> forecasts.IfStopped:
         """
         Foretell the glide if the engine were stopped at the end of the record.
 
@@ -137,7 +136,7 @@ class Resistance(ShownResistance):
         EstimationError
             If no speed was read at its end, or nothing is known of the hull.
         """
-        return stopped.if_stopped_now(self.runs)
+        return forecasts.if_stopped_now(self.runs)
 
     def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]

@@ -19,7 +19,7 @@ from shipdrag_ros.bags.mcap_file import BagFiles, McapFile
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import Listener, Notes
-from shipdrag_ros.library.wording import says_it_in_python
+from shipdrag_ros.library.shown import says_it_in_python
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block

@@ -14,8 +14,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError, ShipFileError
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.resistance import Resistance
-from shipdrag_ros.library.shown import Shown, drawing, time_column, writing
-from shipdrag_ros.library.wording import says_it_in_python
+from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, time_column, writing
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 
@@ -272,7 +271,7 @@ def _ships(
 
 def _rows(results: Sequence[Resistance]) -> Iterator[dict[str, Any]]:
     """Yield the rows that a store would hold, without a diagnosis."""
-    from shipdrag_ros.fleet.rows import coastdown_row  # Parquet takes long to import
+    from shipdrag_ros.fleet.store import coastdown_row  # Parquet takes long to import
 
     for each in results:
         for coastdown in each.coastdowns:

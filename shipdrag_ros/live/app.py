@@ -13,12 +13,14 @@ import hashlib
 import hmac
 import ipaddress
 import json
+import math
 import socket
 import threading
 import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -43,9 +45,97 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from shipdrag_ros import __version__
 from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import signal_k
+from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.headline import Tone
 from shipdrag_ros.live.source import PictureFeed
+
+SOURCE = {'label': 'shipdrag', 'type': 'shipdrag_ros'}
+UNITS = {
+    'navigation.speedThroughWater': 'm/s',
+    'performance.shipdrag.specificResistance': 'm/s2',
+    'performance.shipdrag.resistance': 'N',
+    'performance.shipdrag.effectivePower': 'W',
+    'performance.shipdrag.overCleanHull': 'ratio',
+}
+_ALARMS = {'good': 'normal', 'watch': 'normal', 'act': 'alert', 'bad': 'warn'}
+
+
+def signal_k_hello() -> dict[str, Any]:
+    """
+    Return the message that opens a stream.
+    """
+    return {
+        'name': 'shipdrag_ros',
+        'version': __version__,
+        'self': 'vessels.self',
+        'roles': ['master'],
+        'timestamp': _time(datetime.now(UTC).timestamp()),
+    }
+
+
+def signal_k_deltas(bridge: Bridge, now_s: float) -> list[dict[str, Any]]:
+    """
+    Return the latest figures and the state as deltas; none before there are any.
+
+    Parameters
+    ----------
+    now_s
+        On the clock of the bridge.
+    """
+    if not bridge.now_ns:
+        return []
+    parts = bridge.parts(now_s)
+    figures, said = parts['figures'], parts['headline']
+    assert isinstance(figures, dict)
+    assert isinstance(said, dict)
+    values: dict[str, Any] = {'navigation.speedThroughWater': figures['speed_m_s']}
+    ship, r = bridge.ship, bridge.resistance
+    if r is not None:
+        values['performance.shipdrag.specificResistance'] = r.value
+    usual = figures.get('usual')
+    if usual is not None and ship is not None:
+        force_n = usual['r'] * ship.mass_kg
+        values['performance.shipdrag.resistance'] = force_n
+        values['performance.shipdrag.effectivePower'] = force_n * usual['speed_m_s']
+        values['performance.shipdrag.overCleanHull'] = usual.get('over_clean')
+    notice = {
+        'state': _ALARMS[said['tone']],
+        'method': ['visual'],
+        'message': f'{said["text"]}. {said["action"]}',
+    }
+    time = _time(bridge.now_ns * 1e-9)
+    # apart: signalk-server names itself as the source of all that stands beside a notification
+    groups = (_values(values), _values({'notifications.performance.shipdrag': notice}))
+    return [
+        {
+            'context': 'vessels.self',
+            'updates': [{'source': SOURCE, 'timestamp': time, 'values': each}],
+        }
+        for each in groups
+        if each
+    ]
+
+
+def signal_k_units() -> dict[str, Any]:
+    """
+    Return the delta that says in which unit each figure is.
+    """
+    meta = [{'path': path, 'value': {'units': unit}} for path, unit in UNITS.items()]
+    return {'context': 'vessels.self', 'updates': [{'source': SOURCE, 'meta': meta}]}
+
+
+def _values(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [{'path': path, 'value': value} for path, value in values.items() if _is_known(value)]
+
+
+def _is_known(value: object) -> bool:
+    return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+
+
+def _time(seconds: float) -> str:
+    moment = datetime.fromtimestamp(seconds, UTC)
+    return moment.strftime('%Y-%m-%dT%H:%M:%S.') + f'{moment.microsecond // 1000:03d}Z'
+
 
 COOKIE = 'shipdrag'
 _HEADERS = {
@@ -291,7 +381,7 @@ class FleetPages:
     """
 
     def __init__(self, page: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        from shipdrag_ros.trend.coastdown_page import page_name  # pictures take long to import
+        from shipdrag_ros.trend.page import page_name  # pictures take long to import
 
         self.page = page
         self._rows = {page_name(row): row for row in rows}
@@ -308,7 +398,7 @@ class FleetPages:
             return self._made(name)
 
     def _make(self, name: str) -> str:
-        from shipdrag_ros.trend.coastdown_page import coastdown_page
+        from shipdrag_ros.trend.page import coastdown_page
 
         return coastdown_page(self._rows[name], fleet=FLEET)
 
@@ -507,10 +597,10 @@ class LivePage:
         )
 
     async def _deltas(self, request: Request) -> Response:
-        return JSONResponse([signal_k.units(), *self.deltas()])
+        return JSONResponse([signal_k_units(), *self.deltas()])
 
     def deltas(self) -> list[dict[str, Any]]:
         """
         Return the latest figures as Signal K deltas.
         """
-        return signal_k.deltas(self._source.bridge, time.monotonic())
+        return signal_k_deltas(self._source.bridge, time.monotonic())

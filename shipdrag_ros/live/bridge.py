@@ -16,6 +16,7 @@ from typing import Any
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live import outputs
 from shipdrag_ros.live.figures import (
     Ahead,
     PagePart,
@@ -43,29 +44,8 @@ from shipdrag_ros.live.headline import (
     shaft_check,
     wind_check,
 )
-from shipdrag_ros.live.outputs import (
-    Curve,
-    Figure,
-    PastRun,
-    read_curve,
-    read_forecast,
-    read_path,
-    read_resistance,
-    read_speed,
-)
 from shipdrag_ros.live.trace import Trace
-from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
-from shipdrag_ros.messages.heard import (
-    ERROR,
-    OF_CONDITIONS,
-    OK,
-    STALE,
-    Health,
-    Heard,
-    NodeMessage,
-    Samples,
-    ShipFile,
-)
+from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, topics, types
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SHAFTS, Channel, kind_of
 from shipdrag_ros.ship import Ship
 
@@ -151,19 +131,19 @@ class Bridge:
     def __init__(self, ship: Ship | None = None, *, bag: str = '') -> None:
         self._bag = bag
         self.trace = Trace()
-        self.past: list[PastRun] = []
+        self.past: list[outputs.PastRun] = []
         self._ship = ship
         self._heard_s: float | None = None
-        self._health: Health | None = None
+        self._health: topics.Health | None = None
         self._recent = Recent()
         self._courses: deque[tuple[int, float]] = deque()
         self._course_at_stop: float | None = None
         self._lead_at_stop: float | None = None
         self._coast_ns: int | None = None
         self._bands: list[tuple[float, float]] = []
-        self._speed: Figure | None = None
-        self._resistance: Figure | None = None
-        self._curve: Curve | None = None
+        self._speed: outputs.Figure | None = None
+        self._resistance: outputs.Figure | None = None
+        self._curve: outputs.Curve | None = None
         self._ahead = Ahead()
         self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
         self._found: PagePart | None = None  # the last diagnosis
@@ -173,25 +153,25 @@ class Bridge:
 
     # heard
 
-    def hear(self, heard: Heard, now_s: float) -> None:
+    def hear(self, heard: topics.Heard, now_s: float) -> None:
         """
         Take what was heard at a time [s, steady clock].
         """
         match heard:
-            case Samples(block):
+            case topics.Samples(block):
                 self.trace.add(block)
                 self._recent.add(block)
                 self._ahead.add(block)
                 self._note_course()
-            case Health():
+            case topics.Health():
                 self._heard_s = now_s
                 self._take_health(heard)
-            case NodeMessage(name, payload):
+            case topics.NodeMessage(name, payload):
                 try:
                     self._take_output(name, payload)
                 except Exception as error:  # whatever a peer sends, the page goes on
                     self._note_unread(name, error)
-            case ShipFile(text):
+            case topics.ShipFile(text):
                 try:
                     self._ship = Ship.from_yaml(text, subject="the node's ship file")
                 except ShipdragError as error:
@@ -235,7 +215,7 @@ class Bridge:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise MalformedMessage(f'no document of a diagnosis: {error!r}') from error
 
-    def add_past(self, run: PastRun) -> None:
+    def add_past(self, run: outputs.PastRun) -> None:
         """
         Take a coastdown that has ended; one that is known already is not taken twice.
         """
@@ -283,7 +263,7 @@ class Bridge:
         return self._ship
 
     @property
-    def resistance(self) -> Figure | None:
+    def resistance(self) -> outputs.Figure | None:
         """The latest r [m/s^2]."""
         return self._resistance
 
@@ -294,7 +274,7 @@ class Bridge:
             while self._courses[0][0] < second - _COURSE_S:
                 self._courses.popleft()
 
-    def _take_health(self, health: Health) -> None:
+    def _take_health(self, health: topics.Health) -> None:
         self._health = health
         state = health.of('state')
         since = None if state is None else state.number('coastdown since')
@@ -312,21 +292,23 @@ class Bridge:
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':
-            self._speed = read_speed(payload)
+            self._speed = outputs.read_speed(payload)
             self.trace.add_estimate(self._speed.stamp_ns, self._speed.value)
         elif name == 'resistance':
-            self._resistance = read_resistance(payload)
+            self._resistance = outputs.read_resistance(payload)
         elif name == 'resistance_curve':
-            curve = read_curve(payload)
+            curve = outputs.read_curve(payload)
             if curve is not None:
                 self._curve = curve
                 if self._coast_ns is not None and curve.stamp_ns > self._coast_ns:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
                     self._bands.append((age_s, curve.band(self._ship)))
         elif name == 'forecast':
-            self._ahead.take(read_forecast(payload), self._ship, self._speed, self._coast_ns)
+            self._ahead.take(
+                outputs.read_forecast(payload), self._ship, self._speed, self._coast_ns
+            )
         elif name == 'forecast_path':
-            self._ahead.take_path(read_path(payload), self._coast_ns)
+            self._ahead.take_path(outputs.read_path(payload), self._coast_ns)
         elif name == 'events':
             self._take_event(payload)
         elif name == 'diagnosis':
@@ -341,7 +323,7 @@ class Bridge:
         if note.kind is EventKind.ONSET:
             self._begin(int(note.values['start_ns']))
         elif note.kind is EventKind.COASTDOWN:
-            run = PastRun.of(note, self._curve, bag=self._bag)
+            run = outputs.PastRun.of(note, self._curve, bag=self._bag)
             self.add_past(run)
             if run.curve is None:
                 self._curve = None  # what was drawn of it is no result
@@ -410,7 +392,7 @@ class Bridge:
         coast_s = None
         if self._coast_ns is not None and self._now_s:
             coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
-        trouble = state.message if state is not None and state.level >= ERROR else ''
+        trouble = state.message if state is not None and state.level >= topics.ERROR else ''
         lead = None if self._health is None else self._health.lead
         return Situation(
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
@@ -434,7 +416,9 @@ class Bridge:
         return '; '.join(
             f'{status.input.replace("_", " ")}: {status.message}'
             for status in inputs
-            if status.input in ALL_MOTION and status.level != OK and status.number('messages')
+            if status.input in ALL_MOTION
+            and status.level != topics.OK
+            and status.number('messages')
         )
 
     def _ended(self) -> Ended | None:
@@ -473,8 +457,8 @@ class Bridge:
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
         estimate = None if self._health is None else self._health.of('estimate')
-        if estimate is not None and OF_CONDITIONS in estimate.values:
-            figures['r_of'] = estimate.values[OF_CONDITIONS]
+        if estimate is not None and topics.OF_CONDITIONS in estimate.values:
+            figures['r_of'] = estimate.values[topics.OF_CONDITIONS]
         ended = [run for run in self.past if run.curve is not None]
         if self._curve is not None:
             figures['usual'] = at_usual_speed(self._curve, self._ship)
@@ -502,7 +486,7 @@ class Bridge:
             rows.append(
                 {
                     'name': status.part.removeprefix('input ').replace('_', ' '),
-                    'level': STALE if silent else status.level,
+                    'level': topics.STALE if silent else status.level,
                     'text': f'not known, the node is silent; its last word: {status.message}'
                     if silent
                     else status.message,
@@ -541,7 +525,7 @@ class Bridge:
     def _unless_silent(self, check: Check) -> Check:
         name = _CHECKED.get(check.name, '')
         status = None if self._health is None else self._health.of(f'input {name}')
-        if status is None or status.level != STALE:
+        if status is None or status.level != topics.STALE:
             return check
         return replace(check, held=Held.SILENT, text=status.message)
 

@@ -18,7 +18,7 @@ import numpy as np
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
-from shipdrag_ros.messages.heard import READY_S
+from shipdrag_ros.messages.topics import READY_S
 from shipdrag_ros.samples import SHAFTS, Block, Channel
 from shipdrag_ros.ship import Ship
 

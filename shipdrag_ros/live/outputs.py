@@ -17,17 +17,8 @@ import numpy as np
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation.force import usual_within
-from shipdrag_ros.messages import EventKind, EventNote, MalformedMessage, read_event, types
+from shipdrag_ros.messages import EventKind, EventNote, MalformedMessage, read_event, topics, types
 from shipdrag_ros.messages.publishing import CURVE_FIELDS, FORECAST_FIELDS
-from shipdrag_ros.messages.topics import (
-    EVENTS,
-    FORECAST,
-    FORECAST_PATH,
-    RESISTANCE,
-    RESISTANCE_CURVE,
-    SPEED,
-    OutputTopic,
-)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -88,7 +79,7 @@ def read_speed(payload: bytes) -> Figure:
     MalformedMessage
         If it is none.
     """
-    message = types.deserialize(SPEED.type, payload)
+    message = types.deserialize(topics.SPEED.type, payload)
     variance = float(message.twist.covariance[0])
     return _figure(message, float(message.twist.twist.linear.x), variance)
 
@@ -102,7 +93,7 @@ def read_resistance(payload: bytes) -> Figure:
     MalformedMessage
         If it is none.
     """
-    message = types.deserialize(RESISTANCE.type, payload)
+    message = types.deserialize(topics.RESISTANCE.type, payload)
     variance = float(message.accel.covariance[0])
     return _figure(message, float(message.accel.accel.linear.x), variance)
 
@@ -116,7 +107,7 @@ def read_curve(payload: bytes) -> Curve | None:
     MalformedMessage
         If it is none.
     """
-    stamp_ns, points = _points(RESISTANCE_CURVE, CURVE_FIELDS, payload)
+    stamp_ns, points = _points(topics.RESISTANCE_CURVE, CURVE_FIELDS, payload)
     if len(points) < 2:
         return None
     return Curve(stamp_ns, points[:, 0], points[:, 1], points[:, 2])
@@ -168,7 +159,7 @@ def read_forecast(payload: bytes) -> ComingGlide | None:
     MalformedMessage
         If it is none.
     """
-    stamp_ns, points = _points(FORECAST, FORECAST_FIELDS, payload)
+    stamp_ns, points = _points(topics.FORECAST, FORECAST_FIELDS, payload)
     return ComingGlide(stamp_ns, points) if len(points) >= 2 else None
 
 
@@ -200,7 +191,7 @@ def read_path(payload: bytes) -> ComingPath | None:
     MalformedMessage
         If it is none.
     """
-    message = types.deserialize(FORECAST_PATH.type, payload)
+    message = types.deserialize(topics.FORECAST_PATH.type, payload)
     stamp_ns = types.stamp_ns(message)
     places = [
         ((types.stamp_ns(each) - stamp_ns) * 1e-9, each.pose.position.x, each.pose.position.y)
@@ -211,7 +202,9 @@ def read_path(payload: bytes) -> ComingPath | None:
     return ComingPath(stamp_ns, rows[:, 0], rows[:, 1:]) if len(rows) >= 2 else None
 
 
-def _points(topic: OutputTopic, names: tuple[str, ...], payload: bytes) -> tuple[int, Float64]:
+def _points(
+    topic: topics.OutputTopic, names: tuple[str, ...], payload: bytes
+) -> tuple[int, Float64]:
     message = types.deserialize(topic.type, payload)
     given = tuple(field.name for field in message.fields)
     if given != names or message.is_bigendian:
@@ -326,9 +319,9 @@ def _of_bag(path: Path) -> Iterator[PastRun | str]:
         for message in run.outputs():
             name = message.topic.rpartition('/')[2]
             try:
-                if name == RESISTANCE_CURVE.name:
+                if name == topics.RESISTANCE_CURVE.name:
                     curve = read_curve(message.payload)
-                elif name == EVENTS.name:
+                elif name == topics.EVENTS.name:
                     note = read_event(message.payload)
                     if note.kind is EventKind.COASTDOWN:
                         found = True

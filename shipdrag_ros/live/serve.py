@@ -20,8 +20,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.signal_k import hello, units
+from shipdrag_ros.live.app import LivePage, signal_k_hello, signal_k_units
 
 CONNECTIONS = 250
 ASK_S = 15.0  # a connection that asks for nothing is closed after it
@@ -60,7 +59,7 @@ async def serve_deltas(
         if len(listeners) >= LISTENERS:
             writer.close()
             return
-        writer.write(_line(hello()) + _line(units()))
+        writer.write(_line(signal_k_hello()) + _line(signal_k_units()))
         listeners.add(writer)
 
     server = await asyncio.start_server(welcome, sock=listening)

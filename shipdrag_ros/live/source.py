@@ -20,11 +20,10 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.outputs import PastRun
-from shipdrag_ros.messages.heard import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.messages.publishing import outputs
+from shipdrag_ros.messages.topics import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.node.background import Diagnosing
-from shipdrag_ros.node.health import InputStates, Standing, state_status
-from shipdrag_ros.node.judging import Counts, InputFacts
+from shipdrag_ros.node.health import Counts, InputFacts, InputStates, Standing, state_status
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import feed, settings_of
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate

@@ -13,33 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.coastdown.events import (
-    EndedCoastdown,
-    Event,
-    NoEstimate,
-    NotCoastdown,
-    Onset,
-    Reset,
-    Update,
-    WholeGlide,
-)
+from shipdrag_ros.coastdown import events
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.result import Forecast, PathAhead
-from shipdrag_ros.messages import types
-from shipdrag_ros.messages.topics import (
-    DEFAULT_NODE,
-    FORECAST,
-    FORECAST_PATH,
-    RESISTANCE,
-    RESISTANCE_CURVE,
-    SPEED,
-    EventKind,
-    EventNote,
-    OutputMessage,
-    OutputTopic,
-    event_message,
-    output_message,
-)
+from shipdrag_ros.messages import topics, types
 from shipdrag_ros.samples import Float64
 
 FRAME = 'base_link'
@@ -58,7 +35,7 @@ FORECAST_FIELDS = (
 _FLOAT64_BYTES = 8
 
 
-def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
+def outputs(event: events.Event, *, node: str = topics.DEFAULT_NODE) -> list[topics.OutputMessage]:
     """
     Encode an event of the monitor, in the order to publish.
 
@@ -70,28 +47,28 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
         Full name of the node, the `~` of its topics.
     """
     match event:
-        case Update(stamp_ns, estimate, forecast, path):
+        case events.Update(stamp_ns, estimate, forecast, path):
             return [
                 *_figures(stamp_ns, estimate, node),
                 _forecast(stamp_ns, forecast, node),
                 _path(stamp_ns, path, node),
             ]
-        case EndedCoastdown():
+        case events.EndedCoastdown():
             curve = [] if event.estimate is None else [_curve(event.end_ns, event.estimate, node)]
-            told = event_message(_coastdown_note(event), node=node)
+            told = topics.event_message(_coastdown_note(event), node=node)
             return [*curve, *_withdrawn(event.end_ns, node), told]
-        case Onset(start_ns, detected_ns):
-            note = EventNote(
-                EventKind.ONSET,
+        case events.Onset(start_ns, detected_ns):
+            note = topics.EventNote(
+                topics.EventKind.ONSET,
                 detected_ns,
                 'a coastdown has begun',
                 {'start_ns': str(start_ns)},
             )
-        case NoEstimate(stamp_ns, reason):
-            note = EventNote(EventKind.NO_ESTIMATE, stamp_ns, reason, {})
-        case NotCoastdown(start_ns, end_ns, dismissal, text):
-            note = EventNote(
-                EventKind.DISMISSED,
+        case events.NoEstimate(stamp_ns, reason):
+            note = topics.EventNote(topics.EventKind.NO_ESTIMATE, stamp_ns, reason, {})
+        case events.NotCoastdown(start_ns, end_ns, dismissal, text):
+            note = topics.EventNote(
+                topics.EventKind.DISMISSED,
                 end_ns,
                 f'nearly a coastdown: {text}',
                 {
@@ -100,17 +77,17 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
                     'reason': dismissal.value,
                 },
             )
-        case WholeGlide():  # for a diagnosis of the record alone
+        case events.WholeGlide():  # for a diagnosis of the record alone
             return []
-        case Reset(receive_ns, reason):
-            note = EventNote(EventKind.RESET, receive_ns, reason, {})
-    return [event_message(note, node=node)]
+        case events.Reset(receive_ns, reason):
+            note = topics.EventNote(topics.EventKind.RESET, receive_ns, reason, {})
+    return [topics.event_message(note, node=node)]
 
 
-def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[OutputMessage]:
+def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[topics.OutputMessage]:
     """Speed, resistance and the curve of one estimate."""
     speed = types.make(
-        SPEED.type,
+        topics.SPEED.type,
         {
             'header': types.header(stamp_ns, FRAME),
             'twist.twist.linear.x': float(estimate.last_speed_m_s),
@@ -118,7 +95,7 @@ def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[OutputMessage
         },
     )
     resistance = types.make(
-        RESISTANCE.type,
+        topics.RESISTANCE.type,
         {
             'header': types.header(stamp_ns, FRAME),
             'accel.accel.linear.x': float(estimate.last_resistance_m_s2),
@@ -126,32 +103,32 @@ def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[OutputMessage
         },
     )
     return [
-        output_message(SPEED, speed, stamp_ns, node),
-        output_message(RESISTANCE, resistance, stamp_ns, node),
+        topics.output_message(topics.SPEED, speed, stamp_ns, node),
+        topics.output_message(topics.RESISTANCE, resistance, stamp_ns, node),
         _curve(stamp_ns, estimate, node),
     ]
 
 
-def _curve(stamp_ns: int, estimate: Estimate, node: str) -> OutputMessage:
+def _curve(stamp_ns: int, estimate: Estimate, node: str) -> topics.OutputMessage:
     """Return r(v) inside the valid range, one point a speed."""
     curve = estimate.valid_curve
     points = np.column_stack(
         [curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, curve.froude]
     )
-    return _cloud(RESISTANCE_CURVE, CURVE_FIELDS, points, stamp_ns, node)
+    return _cloud(topics.RESISTANCE_CURVE, CURVE_FIELDS, points, stamp_ns, node)
 
 
-def _forecast(stamp_ns: int, forecast: Forecast | None, node: str) -> OutputMessage:
+def _forecast(stamp_ns: int, forecast: Forecast | None, node: str) -> topics.OutputMessage:
     """Return the rest of the glide, one point a time; none where it is withdrawn."""
     points = np.empty((0, len(FORECAST_FIELDS))) if forecast is None else forecast.in_time()
-    return _cloud(FORECAST, FORECAST_FIELDS, points, stamp_ns, node)
+    return _cloud(topics.FORECAST, FORECAST_FIELDS, points, stamp_ns, node)
 
 
-def _withdrawn(stamp_ns: int, node: str) -> list[OutputMessage]:
+def _withdrawn(stamp_ns: int, node: str) -> list[topics.OutputMessage]:
     return [_forecast(stamp_ns, None, node), _path(stamp_ns, None, node)]
 
 
-def _path(stamp_ns: int, path: PathAhead | None, node: str) -> OutputMessage:
+def _path(stamp_ns: int, path: PathAhead | None, node: str) -> topics.OutputMessage:
     """Return the positions to come, each with the time at which she is there."""
     poses = []
     if path is not None:
@@ -165,13 +142,15 @@ def _path(stamp_ns: int, path: PathAhead | None, node: str) -> OutputMessage:
                 'pose.orientation.w': math.cos(half),
             }
             poses.append(types.make(types.POSE, pose))
-    message = types.make(FORECAST_PATH.type, header=types.header(stamp_ns, PLANE), poses=poses)
-    return output_message(FORECAST_PATH, message, stamp_ns, node)
+    message = types.make(
+        topics.FORECAST_PATH.type, header=types.header(stamp_ns, PLANE), poses=poses
+    )
+    return topics.output_message(topics.FORECAST_PATH, message, stamp_ns, node)
 
 
 def _cloud(
-    topic: OutputTopic, names: Sequence[str], values: Float64, stamp_ns: int, node: str
-) -> OutputMessage:
+    topic: topics.OutputTopic, names: Sequence[str], values: Float64, stamp_ns: int, node: str
+) -> topics.OutputMessage:
     """Return points (n, k) with their k fields."""
     points = values.astype('<f8')
     field = types.class_of('sensor_msgs/msg/PointField')
@@ -191,10 +170,10 @@ def _cloud(
         data=np.frombuffer(points.tobytes(), np.uint8),
         is_dense=True,
     )
-    return output_message(topic, cloud, stamp_ns, node)
+    return topics.output_message(topic, cloud, stamp_ns, node)
 
 
-def _coastdown_note(event: EndedCoastdown) -> EventNote:
+def _coastdown_note(event: events.EndedCoastdown) -> topics.EventNote:
     values = {
         'start_ns': str(event.start_ns),
         'end_ns': str(event.end_ns),
@@ -212,4 +191,4 @@ def _coastdown_note(event: EndedCoastdown) -> EventNote:
         low, high = event.estimate.froude_valid
         values['froude_min'] = repr(float(low))
         values['froude_max'] = repr(float(high))
-    return EventNote(EventKind.COASTDOWN, event.end_ns, text, values)
+    return topics.EventNote(topics.EventKind.COASTDOWN, event.end_ns, text, values)

@@ -22,16 +22,7 @@ from typing import NamedTuple
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
-from shipdrag_ros.nmea.reading import (
-    DAY_NS,
-    START,
-    Sentence,
-    SentenceReader,
-    SentenceSource,
-    SentenceTime,
-    best,
-)
-from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting
+from shipdrag_ros.nmea import sentences
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
 BEHIND_NS = SECOND_NS
@@ -42,7 +33,7 @@ _MEMORY_NS = 60 * SECOND_NS  # of the least delay; a clock that was set is known
 class Stamped(NamedTuple):
     """A sentence, when it was measured by the clock of its receipt, and its receipt [ns]."""
 
-    sentence: Sentence
+    sentence: sentences.Sentence
     stamp_ns: int
     read_ns: int
 
@@ -61,14 +52,14 @@ class WireClock:
 
     def __init__(self) -> None:
         self._receivers: dict[str, _Receiver] = {}
-        self._held: list[tuple[Sentence, int]] = []
+        self._held: list[tuple[sentences.Sentence, int]] = []
         self._read_ns = 0
         self._stamp_ns = 0
         self._due_ns = 0  # the next that states a time
         self._waited = False
         self._timed = False
 
-    def stamped(self, sentence: Sentence, read_ns: int) -> list[Stamped]:
+    def stamped(self, sentence: sentences.Sentence, read_ns: int) -> list[Stamped]:
         """
         Return the sentences whose time is known now, in the order of their receipt.
 
@@ -82,7 +73,7 @@ class WireClock:
         silent = read_ns - self._read_ns > BEHIND_NS and read_ns > self._due_ns
         self._read_ns = read_ns
         moment = sentence.time
-        if isinstance(moment, SentenceTime) and moment.trusted:
+        if isinstance(moment, sentences.SentenceTime) and moment.trusted:
             receiver = self._receivers.setdefault(sentence.talker, _Receiver())
             behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
             self._due_ns = read_ns + receiver.every_ns
@@ -96,7 +87,7 @@ class WireClock:
         self._timed = self._waited = False  # nobody states a time any more
         return self._released(0, read_ns)
 
-    def _timed_by(self, behind_ns: int, sentence: Sentence) -> list[Stamped]:
+    def _timed_by(self, behind_ns: int, sentence: sentences.Sentence) -> list[Stamped]:
         before, read_ns = self._waited, self._read_ns
         # a backlog ends where its lines have caught up
         self._waited = behind_ns > (BEHIND_NS // 10 if before else BEHIND_NS)
@@ -121,7 +112,7 @@ class _Receiver:
     """The clock of one talker beside that of the receipt; the day does not count."""
 
     def __init__(self) -> None:
-        self.every_ns = DAY_NS  # between the last two times that it stated
+        self.every_ns = sentences.DAY_NS  # between the last two times that it stated
         self._least_ns: list[int] = []  # of this minute, then of the one before
         self._since_ns = 0
         self._stated_ns = -1
@@ -143,7 +134,7 @@ class _Receiver:
 
 
 def _within_a_day(difference_ns: int) -> int:
-    return (difference_ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2
+    return (difference_ns + sentences.DAY_NS // 2) % sentences.DAY_NS - sentences.DAY_NS // 2
 
 
 TOPIC = 'nmea'
@@ -159,7 +150,7 @@ _KINDS = 50  # of unknown sentences are counted apart; a hostile talker may inve
 _OTHERS = 'others'
 
 # a source of an input, and the address it is heard on
-HeardSentence = tuple[SentenceSource, str]
+HeardSentence = tuple[sentences.SentenceSource, str]
 
 
 def raw_message(text: str, *, receive_ns: int) -> EncodedMessage:
@@ -198,7 +189,7 @@ class _Choice:
         if self.held is None:
             if now_ns - self.since_ns < SETTLE_NS:
                 return False
-            self.held = best(self.counts)
+            self.held = sentences.best(self.counts)
         if heard != self.held:
             return False
         self.last_ns = now_ns
@@ -231,7 +222,7 @@ class Interpreter:
         came while it was being chosen.
     """
 
-    def __init__(self, mounting: Mounting | None = None) -> None:
+    def __init__(self, mounting: sentences.Mounting | None = None) -> None:
         self.sentences = 0
         self.rejected: Counter[str] = Counter()
         self.unknown: Counter[str] = Counter()
@@ -239,7 +230,7 @@ class Interpreter:
         self.behind: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
         self.not_taken: Counter[str] = Counter()
-        self._reader = SentenceReader(mounting)
+        self._reader = sentences.SentenceReader(mounting)
         self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
 
@@ -259,7 +250,7 @@ class Interpreter:
             When it was read [ns since the epoch].
         """
         # a lost line end leaves two sentences in a line
-        _, *texts = START.split(text)
+        _, *texts = sentences.START.split(text)
         if not texts:
             self.rejected['no sentence'] += 1
         found = []
@@ -288,8 +279,8 @@ class Interpreter:
         sentence, stamp_ns, read_ns = stamped
         if stamp_ns < read_ns:
             _count(self.behind, address)
-        if sentence.kind not in READERS:
-            if sentence.kind not in TIMED:
+        if sentence.kind not in sentences.READERS:
+            if sentence.kind not in sentences.TIMED:
                 _count(self.unknown, sentence.talker + sentence.kind)
             return []
         if sentence.talker not in NMEA_TALKERS:

@@ -12,19 +12,10 @@ import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from shipdrag_ros.coastdown.events import (
-    BY_SPEED,
-    EndedBy,
-    EndedCoastdown,
-    Event,
-    NoEstimate,
-    NotCoastdown,
-    Onset,
-    Reset,
-)
+from shipdrag_ros.coastdown import events
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
+from shipdrag_ros.messages.topics import ERROR, OK, WARN, Status
 from shipdrag_ros.node.background import Compiling
 from shipdrag_ros.node.health import InputState
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
@@ -39,16 +30,16 @@ _LOOK = (
     'against the model'
 )
 ENDED_BY = {
-    EndedBy.SPEED: 'the minimum speed is reached',
-    EndedBy.TURN: 'the ship turned',
-    EndedBy.ENGINE: 'the engine drives again, or the speed settled',
-    EndedBy.BRAKE: 'something but the water stopped the ship',
-    EndedBy.ASTERN: 'the propeller was reversed',
-    EndedBy.DATA_STOP: 'the speed fell silent',
-    EndedBy.SILENCE: 'all sources of speed fell silent',
-    EndedBy.RESET: 'the memory was reset',
-    EndedBy.RECORD_END: 'the node stops',
-    EndedBy.GIVEN: 'given',
+    events.EndedBy.SPEED: 'the minimum speed is reached',
+    events.EndedBy.TURN: 'the ship turned',
+    events.EndedBy.ENGINE: 'the engine drives again, or the speed settled',
+    events.EndedBy.BRAKE: 'something but the water stopped the ship',
+    events.EndedBy.ASTERN: 'the propeller was reversed',
+    events.EndedBy.DATA_STOP: 'the speed fell silent',
+    events.EndedBy.SILENCE: 'all sources of speed fell silent',
+    events.EndedBy.RESET: 'the memory was reset',
+    events.EndedBy.RECORD_END: 'the node stops',
+    events.EndedBy.GIVEN: 'given',
 }
 
 
@@ -59,28 +50,28 @@ class LogLine(NamedTuple):
     warning: bool = False
 
 
-def line_of(event: Event) -> LogLine | None:
+def line_of(event: events.Event) -> LogLine | None:
     """
     Return the line of an event; None where it is one of many.
     """
     match event:
-        case Onset(start_ns, detected_ns):
+        case events.Onset(start_ns, detected_ns):
             seen_s = (detected_ns - start_ns) * _NS
             hold = ': hold rudder and engine' if seen_s < _LATE_S else ''
             text = f'a coastdown began at {utc(start_ns)}, confirmed {seen_s:.0f} s later'
             return LogLine(f'{text}{hold}')
-        case EndedCoastdown():
+        case events.EndedCoastdown():
             return _ended(event)
-        case NotCoastdown():
-            hint = _LOOK if event.reason in BY_SPEED else ''
+        case events.NotCoastdown():
+            hint = _LOOK if event.reason in events.BY_SPEED else ''
             return LogLine(f'nearly a coastdown: {event.text}{hint}')
-        case Reset(_, reason):
+        case events.Reset(_, reason):
             return LogLine(f'all memory is dropped: {reason}', warning=True)
-        case NoEstimate() | _:
+        case events.NoEstimate() | _:
             return None
 
 
-def _ended(event: EndedCoastdown) -> LogLine:
+def _ended(event: events.EndedCoastdown) -> LogLine:
     seconds = (event.end_ns - event.start_ns) * _NS
     why = f'{event.ended_by.value}: {ENDED_BY[event.ended_by]}'
     if event.withdrawn:
@@ -126,7 +117,7 @@ class Announcer:
         self._silence_said = False
         self._compiling_said = False
         self._compiled: Compiling | None = None
-        self._cuts: tuple[NotCoastdown, ...] = ()  # of the last coastdown
+        self._cuts: tuple[events.NotCoastdown, ...] = ()  # of the last coastdown
         self._withdrawn = False
 
     def compiling(self, work: Compiling | None, waiting: int) -> None:
@@ -154,14 +145,14 @@ class Announcer:
                 'compiles beforehand'
             )
 
-    def event(self, event: Event) -> None:
+    def event(self, event: events.Event) -> None:
         """
         Say what the monitor reports.
         """
         line = line_of(event)
-        if isinstance(event, EndedCoastdown):  # why it was withdrawn is said
+        if isinstance(event, events.EndedCoastdown):  # why it was withdrawn is said
             self._cuts, self._withdrawn = event.cuts, event.withdrawn
-        elif isinstance(event, NotCoastdown) and event in self._cuts:
+        elif isinstance(event, events.NotCoastdown) and event in self._cuts:
             line = None if self._withdrawn else LogLine(f'cut from the coastdown: {event.text}')
         if line is not None:
             self._say(line.text, warning=line.warning)

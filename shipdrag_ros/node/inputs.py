@@ -38,7 +38,7 @@ from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
-from shipdrag_ros.node.judging import Counts, InputFacts
+from shipdrag_ros.node.health import Counts, InputFacts
 from shipdrag_ros.samples import FURTHER
 
 Publishers = Callable[[], frozenset[str]]

@@ -26,7 +26,7 @@ from typing import TextIO
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected
-from shipdrag_ros.messages.heard import OK, Health
+from shipdrag_ros.messages.topics import OK, Health
 
 _CLEAR = '\x1b[K'
 

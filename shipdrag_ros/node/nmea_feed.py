@@ -23,12 +23,12 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from shipdrag_ros.messages import EventKind, Source, decode
-from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN, Status
+from shipdrag_ros.messages.topics import ERROR, OK, STALE, WARN, Status
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.live import Address, LiveNmea, SourceCounts, parse_addresses
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
+from shipdrag_ros.node.health import SILENT_S
 from shipdrag_ros.node.inputs import InputTopic, message_class
-from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.samples import ALL_MOTION

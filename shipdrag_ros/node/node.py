@@ -34,8 +34,7 @@ from shipdrag_ros.messages import (
     OutputTopic,
     Source,
 )
-from shipdrag_ros.messages.heard import ERROR, Health, Status
-from shipdrag_ros.messages.topics import diagnosis_message
+from shipdrag_ros.messages.topics import ERROR, Health, Status, diagnosis_message
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.health import (
@@ -51,9 +50,8 @@ from shipdrag_ros.node.health import (
 )
 from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
-from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.service_guard import add_services, guard_services
+from shipdrag_ros.node.requests import NodeParameters, add_services, check_sections, guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A listener that publishes nothing and offers no service: it hears a node for others, and
-calls its `~/engine_stopped` where that is allowed.
+Other nodes beside the node: one that only listens, and one that plays a ship to it.
 
-It may start before the node, and the node may come and go.
+The listener publishes nothing and offers no service; it calls `~/engine_stopped` where that is
+allowed. It may start before the node, and the node may come and go.
 """
 
 from __future__ import annotations
@@ -11,22 +11,39 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Self
 
+import numpy as np
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.display import printable
-from shipdrag_ros.errors import reason_of
-from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Source, decode
-from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
-from shipdrag_ros.messages.heard import read_health as decode_health
-from shipdrag_ros.messages.topics import RESISTANCE_CURVE
+from shipdrag_ros.errors import ShipdragError, reason_of
+from shipdrag_ros.messages import (
+    DEFAULT_NODE,
+    OUTPUT_TOPICS,
+    TOPICS,
+    MalformedMessage,
+    Source,
+    decode,
+    encode,
+    input_type,
+    topics,
+)
+from shipdrag_ros.messages.topics import read_health as decode_health
+from shipdrag_ros.messages.types import stamp_ns
 from shipdrag_ros.node.inputs import LATCHED, is_installed, message_class
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
 LOOK_S = 1.0
 SAID_S = 10.0  # a message that cannot be shown is said so often at most
@@ -58,7 +75,7 @@ class Spectator:
     """
 
     def __init__(
-        self, hear: Callable[[Heard], None], *, node: str = '', marks: bool = False
+        self, hear: Callable[[topics.Heard], None], *, node: str = '', marks: bool = False
     ) -> None:
         self.node = ''
         self.others: tuple[str, ...] = ()
@@ -78,7 +95,11 @@ class Spectator:
         self._of_inputs: dict[str, tuple[str, str, Any]] = {}
         self._last_s: dict[str, float] = {}
         self._ros.create_subscription(
-            message_class(DIAGNOSTICS), '/diagnostics', self._on_diagnostics, _RELIABLE, raw=True
+            message_class(topics.DIAGNOSTICS),
+            '/diagnostics',
+            self._on_diagnostics,
+            _RELIABLE,
+            raw=True,
         )
         self._ros.create_timer(LOOK_S, self._look)
         self._thread = threading.Thread(target=self._spin, name='spectator', daemon=True)
@@ -122,12 +143,12 @@ class Spectator:
 
     def _look(self) -> None:
         """Find the node by the curve that it offers, and hear it."""
-        ending = f'/{RESISTANCE_CURVE.name}'
+        ending = f'/{topics.RESISTANCE_CURVE.name}'
         found = sorted(
             topic.removesuffix(ending)
             for topic, kinds in self._ros.get_topic_names_and_types()
             if topic.endswith(ending)
-            and RESISTANCE_CURVE.type in kinds
+            and topics.RESISTANCE_CURVE.type in kinds
             and self._ros.count_publishers(topic)
         )
         if self._wanted:
@@ -150,7 +171,7 @@ class Spectator:
             self._ros.create_subscription(
                 message_class(topic.type),
                 topic.under(node),
-                lambda payload, name=topic.name: self._hear(NodeMessage(name, payload)),
+                lambda payload, name=topic.name: self._hear(topics.NodeMessage(name, payload)),
                 LATCHED if topic.latched else _RELIABLE,
                 raw=True,
             )
@@ -160,7 +181,7 @@ class Spectator:
             self._ros.create_subscription(
                 String,
                 f'{node}/ship',
-                lambda message: self._hear(ShipFile(message.data)),
+                lambda message: self._hear(topics.ShipFile(message.data)),
                 LATCHED,
             )
         )
@@ -175,13 +196,13 @@ class Spectator:
             self._hear_inputs(own[0])
             self._hear(own[0])
 
-    def _is_own(self, health: Health) -> bool:
+    def _is_own(self, health: topics.Health) -> bool:
         """Whether it is of the node heard; a status may give its name with or without place."""
         name = health.statuses[0].node.strip('/')
         full = (self._wanted or self.node).strip('/')
         return not full or name == full or full.endswith(f'/{name}')
 
-    def _hear_inputs(self, health: Health) -> None:
+    def _hear_inputs(self, health: topics.Health) -> None:
         """Hear the topics that the node hears, in the types that it hears."""
         for status in health.inputs:
             topic, kind = status.values.get('topic', ''), status.values.get('type', '')
@@ -210,4 +231,247 @@ class Spectator:
         self._last_s[source.input] = now_s
         block = decode(source, [payload], [time.time_ns()]).block
         if len(block):
-            self._hear(Samples(block))
+            self._hear(topics.Samples(block))
+
+
+QOS = QoSProfile(depth=1000)
+TIMEOUT_S = 10.0
+DISCOVERY_S = 0.5  # by which a listener knows its publisher after the publisher knew it
+STEP_NS = SECOND_NS  # data and clock advance together by this much
+
+
+class Player:
+    """
+    Publishes samples, and /clock where asked to.
+
+    Parameters
+    ----------
+    node
+        Owner of the publishers.
+    executor
+        Spun while waiting, so that the owner hears the answers.
+    """
+
+    def __init__(self, node: Node, executor: SingleThreadedExecutor) -> None:
+        self._node = node
+        self._executor = executor
+        self._topics: dict[str, Publisher] = {}
+        self._clock: Publisher | None = None
+
+    def connect(self, block: Block, *, timeout_s: float = TIMEOUT_S) -> None:
+        """
+        Wait until somebody hears every input of a block.
+
+        Raises
+        ------
+        ShipdragError
+            Naming the topics that nobody hears.
+        """
+        for code in np.unique(block.channel).tolist():
+            channel = Channel(code)
+            self._publisher(f'/{channel.input}', input_type(channel))
+        self._wait_for_listeners(timeout_s)
+
+    def publish(self, block: Block) -> None:
+        """
+        Publish samples at once, in the order of the block.
+        """
+        for message in encode(block):
+            self._publisher(message.topic, message.type).publish(message.payload)
+
+    def set_clock(self, time_ns: int) -> None:
+        """
+        Publish simulated time [ns].
+
+        Raises
+        ------
+        ShipdragError
+            If nobody hears it.
+        """
+        if self._clock is None:
+            self._clock = self._topics['/clock'] = self._node.create_publisher(
+                Clock, '/clock', QOS
+            )
+            self._wait_for_listeners(TIMEOUT_S)
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(int(time_ns), SECOND_NS)
+        self._clock.publish(message)
+
+    def play(
+        self, block: Block, *, speed: float, progress: Callable[[float], None] = lambda _: None
+    ) -> None:
+        """
+        Publish a block by its times of arrival, /clock a second ahead.
+
+        Parameters
+        ----------
+        speed
+            Seconds of data in a second of life.
+        progress
+            Called with the fraction done.
+        """
+        first_ns = int(block.receive_ns[0])
+        seconds = (block.receive_ns - first_ns) // STEP_NS
+        starts = np.flatnonzero(np.diff(seconds, prepend=-1, append=seconds[-1] + 1))
+        start_s = time.monotonic()
+        for i, j in pairwise(starts.tolist()):
+            due_s = start_s + float(seconds[i]) / speed
+            self._spin_until(due_s)
+            self.set_clock(first_ns + (int(seconds[i]) + 1) * STEP_NS)
+            self.publish(block[i:j])
+            progress(j / len(block))
+
+    def _wait_for_listeners(self, timeout_s: float) -> None:
+        if not self._deaf():
+            return
+        end_s = time.monotonic() + timeout_s
+        while deaf := self._deaf():
+            if time.monotonic() > end_s:
+                raise ShipdragError(
+                    f'nobody hears {", ".join(deaf)} within {timeout_s:g} s; is the node active?'
+                )
+            self._executor.spin_once(timeout_sec=0.05)
+        self._spin_until(time.monotonic() + DISCOVERY_S)
+
+    def _deaf(self) -> list[str]:
+        return [name for name, topic in self._topics.items() if not topic.get_subscription_count()]
+
+    def _spin_until(self, due_s: float) -> None:
+        while True:  # once at least, to hear the answers also when late
+            self._executor.spin_once(timeout_sec=max(due_s - time.monotonic(), 0.0))
+            if time.monotonic() >= due_s:
+                return
+
+    def _publisher(self, topic: str, type_name: str) -> Publisher:
+        if topic not in self._topics:
+            self._topics[topic] = self._node.create_publisher(message_class(type_name), topic, QOS)
+        return self._topics[topic]
+
+
+@dataclass(frozen=True)
+class LiveEstimate:
+    """What the node said of one moment, as a subscriber hears it."""
+
+    stamp_ns: int
+    speed_m_s: float
+    resistance_m_s2: float
+    sigma_m_s2: float
+
+
+class Rehearsal:
+    """
+    A peer of the node on the ROS graph; a context manager.
+
+    Parameters
+    ----------
+    heard
+        Called with every estimate.
+
+    Attributes
+    ----------
+    estimates
+        How many were heard.
+    """
+
+    def __init__(self, heard: Callable[[LiveEstimate], None]) -> None:
+        self.estimates = 0
+        self._heard = heard
+        self._speeds: dict[int, float] = {}
+        self._resistances: dict[int, tuple[float, float]] = {}
+        self._context = rclpy.Context()
+        # Ctrl-C stays what it is in Python; the caller has a process to end
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node('rehearsal', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._player = Player(self._node, self._executor)
+        self._ready = False
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
+        for topic, callback in (
+            (topics.SPEED, self._hear_speed),
+            (topics.RESISTANCE, self._hear_resistance),
+        ):
+            self._node.create_subscription(
+                message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
+            )
+
+    def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
+        """
+        Wait until the node hears every input of a block, and is ready to estimate.
+
+        Parameters
+        ----------
+        alive
+            Called now and then; raises if there is nothing to wait for.
+
+        Raises
+        ------
+        ShipdragError
+            Naming the inputs that are not heard in time.
+        """
+        end_s = time.monotonic() + timeout_s
+        while True:
+            alive()
+            try:
+                self._player.connect(block, timeout_s=1.0)
+            except ShipdragError:
+                if time.monotonic() > end_s:
+                    raise
+            else:
+                break
+        while not self._ready:  # a first start compiles, which ends by itself
+            alive()
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def play(self, block: Block, *, speed: float, progress: Callable[[float], None]) -> None:
+        """
+        Send samples under simulated time.
+
+        Parameters
+        ----------
+        speed
+            Seconds of data in a second of life.
+        progress
+            Called with the fraction done.
+        """
+        self._player.play(block, speed=speed, progress=progress)
+
+    def listen(self, *, until: Callable[[], bool] = lambda: False, timeout_s: float) -> None:
+        """
+        Hear on until a condition holds, or time is up.
+        """
+        end_s = time.monotonic() + timeout_s
+        while not until() and time.monotonic() < end_s:
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _hear_health(self, message: DiagnosticArray) -> None:
+        for health in topics.health_of(message.status):
+            state = health.of('state')
+            assert state is not None  # by which a node is known
+            compiling = 'compiling [s]' in state.values
+            self._ready = state.values['lifecycle'] == 'active' and not compiling
+
+    def _hear_speed(self, message: Any) -> None:
+        self._speeds[stamp_ns(message)] = message.twist.twist.linear.x
+        self._join(stamp_ns(message))
+
+    def _hear_resistance(self, message: Any) -> None:
+        variance = message.accel.covariance[0]
+        self._resistances[stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
+        self._join(stamp_ns(message))
+
+    def _join(self, stamp_ns: int) -> None:
+        """Report a moment once both of its figures are there, whichever came first."""
+        if stamp_ns not in self._speeds or stamp_ns not in self._resistances:
+            return
+        resistance, sigma = self._resistances.pop(stamp_ns)
+        self.estimates += 1
+        self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))

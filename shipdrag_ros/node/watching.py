@@ -21,8 +21,8 @@ from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.coastdown.events import State
 from shipdrag_ros.messages import EventKind
 from shipdrag_ros.messages.types import is_stamped
+from shipdrag_ros.node.health import convention_doubt
 from shipdrag_ros.node.inputs import InputTopic
-from shipdrag_ros.node.judging import convention_doubt
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import ALL_MOTION, BACKWARD_JUMP_NS, MOTION_INPUTS

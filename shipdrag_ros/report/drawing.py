@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from shipdrag_ros.display import Picture
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, distinct to colour-blind readers; line styles and
@@ -61,6 +63,18 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout='constrained')
+
+
+@contextmanager
+def one_axis(
+    width: float, height: float, more: Mapping[Any, Any] | None = None
+) -> Iterator[tuple[Figure, Axes]]:
+    """
+    Draw a figure [inches] of one axis, in the style of all pages.
+    """
+    with styled(more):
+        figure = new_figure(width, height)
+        yield figure, figure.subplots()
 
 
 def picture(figure: Figure, caption: str) -> Picture:

@@ -18,20 +18,12 @@ from numpy.typing import NDArray
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import terms
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
 from shipdrag_ros.simulation.sensors import lagged, log_reading
 from shipdrag_ros.simulation.surge import own_action, steps_of
-from shipdrag_ros.simulation.terms import (
-    acted,
-    columns_of,
-    edges_of,
-    extra_of,
-    law_of,
-    legs_of,
-    outside,
-)
 
 RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left, which is none
 _STEPS_A_RUN_DOWN = 4
@@ -95,7 +87,7 @@ class _Prepared:
         """Return what `follow` does, a path a motion (p, m, 5)."""
         paths = np.empty((len(self.records), len(time_s), 5))
         follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
-        lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
+        lost = np.maximum.accumulate(terms.outside(self.law, paths[:, :, 0]), axis=1)
         paths[lost] = np.nan
         return paths
 
@@ -211,7 +203,7 @@ def _prepare(
     speed_m_s: Float64 | None,
     step_s: float | None,
 ) -> _Prepared:
-    law = law_of(ship, scenario.speed_m_s)
+    law = terms.law_of(ship, scenario.speed_m_s)
     speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
     longest = _longest_step_s(ship, scenario.speed_m_s)
@@ -219,17 +211,17 @@ def _prepare(
     places: dict[tuple[Turn, ...], tuple[int, int]] = {}
     for action in actions:
         if action.turns not in places:
-            of_column = acted(scenario, action) if action.turns else scenario
-            edges = edges_of(of_column, also_s=also)
+            of_column = terms.acted(scenario, action) if action.turns else scenario
+            edges = terms.edges_of(of_column, also_s=also)
             steps = (
                 _steps(ship, of_column, edges, longest)
                 if step_s is None
                 else steps_of(ship, of_column, edges, step_s=step_s)
             )
             first = sum(map(len, legs))
-            legs.append(legs_of(ship, of_column, edges, steps))
+            legs.append(terms.legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)
-    records = columns_of(ship, scenario, actions, speed_m_s=speeds)
+    records = terms.columns_of(ship, scenario, actions, speed_m_s=speeds)
     motions: dict[tuple[object, ...], int] = {}
     motion = [
         motions.setdefault((record.tobytes(), action.resistance, action.turns), len(motions))
@@ -241,7 +233,7 @@ def _prepare(
         np.array(motion),
         law,
         records[once],
-        extra_of(ship, law, moving),
+        terms.extra_of(ship, law, moving),
         np.concatenate(legs),
         np.array([places[action.turns] for action in moving]),
     )

@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
@@ -14,22 +15,13 @@ import numpy as np
 
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
-from shipdrag_ros.parameter import ABSOLUTE, Parameter, Scale
+from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
 from shipdrag_ros.ship.expression import PURE, Formula
+from shipdrag_ros.simulation import effect
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    AREAS,
-    DAY_S,
-    DRAUGHTS,
-    SPEEDS,
-    WEIGHTS,
-    Effect,
-    Frame,
-    Scope,
-)
 from shipdrag_ros.simulation.hydrodynamics import friction_n, viscous_n
 from shipdrag_ros.simulation.scenario import Turn
 
@@ -38,7 +30,8 @@ _FOR_EVER_S = 1e7
 _STEP = 0.01  # of a speed, over which a power is looked at
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
 _SCALES: Mapping[str, Scale] = {
-    scale.text: scale for scale in (ABSOLUTE, WEIGHTS, AREAS, SPEEDS, DRAUGHTS)
+    scale.text: scale
+    for scale in (ABSOLUTE, effect.WEIGHTS, effect.AREAS, effect.SPEEDS, effect.DRAUGHTS)
 }
 _NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
 _ERRS_IN = {
@@ -49,7 +42,7 @@ _ERRS_IN = {
 }
 
 
-def effects_in(file: Traversable) -> Iterator[Effect]:
+def effects_in(file: Traversable) -> Iterator[effect.Effect]:
     """
     Yield the effects of a file of the library: terms, with what else an effect declares.
 
@@ -60,7 +53,7 @@ def effects_in(file: Traversable) -> Iterator[Effect]:
     """
     problems: Problems = []
     data = parse(file.read_text(encoding='utf-8'), subject=file.name, error=EffectFileError)
-    of_term, of_effect = keys_of(LearntTerm), keys_of(Effect)
+    of_term, of_effect = keys_of(LearntTerm), keys_of(effect.Effect)
     for name, entry in data.items():
         given = read_keys(of_term | of_effect, {'name': name, **entry}, name, problems)
         if problems:
@@ -70,7 +63,51 @@ def effects_in(file: Traversable) -> Iterator[Effect]:
         yield replace(effect_of(term), **more)
 
 
-def effect_of(term: LearntTerm) -> Effect:
+def stated(name: str, act: Callable[..., Action]) -> effect.Effect:
+    """
+    Return an effect of which a module says what it does, and a file of the library all else.
+    """
+    entry = _of_modules()[name]
+    of_effect, problems = keys_of(effect.Effect), list[str]()
+    more = read_keys(
+        of_effect, {key: entry[key] for key in entry if key in of_effect}, name, problems
+    )
+    if problems:
+        raise EffectFileError(name, problems)
+    return effect.Effect(
+        name=name,
+        scope=effect.Scope(entry['scope']),
+        parameters=tuple(_stated(*each) for each in entry['parameters'].items()),
+        act=act,
+        nameless_at=entry.get('nameless_at', {}),
+        **more,
+    )
+
+
+@cache
+def _of_modules() -> dict[str, Any]:
+    file = resources.files('shipdrag_ros') / 'data' / 'effects_of_modules.yaml'
+    content = file.read_text(encoding='utf-8')
+    found: dict[str, Any] = parse(content, subject=file.name, error=EffectFileError)
+    return found
+
+
+def _stated(name: str, about: Mapping[str, Any]) -> Parameter:
+    shape, *numbers = about['prior']
+    return Parameter(
+        about.get('value', math.nan),
+        name=name,
+        unit=about.get('unit', ''),
+        meaning=about['meaning'],
+        prior=Prior(Shape(shape), *numbers),
+        low=about['bounds'][0],
+        high=about['bounds'][1],
+        words=about.get('words', {}),
+        measured_in=_SCALES[about.get('counted_in', '')],
+    )
+
+
+def effect_of(term: LearntTerm) -> effect.Effect:
     """
     Return a term as an effect, as those of the library are.
     """
@@ -79,9 +116,9 @@ def effect_of(term: LearntTerm) -> Effect:
     # what it leaves of a run that it was not learnt on is how far its formula may be off
     left = 1.0 - term.evidence.held_out_gap_cut if term.evidence else 0.0
     names = {name for *_, text in term.formulas for name in Formula.parse(text).names}
-    return Effect(
+    return effect.Effect(
         name=term.name,
-        scope=Scope(term.term.scope),
+        scope=effect.Scope(term.term.scope),
         parameters=tuple(
             _parameter(name, each, is_size=name == size) for name, each in term.parameters.items()
         ),
@@ -92,7 +129,7 @@ def effect_of(term: LearntTerm) -> Effect:
         needs=tuple(key for name, key in _NEEDS.items() if name in names)
         + (('air',) if any(part.channel == 'air' for part in term.parts) else ()),
         errs_in=_ERRS_IN.get(term.term.channel, ()),
-        lasts_s=0.0 if term.term.scope == Scope.RUN else 365.0 * DAY_S,
+        lasts_s=0.0 if term.term.scope == effect.Scope.RUN else 365.0 * effect.DAY_S,
     )
 
 
@@ -112,7 +149,7 @@ def _parameter(name: str, declared: TermParameter, *, is_size: bool) -> Paramete
     )
 
 
-_OF_RUN: Mapping[str, Callable[[Frame], float]] = {
+_OF_RUN: Mapping[str, Callable[[effect.Frame], float]] = {
     'rho': lambda frame: frame.ship.water.density_kg_m3,
     'g': lambda frame: GRAVITY_M_S2,
     'pi': lambda frame: math.pi,
@@ -146,7 +183,7 @@ class _Acting:
 
     text: str
     term: LearntTerm
-    frame: Frame
+    frame: effect.Frame
     values: tuple[float, ...]
 
     def at(self, speed_m_s: Float64 | float = 0.0, time_s: Float64 | float = 0.0) -> Float64:
@@ -196,7 +233,7 @@ class _Acting:
 
 
 def force_n(
-    term: LearntTerm, frame: Frame, values: tuple[float, ...], speed_m_s: Float64
+    term: LearntTerm, frame: effect.Frame, values: tuple[float, ...], speed_m_s: Float64
 ) -> Float64:
     """
     Return the force of a term at speeds (n,), at the stop [N].
@@ -204,7 +241,7 @@ def force_n(
     return _Acting(term.term.expression, term, frame, values).force_n(speed_m_s)
 
 
-def _act(term: LearntTerm, frame: Frame, *values: float) -> Action:
+def _act(term: LearntTerm, frame: effect.Frame, *values: float) -> Action:
     total = Action()
     for part, unit in zip(term.parts, term.units, strict=True):
         total += _action(part, _Acting(part.expression, term, frame, values), unit == PURE)

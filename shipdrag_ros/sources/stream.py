@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.reading import best
+from shipdrag_ros.nmea.sentences import best
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.log import (

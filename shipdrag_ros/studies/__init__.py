@@ -16,8 +16,6 @@ from importlib.metadata import entry_points
 from pkgutil import iter_modules
 from typing import NamedTuple
 
-__all__ = ['GROUP', 'Study', 'found']
-
 GROUP = 'shipdrag.papers'
 
 

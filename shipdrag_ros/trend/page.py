@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,26 +15,23 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.display import (
-    M_S_PER_KNOT,
-    Link,
-    Picture,
-    Section,
-    Table,
-    force_unit,
-    plus_minus,
-    utc,
-)
+from shipdrag_ros import display
+from shipdrag_ros.diagnosis.words import quantity_text
+from shipdrag_ros.diagnosis.words import size as size_text
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.report.document import page_text
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION, picture
 from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.simulation.effects import find
 from shipdrag_ros.trend import words
+from shipdrag_ros.trend.series import CoastdownRow
 from shipdrag_ros.trend.ship_trend import ShipTrend
 
 _RANKED = 'Each ship at her reference speed, the one to be cleaned first on top.'
 _RUNS = 'Coastdowns, the latest first; ± is two standard deviations'
 Links = Mapping[tuple[str, int], str]
-_HOW = Section(
+_HOW = display.Section(
     'How to read it',
     lines=(
         'Added resistance is the resistance of the hull through the water over that of the clean '
@@ -79,7 +79,7 @@ def fleet_text(
         Where the page of each coastdown is, by bag and start; None where there are none.
     """
     sections = [
-        Section(
+        display.Section(
             'Which hull first',
             tables=((f'{_RANKED} {words.ranked_by(trends)}', words.ranking(trends)),),
         )
@@ -88,7 +88,7 @@ def fleet_text(
         drawn = () if trend.curve is None else (added_resistance(trend),)
         steps = (('Steps in the state of the hull', words.event_table(trend)),)
         sections.append(
-            Section(
+            display.Section(
                 trend.series.name or 'a ship without a name',
                 entry=trend.series.name or 'a ship without a name',
                 lead=words.lines(trend)[:1],
@@ -98,9 +98,9 @@ def fleet_text(
             )
         )
     if skipped:
-        table = Table(('bag', 'reason'), tuple(skipped))
+        table = display.Table(('bag', 'reason'), tuple(skipped))
         sections.append(
-            Section(
+            display.Section(
                 'Bags that could not be used',
                 tables=(('What the fleet could not use, and why', table),),
             )
@@ -109,24 +109,24 @@ def fleet_text(
     return page_text('Trend of the fleet', sections, sentence=_sentence(trends))
 
 
-def _runs(trend: ShipTrend, links: Links) -> Table:
+def _runs(trend: ShipTrend, links: Links) -> display.Table:
     """Return a line a coastdown; its date leads to its page, where there is one."""
     rows = []
     for point in reversed(trend.points):
-        date, href = utc(point.time_ns), links.get((point.bag, point.time_ns))
+        date, href = display.utc(point.time_ns), links.get((point.bag, point.time_ns))
         loss = words.speed_lost(point.value)
         known = bool(np.isfinite(point.value))
         rows.append(
             (
-                date if href is None else Link(date, href),
+                date if href is None else display.Link(date, href),
                 point.bag,
-                plus_minus(100.0 * point.value, 200.0 * point.sd) if known else '-',
+                display.plus_minus(100.0 * point.value, 200.0 * point.sd) if known else '-',
                 '-' if loss is None or not known else f'{100.0 * loss:.1f}',
                 point.reason or 'used',
             )
         )
     head = ('start', 'bag', 'added [%]', 'speed lost [%]', 'used, or why not')
-    return Table(head, tuple(rows))
+    return display.Table(head, tuple(rows))
 
 
 def _sentence(trends: Sequence[ShipTrend]) -> str:
@@ -144,7 +144,7 @@ def _sentence(trends: Sequence[ShipTrend]) -> str:
 _SIZE = (9.0, 3.6)
 
 
-def added_resistance(trend: ShipTrend) -> Picture:
+def added_resistance(trend: ShipTrend) -> display.Picture:
     """
     Draw the added resistance of one ship against time.
 
@@ -217,7 +217,7 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
     axes.legend(loc='upper left')
 
 
-def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Picture:
+def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> display.Picture:
     """
     Draw the resistance of one coastdown over that of the clean hull.
 
@@ -230,11 +230,11 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Pic
     mass_kg
         Of the ship.
     """
-    unit, name = force_unit(mass_kg)
+    unit, name = display.force_unit(mass_kg)
     with rc_context(STYLE):
         figure = Figure(figsize=_SIZE, layout='constrained')
         axes = figure.add_subplot()
-        knots = np.asarray(row['speed_m_s'], dtype=float) / M_S_PER_KNOT
+        knots = np.asarray(row['speed_m_s'], dtype=float) / display.M_S_PER_KNOT
         force = mass_kg / unit * np.asarray(row['resistance_m_s2'], dtype=float)
         spread = 2.0 * mass_kg / unit * np.asarray(row['sigma_m_s2'], dtype=float)
         axes.fill_between(
@@ -250,8 +250,7 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Pic
         if row['clean_m_s2'] is not None:
             clean = mass_kg / unit * np.asarray(row['clean_m_s2'], dtype=float)
             axes.plot(knots[known], clean[known], color=VERMILION, ls='--', label='clean hull')
-        axes.set_xlabel('speed through water [knots]')
-        axes.set_ylabel(f'resistance [{name}]')
+        axes.set(xlabel='speed through water [knots]', ylabel=f'resistance [{name}]')
         axes.set_ylim(bottom=0.0)
         axes.legend(loc='upper left')
     return picture(
@@ -264,3 +263,192 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Pic
 def _days(time_ns: Int64) -> Float64:
     """Return days since 1970, in which matplotlib counts dates."""
     return np.asarray(time_ns / 86_400e9)
+
+
+_LINES = 12
+_VERDICTS = {
+    'none': 'Model and data agree: no effect is missing.',
+    'unknown': 'Something is missing that has no name in the library of effects.',
+}
+_FLAGS = {
+    'cut': 'part of the record was cut',
+    'short': 'the run is short',
+    'turned': 'the ship turned',
+    'engine': 'the engine drove again',
+    'braked': 'something but the water stopped her',
+    'data_stop': 'the data stopped',
+    'withdrawn': 'it turned out to be no coastdown',
+    'no_estimate': 'no estimate was possible',
+    'no_diagnosis': 'it was not diagnosed',
+    'clocks_apart': 'the clocks of the sensors differ',
+    'damaged': 'the recording is damaged',
+}
+
+
+def page_name(row: CoastdownRow) -> str:
+    """
+    Return the file name of a coastdown's page: the same for the same content.
+    """
+    return f'{row["content_hash"][:20]}-{row["time_ns"]}.html'
+
+
+def links(rows: list[CoastdownRow], folder: str) -> dict[tuple[str, int], str]:
+    """
+    Return where each coastdown's page is, by bag and start.
+
+    Parameters
+    ----------
+    rows
+        Of the store's `coastdowns`.
+    folder
+        That holds the pages, as it is reached from the page of the fleet; ends with '/'.
+    """
+    return {(row['bag'], row['time_ns']): f'{folder}{page_name(row)}' for row in rows}
+
+
+def coastdown_page(row: CoastdownRow, *, fleet: str) -> str:
+    """
+    Return the page of a coastdown (HTML).
+
+    Parameters
+    ----------
+    row
+        Of the store's `coastdowns`.
+    fleet
+        Where the page of the fleet is.
+    """
+    ship = row['ship'] or 'a ship without a name'
+    bag = shlex.quote(row['bag'].rpartition('/')[2])
+    more = (
+        f'The motion, the residuals and what would decide: shipdrag diagnose {bag} '
+        '--report page.html, in the folder of the bag.'
+    )
+    sections = [
+        display.Section('The run', tables=(('What is known of it', _facts(row)),)),
+        *_curve(row),
+        display.Section('What differs', lead=(_verdict(row),), tables=_candidates(row)),
+        display.Section('More', text=(more,)),
+    ]
+    return page_text(
+        f'{ship}: coastdown of {display.utc(row["time_ns"])}',
+        sections,
+        sentence=_of_run(row),
+        above=display.Link('The fleet', fleet),
+    )
+
+
+def _mass_kg(row: CoastdownRow) -> float:
+    return float(row['displaced_volume_m3'] * row['water_density_kg_m3'])
+
+
+def _known(row: CoastdownRow) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Return the places of the grid where r is known."""
+    r = np.asarray(row['resistance_m_s2'], dtype=float)
+    return np.flatnonzero(np.isfinite(r) & (r > 0.0))
+
+
+def _of_run(row: CoastdownRow) -> str:
+    known = _known(row)
+    if len(known) == 0:
+        return f'No estimate: {row["error"] or "none was possible"}.'
+    wished = 0.75 * (row['speed_at_stop_m_s'] or row['speed_m_s'][known[-1]])
+    place = int(known[np.abs(np.asarray(row['speed_m_s'])[known] - wished).argmin()])
+    speed, force, power, over = _cells(row, place)
+    said = f'At {speed} knots: resistance {force}, effective power {power}'
+    return f'{said}, {over} % over the clean hull; ± is two standard deviations.' if over else said
+
+
+def _cells(row: CoastdownRow, place: int) -> tuple[str, str, str, str]:
+    """Return speed, resistance, effective power and percent over the clean hull as text."""
+    mass, speed = _mass_kg(row), float(row['speed_m_s'][place])
+    newtons = mass * float(row['resistance_m_s2'][place])
+    spread = 2.0 * mass * float(row['sigma_m_s2'][place])
+    force, force_name = display.force_unit(mass)
+    power, power_name = display.power_unit(mass)
+    over, clean = '', row['clean_m_s2']
+    if clean is not None and clean[place] is not None and np.isfinite(clean[place]):
+        clean_n = mass * float(clean[place])
+        over = display.plus_minus(100.0 * (newtons / clean_n - 1.0), 100.0 * spread / clean_n)
+    return (
+        f'{speed / display.M_S_PER_KNOT:.1f}',
+        f'{display.plus_minus(newtons / force, spread / force)} {force_name}',
+        f'{display.plus_minus(newtons * speed / power, spread * speed / power)} {power_name}',
+        over,
+    )
+
+
+def _facts(row: CoastdownRow) -> display.Table:
+    heading, end_ns = row['heading_rad'], row['end_ns']
+    compass = None if heading is None else (90.0 - np.degrees(heading)) % 360.0
+    flags = [_FLAGS.get(flag, flag.replace('_', ' ')) for flag in row['flags'] or ()]
+    found = {
+        'bag': row['bag'],
+        'start': display.utc(row['time_ns']),
+        'length': end_ns and display.duration((end_ns - row['time_ns']) / 1e9),
+        'ended by': row['ended_by'] and row['ended_by'].replace('_', ' '),
+        'compass heading': None if compass is None else f'{compass:03.0f}',
+        'speed at the stop': row['speed_at_stop_m_s']
+        and display.ship_speed(row['speed_at_stop_m_s'], _mass_kg(row)),
+        'draught': row['draught_m'] and f'{row["draught_m"]:.2f} m',
+        'displaced volume': f'{row["displaced_volume_m3"]:.0f} m³',
+        'noted in the log book': ', '.join(row['facts'] or ()),
+        'to be weighed': ', '.join(flags),
+        'no estimate, because': row['error'],
+        'software': f'shipdrag_ros {row["software_version"]}',
+    }
+    return display.Table(
+        ('', ''), tuple((name, str(text)) for name, text in found.items() if text)
+    )
+
+
+def _curve(row: CoastdownRow) -> list[display.Section]:
+    known = _known(row)
+    if len(known) < 2:
+        return []
+    places = np.unique(known[np.linspace(0, len(known) - 1, _LINES).round().astype(int)])
+    head = ('speed [knots]', 'resistance', 'effective power', 'over the clean hull [%]')
+    table = display.Table(head, tuple(_cells(row, int(place)) for place in places))
+    caption = 'Resistance and effective power; ± is two standard deviations, of the run alone'
+    return [
+        display.Section(
+            'What she needed',
+            pictures=(coastdown_curve(row, known, _mass_kg(row)),),
+            tables=((caption, table),),
+        )
+    ]
+
+
+def _verdict(row: CoastdownRow) -> str:
+    if row['verdict'] is None:
+        return 'It was not diagnosed.'
+    if row['verdict'] in _VERDICTS:
+        return _VERDICTS[row['verdict']]
+    if row['verdict'] == 'named':
+        names = ' and '.join(each['name'].replace('_', ' ') for each in json.loads(row['effects']))
+        return f'Missing in the model of the clean hull: {names}.'
+    return 'Missing is one of those below; this run alone cannot separate them.'
+
+
+def _candidates(row: CoastdownRow) -> tuple[tuple[str, display.Table], ...]:
+    rows = []
+    for each in json.loads(row['candidates'] or '[]'):
+        sizes = [
+            _size(effect['name'], name, Parameter(size['value'], size['sd']))
+            for effect in each['effects']
+            for name, size in effect['parameters'].items()
+        ]
+        names = ' and '.join(name.replace('_', ' ') for name in each['names'])
+        rows.append((names, f'{each["probability"]:.1%}', '; '.join(sizes)))
+    if not rows:
+        return ()
+    head = ('effect', 'probability', 'how large; ± is two standard deviations')
+    return (('How probable, and how large', display.Table(head, tuple(rows))),)
+
+
+def _size(effect: str, name: str, size: Parameter) -> str:
+    """Return the size of an effect in words; of one that this version does not know, as it is."""
+    with suppress(SimulationError):
+        for quantity in find(effect).parameters:
+            if quantity.name == name:
+                return f'{quantity_text(quantity)} {size_text(quantity, size)}'
+    return f'{name} {display.plus_minus(size.value, 2.0 * size.sd)}'

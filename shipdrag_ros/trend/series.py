@@ -11,7 +11,7 @@ import numpy as np
 
 from shipdrag_ros.display import day
 from shipdrag_ros.estimation.force import USUAL_SHARE
-from shipdrag_ros.fleet.rows import same_time
+from shipdrag_ros.fleet.store import same_time
 from shipdrag_ros.samples import Float64
 
 FIRST_MONTHS_NS = 90 * 86_400_000_000_000

@@ -16,8 +16,15 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
-from shipdrag_ros.trend.change_points import FoundStep, search
-from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
+from shipdrag_ros.trend.hull_state import (
+    FoundStep,
+    Growth,
+    HullState,
+    Mixture,
+    Runs,
+    Steps,
+    search,
+)
 from shipdrag_ros.trend.series import YEAR_NS, CoastdownRow, Point, ShipSeries, series_of
 
 _DRAWS, _SEED = 4000, 1

@@ -14,7 +14,7 @@ from mcap.stream_reader import StreamReader
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import recover
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.recover import SUFFIX, compact
 from shipdrag_ros.bags.writer import RecordWriter
 from shipdrag_ros.errors import BagError

@@ -13,8 +13,7 @@ from mcap.reader import make_reader
 
 from shipdrag_ros.bags import durable as module
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import DurableRecording, LiveFile, PartLimits, RecordingProgress
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage

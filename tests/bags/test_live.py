@@ -11,7 +11,7 @@ from mcap.exceptions import EndOfFile
 from mcap.records import Attachment, Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 
-from shipdrag_ros.bags.live import DECLARE_BYTES, LiveFile
+from shipdrag_ros.bags.durable import DECLARE_BYTES, LiveFile
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.retention import DAY_S, Keep, Removed, Retention
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.messages import EncodedMessage

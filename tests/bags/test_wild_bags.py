@@ -23,7 +23,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, types

@@ -11,8 +11,7 @@ import pytest
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.fleet.rows import BagResult, bag_row
-from shipdrag_ros.fleet.store import Store
+from shipdrag_ros.fleet.store import BagResult, Store, bag_row
 
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 

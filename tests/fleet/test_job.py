@@ -14,7 +14,7 @@ import pytest
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.fleet.find import BagToRead, Beside
 from shipdrag_ros.fleet.job import _name, work
-from shipdrag_ros.fleet.rows import FROUDE, BagResult
+from shipdrag_ros.fleet.store import FROUDE, BagResult
 from shipdrag_ros.ship import Ship
 from tests.sources.log_samples import sentence
 

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import FleetError
-from shipdrag_ros.fleet.rows import FROUDE, BagResult
 from shipdrag_ros.fleet.store import (
     BAGS,
     COASTDOWNS,
+    FROUDE,
+    BagResult,
     Store,
     coastdown_schema,
     partition,

@@ -19,7 +19,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.fleet import job
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.job import BagJob, work
-from shipdrag_ros.fleet.rows import BagResult
+from shipdrag_ros.fleet.store import BagResult
 from shipdrag_ros.library import diagnosing
 from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.coasts import dismissed_glides, whole_window

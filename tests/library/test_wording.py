@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import shipdrag_ros as sd
-from shipdrag_ros.library import wording
-from shipdrag_ros.library.wording import in_python
+from shipdrag_ros.library import shown
+from shipdrag_ros.library.shown import in_python
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Option
 
@@ -52,10 +52,10 @@ def new_format(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     options = Option('--gain', 'FACTOR', 'of the speeds'), Option('--as-it-is', '', 'no filter')
     formats_then = (*formats.found(), formats.found()[0]._replace(name='new', options=options))
     monkeypatch.setattr(formats, 'found', lambda: formats_then)
-    for kept in (wording._read, wording._option):
+    for kept in (shown._read, shown._option):
         kept.cache_clear()
     yield
-    for kept in (wording._read, wording._option):
+    for kept in (shown._read, shown._option):
         kept.cache_clear()
 
 

@@ -19,8 +19,7 @@ from starlette.applications import Starlette
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import signal_k
-from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.app import LivePage, signal_k_deltas, signal_k_units
 from shipdrag_ros.live.bridge import Bridge, SpeedNow
 from shipdrag_ros.live.figures import Ahead
 from shipdrag_ros.live.headline import (
@@ -37,7 +36,7 @@ from shipdrag_ros.live.headline import (
 from shipdrag_ros.live.outputs import ComingPath, recorded_runs
 from shipdrag_ros.live.source import BagSource, NodeSource, Timeline
 from shipdrag_ros.messages import EventKind, EventNote, event_message
-from shipdrag_ros.messages.heard import (
+from shipdrag_ros.messages.topics import (
     ERROR,
     OK,
     STALE,
@@ -150,8 +149,8 @@ def test_two_bags_make_a_pair_and_seeking_back_shows_what_was(bags: list[Path]) 
 def test_deltas_are_what_signal_k_asks_for(bags: list[Path]) -> None:
     source = BagSource(open_runs(bags[:1]), ship=None, speed=100.0)
     try:
-        assert signal_k.deltas(Bridge(), 0.0) == []
-        found = signal_k.deltas(source.bridge, settled(source, 0.0))
+        assert signal_k_deltas(Bridge(), 0.0) == []
+        found = signal_k_deltas(source.bridge, settled(source, 0.0))
     finally:
         source.close()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
@@ -162,7 +161,7 @@ def test_deltas_are_what_signal_k_asks_for(bags: list[Path]) -> None:
         assert update['timestamp'].endswith('Z')
         values |= {each['path']: each['value'] for each in update['values']}
     told = {path for path in values if not path.startswith('notifications.')}
-    (meta,) = signal_k.units()['updates']
+    (meta,) = signal_k_units()['updates']
     assert told == {each['path'] for each in meta['meta']}
     assert values['performance.shipdrag.resistance'] > 1e5
     note = values['notifications.performance.shipdrag']

@@ -13,7 +13,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.source import BagSource, NodeSource
-from shipdrag_ros.messages.heard import ERROR, STALE, WARN, Health, Status
+from shipdrag_ros.messages.topics import ERROR, STALE, WARN, Health, Status
 
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SCREENS = {1920: 1080, 1024: 768, 390: 844}

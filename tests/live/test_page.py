@@ -15,7 +15,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.live.app import PAGE, LivePage
 from shipdrag_ros.live.source import BagSource, NodeSource
-from shipdrag_ros.messages.heard import Samples
+from shipdrag_ros.messages.topics import Samples
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 
@@ -49,7 +49,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     start: Any, view: Any, tmp_path: Path
 ) -> None:
     pytest.importorskip('rclpy')
-    from shipdrag_ros.node.rehearsal import Rehearsal
+    from shipdrag_ros.node.spectator import Rehearsal
     from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
     watch = start('shipdrag_ros.cli', 'watch', '--port', '0')

@@ -22,7 +22,7 @@ import httpx
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.live.signal_k import UNITS
+from shipdrag_ros.live.app import UNITS
 
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 WITHIN_S = 120.0

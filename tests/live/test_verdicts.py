@@ -14,8 +14,7 @@ from shipdrag_ros.diagnosis.result import Advice, Candidate, DiagnosisResult, Ef
 from shipdrag_ros.display import json_text
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.live.bridge import Bridge, verdict_part
-from shipdrag_ros.messages.heard import OK, WARN, Health, NodeMessage, Status
-from shipdrag_ros.messages.topics import diagnosis_message
+from shipdrag_ros.messages.topics import OK, WARN, Health, NodeMessage, Status, diagnosis_message
 from shipdrag_ros.node.background import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.health import diagnosis_status
 from shipdrag_ros.parameter import Parameter

@@ -115,7 +115,7 @@ class Peer:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        from shipdrag_ros.node.rehearsal import Player
+        from shipdrag_ros.node.spectator import Player
 
         self._rclpy = rclpy
         self._context = rclpy.Context()
@@ -174,7 +174,7 @@ class Peer:
         """
         Return once the next message of a publisher is heard.
         """
-        from shipdrag_ros.node.rehearsal import DISCOVERY_S
+        from shipdrag_ros.node.spectator import DISCOVERY_S
 
         self.spin_until(publisher.get_subscription_count)
         self.spin_for(DISCOVERY_S)
@@ -183,7 +183,7 @@ class Peer:
         """
         Return the answer of a service.
         """
-        from shipdrag_ros.node.rehearsal import DISCOVERY_S
+        from shipdrag_ros.node.spectator import DISCOVERY_S
 
         client = self.node.create_client(kind, service)
         self.spin_until(client.service_is_ready)

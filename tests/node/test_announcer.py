@@ -9,10 +9,9 @@ import pytest
 from rclpy.logging import get_logger
 
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
-from shipdrag_ros.messages.heard import ERROR, OK, WARN
+from shipdrag_ros.messages.topics import ERROR, OK, WARN
 from shipdrag_ros.node.announcer import Announcer, line_of
-from shipdrag_ros.node.health import InputState
-from shipdrag_ros.node.judging import Finding, InputFacts
+from shipdrag_ros.node.health import Finding, InputFacts, InputState
 
 
 def seen(name: str, level: int, text: str, *, age_s: float | None = 0.1) -> InputState:

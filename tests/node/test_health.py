@@ -6,9 +6,8 @@ from __future__ import annotations
 import pytest
 
 from shipdrag_ros.coastdown.monitor import State
-from shipdrag_ros.messages.heard import OK
-from shipdrag_ros.node.health import InputStates, Standing, state_status
-from shipdrag_ros.node.judging import Counts, InputFacts
+from shipdrag_ros.messages.topics import OK
+from shipdrag_ros.node.health import Counts, InputFacts, InputStates, Standing, state_status
 
 ASKED = 'no shaft is received: is the engine stopped, and not astern?'
 

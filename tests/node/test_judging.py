@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN
-from shipdrag_ros.node.judging import (
+from shipdrag_ros.messages.topics import ERROR, OK, STALE, WARN
+from shipdrag_ros.node.health import (
     Counts,
     InputFacts,
     Recently,

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
-from shipdrag_ros.messages.heard import Health, Status
+from shipdrag_ros.messages.topics import Health, Status
 from shipdrag_ros.node.main import line, terminal_line
 
 rclpy = pytest.importorskip('rclpy')

@@ -13,8 +13,7 @@ from threading import Event
 import pytest
 from mcap.reader import make_reader
 
-from shipdrag_ros.bags.durable import PartLimits
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.durable import LiveFile, PartLimits
 from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.messages import (
@@ -24,7 +23,7 @@ from shipdrag_ros.messages import (
     OutputMessage,
     event_message,
 )
-from shipdrag_ros.messages.heard import WARN
+from shipdrag_ros.messages.topics import WARN
 from shipdrag_ros.node.health import recording_status
 from shipdrag_ros.node.recorder import DEFAULT_LIMITS, EVERYTHING, Recorder, RecordingState
 from shipdrag_ros.parameters import Parameters

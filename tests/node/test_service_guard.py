@@ -19,7 +19,7 @@ from rcl_interfaces.srv import (
 )
 from std_srvs.srv import Trigger
 
-from shipdrag_ros.node.service_guard import CHANGES, TRIGGERS, RateLimit, limit_services
+from shipdrag_ros.node.requests import CHANGES, TRIGGERS, RateLimit, limit_services
 
 
 def test_a_burst_and_then_so_many_a_second() -> None:

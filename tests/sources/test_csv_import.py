@@ -22,7 +22,11 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.sources.formats.csv.importer import BASE_NS, TableColumns, TableResult, read_csv
+from shipdrag_ros.sources.formats.csv.importer import (
+    TableResult,
+    read_csv,
+)
+from shipdrag_ros.sources.log import BASE_NS, Log
 from shipdrag_ros.sources.table import LogTable
 
 from .conftest import into_bag
@@ -40,15 +44,20 @@ def import_text(tmp_path: Path) -> Import:
         source.write_bytes(text if isinstance(text, bytes) else text.encode())
         out.unlink(missing_ok=True)
         progress = options.pop('progress', None)
-        result = into_bag(read_csv, source, out, columns(maps, time, **options), progress=progress)
+        result = into_bag(
+            read_file, source, out, columns(maps, time, **options), progress=progress
+        )
         return result, samples(out)
 
     return run
 
 
-def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> TableColumns:
-    inputs = [parse_input(each) for each in maps]
-    return TableColumns(inputs, None if time is None else parse_time(time), **options)
+def read_file(source: Path, log: Log, options: dict[str, Any], **more: Any) -> TableResult:
+    return read_csv(LogTable(source), log, options, **more)
+
+
+def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> dict[str, Any]:
+    return {'map': maps, 'time': None if time is None else parse_time(time), **options}
 
 
 def samples(path: Path) -> Block:
@@ -112,13 +121,13 @@ def test_delimiters_marks_and_line_ends(
     ],
 )
 def test_units(import_text: Import, text: str, name: str, value: float) -> None:
-    _, block = import_text(text, name, rate_hz=1.0)
+    _, block = import_text(text, name, rate=1.0)
     assert block.value[0, 0] == pytest.approx(value, rel=1e-15)
 
 
 def test_several_shafts_and_their_pitch(import_text: Import) -> None:
     text = 'p,s,a,b\n60,-120,50,25\n,90,0,x\n'
-    result, block = import_text(text, 'shaft=p,s:rpm', 'pitch=a:%,b:ratio', rate_hz=1)
+    result, block = import_text(text, 'shaft=p,s:rpm', 'pitch=a:%,b:ratio', rate=1)
     assert block.channel.tolist() == [
         *(Channel.SHAFT, Channel.SHAFT_2, Channel.PITCH, Channel.PITCH_2),
         *(Channel.SHAFT_2, Channel.PITCH),
@@ -135,10 +144,10 @@ def test_several_shafts_and_their_pitch(import_text: Import) -> None:
 
 
 def test_two_columns(import_text: Import) -> None:
-    _, block = import_text('1,2,3,4\n', 'position=1:km,2:nmi', 'wind_apparent=4,3', rate_hz=1)
+    _, block = import_text('1,2,3,4\n', 'position=1:km,2:nmi', 'wind_apparent=4,3', rate=1)
     assert block.value[0].tolist() == [1000.0, 3704.0]
     assert block.value[1].tolist() == [4.0, 3.0]
-    _, block = import_text('lat,lon\n60.5,-5.25\n', 'position=lat:deg,lon:deg', rate_hz=1)
+    _, block = import_text('lat,lon\n60.5,-5.25\n', 'position=lat:deg,lon:deg', rate=1)
     assert block.channel.tolist() == [Channel.POSITION_GEODETIC]
     assert block.value[0].tolist() == [60.5, -5.25]
 
@@ -158,7 +167,7 @@ def test_two_columns(import_text: Import) -> None:
 def test_a_unit_given_once_holds_for_both_columns(
     import_text: Import, columns: str, value: list[float]
 ) -> None:
-    _, block = import_text('1,2\n', columns, rate_hz=1)
+    _, block = import_text('1,2\n', columns, rate=1)
     assert block.value[0] == pytest.approx(value, rel=1e-15)
     geodetic = block.channel[0] == Channel.POSITION_GEODETIC
     assert geodetic == columns.count('deg')
@@ -187,7 +196,7 @@ def test_times_are_exact(
 
 def test_a_rate_counts_the_rows_that_are_chosen(import_text: Import) -> None:
     text = 'test,u\na,1\nb,2\nb,\nb,4\nc,5\n'
-    result, block = import_text(text, 'shaft=u', rate_hz=3.0, where=[('test', 'b')])
+    result, block = import_text(text, 'shaft=u', rate=3.0, where=[('test', 'b')])
     assert (block.stamp_ns - BASE_NS).tolist() == [0, 666_666_667]
     assert block.value[:, 0].tolist() == [2.0, 4.0]
     assert (result.rows, result.left_out) == (5, 2)
@@ -196,16 +205,8 @@ def test_a_rate_counts_the_rows_that_are_chosen(import_text: Import) -> None:
 
 def test_all_conditions_must_hold(import_text: Import) -> None:
     text = 'test,part,u\na,x,1\na,y,2\nb,y,3\n'
-    _, block = import_text(text, 'shaft=u', rate_hz=1, where=[('test', 'a'), ('2', 'y')])
+    _, block = import_text(text, 'shaft=u', rate=1, where=[('test', 'a'), ('2', 'y')])
     assert block.value[:, 0].tolist() == [2.0]
-
-
-def test_the_date_of_time_zero_can_be_given(import_text: Import) -> None:
-    result, block = import_text('1\n', 'shaft=1', rate_hz=1, start_ns=10**18)
-    assert block.stamp_ns.tolist() == [10**18]
-    assert result.base_ns == 10**18
-    result, block = import_text('3,1\n', 'shaft=2', time='1', start_ns=10**18)
-    assert block.stamp_ns.tolist() == [10**18 + 3 * 10**9]
 
 
 def test_bad_cells_are_counted_by_reason_with_their_lines(
@@ -258,7 +259,7 @@ def test_many_rows_are_the_same_rows(import_text: Import) -> None:
     _, block = import_text(
         '\n'.join(map(repr, values.tolist())),
         'speed_through_water=1',
-        rate_hz=10.0,
+        rate=10.0,
         progress=lambda done, total: told.append((done, total)),
     )
     np.testing.assert_array_equal(block.value[:, 0], values)
@@ -269,7 +270,7 @@ def test_many_rows_are_the_same_rows(import_text: Import) -> None:
 
 def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -> None:
     text = 'a,u,v,p\nx,1,2,3\n'
-    import_text(text, 'shaft=u,v', 'pitch=p', rate_hz=2.0, where=[('a', 'x')])
+    import_text(text, 'shaft=u,v', 'pitch=p', rate=2.0, where=[('a', 'x')])
     (run,) = open_runs([tmp_path / 'out.mcap'])
     assert yaml.safe_load(run.attachments['import.yaml']) == {
         'source': 'in.csv',
@@ -310,25 +311,25 @@ def test_times_that_say_nothing() -> None:
 @pytest.mark.parametrize(
     ('content', 'maps', 'options', 'expected'),
     [
-        ('\n \n', ['shaft=1'], {'rate_hz': 1}, 'is empty'),
-        ('1,2\n', ['shaft=u'], {'rate_hz': 1}, "no column 'u'; it has no header"),
-        ('1,2\n', ['shaft=3'], {'rate_hz': 1}, "no column '3'"),
-        ('1,2\n', ['shaft=0'], {'rate_hz': 1}, "no column '0'"),
-        ('u,u\n1,2\n', ['shaft=u'], {'rate_hz': 1}, "2 columns 'u'; write a number: 1 or 2"),
-        ('1,2\n', ['shaft=1'], {}, 'give either --time COLUMN.* or --rate'),
-        ('1,2\n', ['shaft=1'], {'rate_hz': 1, 'time': '2'}, 'give either --time'),
-        ('1,2\n', ['shaft=1'], {'rate_hz': 0.0}, '--rate 0.0: expected'),
-        ('1,2\n', ['shaft=1'], {'rate_hz': math.nan}, '--rate nan: expected'),
-        ('1,2\n', [], {'rate_hz': 1}, 'no column is mapped'),
-        ('1,2\n', ['shaft=1', 'shaft=2'], {'rate_hz': 1}, 'shaft=...: given 2 times'),
-        ('1,2\n', ['pitch=1', 'pitch=2'], {'rate_hz': 1}, 'pitch=...: given 2 times'),
+        ('\n \n', ['shaft=1'], {'rate': 1}, 'is empty'),
+        ('1,2\n', ['shaft=u'], {'rate': 1}, "no column 'u'; it has no header"),
+        ('1,2\n', ['shaft=3'], {'rate': 1}, "no column '3'"),
+        ('1,2\n', ['shaft=0'], {'rate': 1}, "no column '0'"),
+        ('u,u\n1,2\n', ['shaft=u'], {'rate': 1}, "2 columns 'u'; write a number: 1 or 2"),
+        ('1,2\n', ['shaft=1'], {}, 'give --time COLUMN.* or --rate'),
+        ('1,2\n', ['shaft=1'], {'rate': 1, 'time': '2'}, 'both give the times'),
+        ('1,2\n', ['shaft=1'], {'rate': 0.0}, '--rate 0.0: expected'),
+        ('1,2\n', ['shaft=1'], {'rate': math.nan}, '--rate nan: expected'),
+        ('1,2\n', [], {'rate': 1}, 'has no names of columns'),
+        ('1,2\n', ['shaft=1', 'shaft=2'], {'rate': 1}, 'shaft=...: given 2 times'),
+        ('1,2\n', ['pitch=1', 'pitch=2'], {'rate': 1}, 'pitch=...: given 2 times'),
         (
             't,u\na,1\nb,2\n',
             ['shaft=u'],
-            {'rate_hz': 1, 'where': [('t', 'c')]},
+            {'rate': 1, 'where': [('t', 'c')]},
             '--where chooses none of them: the column holds a, b',
         ),
-        ('1,"' + 'x' * 200_000, ['shaft=1'], {'rate_hz': 1}, 'is no row of a table'),
+        ('1,"' + 'x' * 200_000, ['shaft=1'], {'rate': 1}, 'is no row of a table'),
     ],
 )
 def test_tables_that_cannot_be_used(
@@ -345,15 +346,15 @@ def test_tables_that_cannot_be_used(
 
 
 def test_a_source_that_is_not_there_and_a_bag_that_is(tmp_path: Path) -> None:
-    shaft = columns(['shaft=1'], rate_hz=1.0)
+    shaft = columns(['shaft=1'], rate=1.0)
     with pytest.raises(ImportDataError, match='cannot be read: No such file'):
-        into_bag(read_csv, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
+        into_bag(read_file, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
     with pytest.raises(ImportDataError, match='cannot be read: Is a directory'):
-        into_bag(read_csv, tmp_path, tmp_path / 'a.mcap', shaft)
+        into_bag(read_file, tmp_path, tmp_path / 'a.mcap', shaft)
     (tmp_path / 'a.csv').write_text('1\n')
     (tmp_path / 'a.mcap').write_text('precious')
     with pytest.raises(BagError, match='exists'):
-        into_bag(read_csv, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
+        into_bag(read_file, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
     assert (tmp_path / 'a.mcap').read_text() == 'precious'
 
 
@@ -375,7 +376,7 @@ def test_a_packed_table_that_is_cut_is_an_error(tmp_path: Path, content: bytes) 
     by_time=st.booleans(),
 )
 def test_any_content(import_text: Import, content: bytes, by_time: bool) -> None:
-    options: dict[str, Any] = {'time': '1'} if by_time else {'rate_hz': 1.0}
+    options: dict[str, Any] = {'time': '1'} if by_time else {'rate': 1.0}
     try:
         result, block = import_text(content, 'speed_through_water=1', **options)
     except ImportDataError as error:
@@ -417,7 +418,7 @@ needs_data = pytest.mark.skipif(
             {'time': 't_s', 'where': [('test', 'Test_6'), ('segment', 'coast')]},
             2 * 16,
         ),
-        ('car/Michelin60A.csv', ['speed_through_water=1:km/h'], {'rate_hz': 1.0}, 165),
+        ('car/Michelin60A.csv', ['speed_through_water=1:km/h'], {'rate': 1.0}, 165),
         (
             'car/shotgoose_RR-Coastdown-2_coast_100hz.csv',
             ['speed_through_water=v_mps'],
@@ -429,7 +430,7 @@ needs_data = pytest.mark.skipif(
 def test_measured_records(
     tmp_path: Path, name: str, maps: list[str], options: dict[str, Any], count: int
 ) -> None:
-    result = into_bag(read_csv, DATA / name, tmp_path / 'a.mcap', columns(maps, **options))
+    result = into_bag(read_file, DATA / name, tmp_path / 'a.mcap', columns(maps, **options))
     assert sum(result.written.values()) == count == len(samples(tmp_path / 'a.mcap'))
     assert result.rejected == {}
     assert result.backward == 0
@@ -438,7 +439,7 @@ def test_measured_records(
 @needs_data
 def test_the_coasting_ferry_gives_a_resistance(tmp_path: Path) -> None:
     into_bag(
-        read_csv,
+        read_file,
         DATA / 'milliampere_coast_t457_20hz.csv',
         tmp_path / 'a.mcap',
         columns(['speed_over_ground=speed_mps', 'position=pos_e_m,pos_n_m'], 't_s'),

@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Block, concatenate
-from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader
+from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, RowClock
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
-from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.table import LogTable
 
 COLUMNS = {
@@ -91,14 +90,14 @@ def test_counts_as_numbers_are_the_times_of_their_texts(unit: str, values: list[
     found = []
     for cells in (np.array(values), [repr(each) if each == each else '' for each in values]):
         bad: dict[int, BadCell] = {}
-        clock = RowClock.of(parse_time(f't:{unit}'), None, 0, [], table)
+        clock = RowClock.of(parse_time(f't:{unit}'), None, [], table)
         times = clock.times(cells, 0, bad)
         found.append([None if place in bad else int(t) for place, t in enumerate(times)])
     assert found[0] == found[1]
     first = values[0]
     if found[0][0] is not None:
         exact = Decimal(repr(first)) * NANOSECONDS[unit]
-        assert found[0][0] == int(exact.to_integral_value())
+        assert found[0][0] - (clock.base_ns or 0) == int(exact.to_integral_value())
 
 
 @given(

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
-from shipdrag_ros.nmea.reading import Checksum
+from shipdrag_ros.nmea.sentences import Checksum
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log

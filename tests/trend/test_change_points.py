@@ -3,9 +3,8 @@
 
 import numpy as np
 
-from shipdrag_ros.trend import change_points
-from shipdrag_ros.trend.change_points import search
-from shipdrag_ros.trend.hull_state import Growth, Runs, Steps
+from shipdrag_ros.trend import hull_state as change_points
+from shipdrag_ros.trend.hull_state import Growth, Runs, Steps, search
 
 MONTH = 31.0 / 365.25
 

@@ -3,7 +3,8 @@
 The library of effects: declared in `data/effects.yaml`, or a module in this folder.
 
 A new effect is an entry of that file, or where no formula of a term holds it a new module with an
-`EFFECT`; simulation, command line, diagnosis and documentation find it here.
+`EFFECT`, of which all but what it does may stand in `data/effects_of_modules.yaml`; simulation,
+command line, diagnosis and documentation find it here.
 """
 
 from __future__ import annotations
@@ -24,23 +25,6 @@ from shipdrag_ros.ship.term import check_name
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import effect_of, effects_in
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
-
-__all__ = [
-    'LIBRARY',
-    'OWN',
-    'action_of',
-    'carrying',
-    'confounders',
-    'declared',
-    'discriminating_measurements',
-    'effects_of',
-    'find',
-    'inseparable',
-    'parse',
-    'terms',
-    'using',
-    'values_of',
-]
 
 
 def _found() -> dict[str, Effect]:

@@ -23,17 +23,7 @@ from typing import Any, NamedTuple
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import NoValue
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
-from shipdrag_ros.sources.format import (
-    CERTAIN,
-    DATE,
-    GEAR,
-    NO,
-    RATE,
-    TRANSDUCER,
-    Format,
-    Head,
-    Job,
-)
+from shipdrag_ros.sources import format
 from shipdrag_ros.sources.log import BASE_NS, Log, iso_ns
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
@@ -183,7 +173,7 @@ class FrameClock:
     notes: tuple[str, ...] = ()
 
 
-def clock_of(job: Job) -> FrameClock:
+def clock_of(job: format.Job) -> FrameClock:
     """
     Find out how the times of a log are to be read.
 
@@ -353,7 +343,7 @@ class N2kReader:
         self._frames = 0
         self._unwrapped = _Unwrapped()
 
-    def read(self, job: Job) -> Iterator[Reading]:
+    def read(self, job: format.Job) -> Iterator[Reading]:
         """
         Yield the readings of a log.
         """
@@ -490,11 +480,11 @@ _READERS: Mapping[int, Callable[[_Fields], N2kValue]] = {
 }
 
 
-def _score(head: Head) -> float:
-    return CERTAIN if head.share(parse) > 0.5 else NO
+def _score(head: format.Head) -> float:
+    return format.CERTAIN if head.share(parse) > 0.5 else format.NO
 
 
-def _open(job: Job, log: Log) -> StreamResult:
+def _open(job: format.Job, log: Log) -> StreamResult:
     clock = clock_of(job)
     about = {key: job.options.get(key) for key in ('date', 'gear', 'rate', 'transducer')}
     return read_stream(
@@ -502,11 +492,11 @@ def _open(job: Job, log: Log) -> StreamResult:
     )
 
 
-FORMAT = Format(
+FORMAT = format.Format(
     name='n2k',
     kind='a log of NMEA 2000',
     about=__doc__,
     score=_score,
     read=_open,
-    options=(DATE, GEAR, RATE, TRANSDUCER),
+    options=(format.DATE, format.GEAR, format.RATE, format.TRANSDUCER),
 )

@@ -9,8 +9,7 @@ import numpy as np
 
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
-from shipdrag_ros.studies.residual.fit import ResidualFit
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import Hulls, ResidualFit
 
 _POINTS = 15  # Froude numbers tried
 _VAGUE = 1.0  # of the value: a larger sd makes it no baseline

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
+from shipdrag_ros.studies.manoeuvring.simulate import (
     Manoeuvre,
     ManoeuvreMotion,
     overshoots_rad,
+    steer,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
-from shipdrag_ros.studies.manoeuvring.simulate import steer
 from shipdrag_ros.studies.sensitivity.loss import (
     CHANGES,
     Losses,

@@ -6,9 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.studies.manoeuvring.manoeuvre import Side, overshoots_rad, parse, turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.manoeuvring.simulate import (
+    Side,
+    overshoots_rad,
+    parse,
+    steer,
+    turn,
+    zigzag,
+)
 
 SHIP = mariner()
 

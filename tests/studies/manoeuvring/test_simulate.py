@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.studies.manoeuvring.manoeuvre import Side, turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.manoeuvring.simulate import Side, steer, turn, zigzag
 
 SHIP = mariner()
 U, L = SHIP.speed_m_s, SHIP.length_m

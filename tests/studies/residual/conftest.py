@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import Hulls
 
 NAMES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 

@@ -13,8 +13,7 @@ from shipdrag_ros.errors import DataError, ShipdragError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import Hulls, ResidualFit, fit_residual
 
 SHIP = """
 name: River ship

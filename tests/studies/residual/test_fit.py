@@ -12,8 +12,7 @@ from scipy import stats
 
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import FORMS, fit_residual, leave_hulls_out
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import FORMS, Hulls, fit_residual, leave_hulls_out
 
 Fleet = Callable[[int, int], Hulls]
 Resistance = Callable[[Hulls], Float64]

@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.studies.residual.fit import FORMS, RegressionForm
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import FORMS, Hulls, RegressionForm
 
 
 def hull() -> Hulls:

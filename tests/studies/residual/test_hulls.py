@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import Hulls
 
 ROW = np.array([[8.18, 4.0, 0.851, 0.15]])
 NAMES = ('L_B', 'B_T', 'C_B', 'Fr')

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.studies.residual.fit import FORMS, fit_form
-from shipdrag_ros.studies.residual.hulls import Hulls
+from shipdrag_ros.studies.residual.fit import FORMS, Hulls, fit_form
 
 FOLDER = os.environ.get('SHIPDRAG_DATA')
 

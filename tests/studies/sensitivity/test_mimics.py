@@ -12,8 +12,7 @@ import pytest
 from shipdrag_ros.ship import Propulsion, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import study_coast
-from shipdrag_ros.studies.sensitivity.mimics import WORST
+from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
 
 CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
 

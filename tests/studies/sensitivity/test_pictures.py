@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.manoeuvring.manoeuvre import turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.manoeuvring.simulate import turn, zigzag
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
-from shipdrag_ros.studies.sensitivity.face import pictures as pictures
+from shipdrag_ros.studies.sensitivity.face import coasting, steering
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
 
 CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
@@ -34,7 +34,7 @@ def coasted():
 
 
 def test_bars_of_kept_and_dropped_derivatives(steered):
-    axis = pictures.ranking_picture(steered).axes[0]
+    axis = steering.ranking_picture(steered).axes[0]
     shown = [label.split()[-1] for label in names(axis.get_yticklabels())]
     assert shown == list(steered.losses.ranking)
     assert names(axis.get_yticklabels())[0] == 'yaw moment by rudder  Nd'
@@ -44,7 +44,7 @@ def test_bars_of_kept_and_dropped_derivatives(steered):
 
 
 def test_three_models_in_four_panels(steered):
-    figure = pictures.check_picture(steered)
+    figure = steering.check_picture(steered)
     assert [len(axis.lines) for axis in figure.axes] == [3, 3, 3, 3]
     legend = names(figure.legends[0].get_texts())
     assert legend == ['full', '24 derivatives kept', '18 measurements kept']
@@ -54,18 +54,18 @@ def test_three_models_in_four_panels(steered):
 
 def test_a_map_with_a_dot_at_the_best_manoeuvre():
     shown = experiment(mariner(), (zigzag(10.0), turn(35.0)))
-    axis = pictures.design_picture(shown).axes[0]
+    axis = steering.design_picture(shown).axes[0]
     assert names(axis.get_yticklabels()) == ['zigzag:10', 'turn:35']
     dots = axis.lines[0].get_ydata()
     assert [shown.manoeuvres[int(i)] for i in dots] == list(shown.best)
 
 
 def test_bars_of_values_and_of_effects(coasted):
-    axis = pictures.particulars_picture(coasted).axes[0]
+    axis = coasting.particulars_picture(coasted).axes[0]
     order = [*coasted.selection.kept, *coasted.selection.dropped]
     assert names(axis.get_yticklabels()) == order
     wide = {bar.get_y(): bar.get_width() for bar in axis.containers[0]}
     assert wide[max(wide)] == max(wide.values())
-    axis = pictures.mimic_picture(coasted).axes[0]
+    axis = coasting.mimic_picture(coasted).axes[0]
     assert names(axis.get_yticklabels()) == [mimic.effect.name for mimic in coasted.mimics]
     assert axis.texts[0].get_text().startswith(coasted.mimics[0].particular.key)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SensitivityError
-from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.manoeuvring.simulate import Manoeuvre, steer, turn, zigzag
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     DESIGN,

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.studies.manoeuvring.manoeuvre import turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.manoeuvring.simulate import turn, zigzag
 from shipdrag_ros.studies.sensitivity.face import steering as words
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
 

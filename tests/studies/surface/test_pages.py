@@ -12,9 +12,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.face import show
 from shipdrag_ros.studies.residual.face import verb as words
-from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
-from shipdrag_ros.studies.residual.hulls import Hulls
-from shipdrag_ros.studies.surface import words as fit_words
+from shipdrag_ros.studies.residual.fit import Hulls, ResidualFit, fit_residual
 from shipdrag_ros.studies.surface.face import verb as surface_words
 from shipdrag_ros.studies.surface.fit import Prediction, Surface, fit_surface
 
@@ -44,15 +42,15 @@ def residual() -> tuple[ResidualFit, Float64]:
 
 def test_cells_of_a_surface() -> None:
     found, _ = surface(2)
-    degrees = fit_words.degrees(found)
+    degrees = surface_words.degrees_table(found)
     assert degrees.rows[0][4:] == ('-', '-', '')
     assert [row[0] for row in degrees.rows if row[-1] == 'chosen'] == ['3']
-    terms = [row[0] for row in fit_words.coefficients(found).rows]
+    terms = [row[0] for row in surface_words.coefficients_table(found).rows]
     assert terms[:6] == ['1', 'x0', 'x1', 'x0^2', 'x0 x1', 'x1^2']
 
 
 def test_cells_of_predictions() -> None:
-    rows = fit_words.predictions([Prediction(0.25, 0.013, ()), REFUSED]).rows
+    rows = surface_words.predictions_table([Prediction(0.25, 0.013, ()), REFUSED]).rows
     assert rows[0] == ('1', '0.25', '0.013', 'yes')
     assert rows[1] == ('2', '1.5', 'open', 'NO: x 9 is outside <0..1> of the data')
 

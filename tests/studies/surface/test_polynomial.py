@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.studies.surface.polynomial import Polynomial, monomials, terms_up_to
+from shipdrag_ros.studies.surface.fit import Polynomial, monomials, terms_up_to
 
 
 def some(variables: int, degree: int, seed: int) -> tuple[Polynomial, np.ndarray]:

@@ -23,6 +23,7 @@ from shipdrag_ros.samples import ALL_MOTION, FURTHER, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
+    RowClock,
     are_in_minutes,
     has_decimal_commas,
     is_date,
@@ -38,7 +39,6 @@ from shipdrag_ros.sources.formats.csv.columns import (
     columns_of,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.table import LogTable
 
 _STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
@@ -197,7 +197,7 @@ class FirstRows:
         places = [self.table.column(name) for name in time.names]
         texts = self._rows.joined(places)
         try:
-            clock = RowClock.of(time, None, 0, texts, self.table)
+            clock = RowClock.of(time, None, texts, self.table)
         except ImportDataError:
             return None
         bad: dict[int, BadCell] = {}

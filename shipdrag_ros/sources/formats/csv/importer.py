@@ -29,6 +29,7 @@ from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
     BadCell,
     CellReader,
+    RowClock,
     are_in_minutes,
     combined,
     has_decimal_commas,
@@ -37,7 +38,6 @@ from shipdrag_ros.sources.formats.csv.cells import (
 from shipdrag_ros.sources.formats.csv.columns import (
     SPEED_UNITS,
     InputColumns,
-    TimeColumn,
     parse_input,
     parse_time,
     role_and_unit,
@@ -50,10 +50,8 @@ from shipdrag_ros.sources.formats.csv.guess import (
     is_table,
     with_dates,
 )
-from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
-    BASE_NS,
     ImportResult,
     Log,
     Rejected,
@@ -113,92 +111,56 @@ _SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
 
 
-@dataclass(frozen=True)
-class TableColumns:
-    """
-    What is to be taken from a table.
-
-    Attributes
-    ----------
-    inputs
-        Columns of the inputs, from `parse_input`.
-    time
-        Column of the time, from `parse_time`; or else
-    rate_hz
-        Rows a second.
-    where
-        (column, text): only rows with this text there are taken.
-    start_ns
-        Date of time 0, for times that count from the start of a test [ns].
-    """
-
-    inputs: Sequence[InputColumns]
-    time: TimeColumn | None = None
-    rate_hz: float | None = None
-    where: Sequence[tuple[str, str]] = ()
-    start_ns: int = BASE_NS
-
-    def check(self) -> None:
-        """
-        Refuse what is missing, or given twice.
-
-        Raises
-        ------
-        ImportDataError
-        """
-        if (self.time is None) == (self.rate_hz is None):
-            raise ImportDataError(
-                'the times of the rows: give either --time COLUMN[:unit] or --rate'
-            )
-        if not self.inputs:
-            raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
-        for name, count in Counter(each.name for each in self.inputs).items():
-            if count > 1:
-                raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
-
-
 def read_csv(
-    source: Path | LogTable,
-    log: Log,
-    columns: TableColumns,
-    *,
-    progress: PartDone | None = None,
+    table: LogTable, log: Log, options: Mapping[str, Any], *, progress: PartDone | None = None
 ) -> TableResult:
     """
-    Read the measurements of a table.
+    Read a table by its options, and what they leave open by its names and values.
 
     Parameters
     ----------
-    source
-        Table, see `LogTable`.
+    table
     log
         Where to.
-    columns
-        Which of it to take.
+    options
+        By `Option.key`; those that are not there were not given.
     progress
         Called with how many bytes are read, and of how many.
 
     Raises
     ------
     ImportDataError
-        If a column is not there, or nothing can be read.
+        If a column is not there, nothing that moves has a known unit, the options do not go
+        together, or nothing can be read.
     """
-    columns.check()
-    table = source if isinstance(source, LogTable) else LogTable(source)
-    time = columns.time
-    channels = [each for mapped in columns.inputs for each in mapped.by_channel()]
+    time, rate = options.get('time'), options.get('rate')
+    if time is not None and rate is not None:
+        raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
+    dates = options.get('date_order', ''), options.get('zone')
+    found = _inputs(table, with_dates(time, *dates), options)
+    time = with_dates(found.time, *dates)
+    channels = [each for mapped in found.inputs for each in mapped.by_channel()]
     places = [[table.column(name) for name in each.names] for each in channels]
     time_places = [] if time is None else [table.column(name) for name in time.names]
-    chosen = [(table.column(name), text) for name, text in columns.where]
+    where = options.get('where', ())
+    chosen = [(table.column(name), text) for name, text in where]
     sample = table.first_rows(_SAMPLE_ROWS)
-    texts = sample.joined(time_places)
-    clock = RowClock.of(time, columns.rate_hz, columns.start_ns, texts, table)
+    clock = RowClock.of(time, rate, sample.joined(time_places), table)
     inputs = zip(channels, places, _readers(channels, places, sample), strict=True)
     record = _RowSamples(list(inputs), chosen, clock, time_places)
-    log.attach(ATTACHMENT, _provenance(table.path, columns))
+    about = {
+        'source': table.path.name,  # the name alone, whatever the machine
+        'inputs': {each.name: list(each.names) for each in found.inputs},
+        'time': None if time is None else ', '.join(time.names),
+        'rate_hz': rate,
+        'where': dict(where),
+    }
+    log.attach(ATTACHMENT, strict_yaml.dump(about))
     for rows in table.rows(progress):
         log.write_samples(record.take(rows))
-    return record.result(table, log)
+    result = record.result(table, log)
+    doubts = tuple(f'Not used: {each}' for each in found.unclear)
+    return replace(result, notes=(*found.notes, *result.notes, *doubts))
 
 
 class _RowSamples:
@@ -386,18 +348,6 @@ def _readers(
     return found
 
 
-def _provenance(source: Path, columns: TableColumns) -> str:
-    """Say where the samples come from; the name alone, whatever the machine."""
-    about = {
-        'source': source.name,
-        'inputs': {each.name: list(each.names) for each in columns.inputs},
-        'time': None if columns.time is None else ', '.join(columns.time.names),
-        'rate_hz': columns.rate_hz,
-        'where': dict(columns.where),
-    }
-    return strict_yaml.dump(about)
-
-
 def _score(head: Head) -> float:
     if not head.lines or head.lines[0][0] in '{<[' or not is_table(head.path):
         return NO
@@ -406,34 +356,7 @@ def _score(head: Head) -> float:
 
 
 def _open(job: Job, log: Log) -> TableResult:
-    return read_table(LogTable(job.source), log, job.options, progress=job.progress)
-
-
-def read_table(
-    table: LogTable, log: Log, options: Mapping[str, Any], *, progress: PartDone | None = None
-) -> TableResult:
-    """
-    Read a table by its options, and what they leave open by its names and values.
-
-    Raises
-    ------
-    ImportDataError
-        If nothing that moves has a known unit, or the options do not go together.
-    """
-    time, rate = options.get('time'), options.get('rate')
-    if time is not None and rate is not None:
-        raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
-    time = with_dates(time, options.get('date_order', ''), options.get('zone'))
-    found = _inputs(table, time, options)
-    time = with_dates(found.time, options.get('date_order', ''), options.get('zone'))
-    result = read_csv(
-        table,
-        log,
-        TableColumns(found.inputs, time, rate, options.get('where', ())),
-        progress=progress,
-    )
-    doubts = tuple(f'Not used: {each}' for each in found.unclear)
-    return replace(result, notes=(*found.notes, *result.notes, *doubts))
+    return read_csv(LogTable(job.source), log, job.options, progress=job.progress)
 
 
 def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
@@ -444,6 +367,9 @@ def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
         speed_unit = options.get('speed_unit', '')
         return guess(table, time=time, counted=counted, speed_unit=speed_unit)
     found = Guess([parse_input(text) for text in mapped], time)
+    for name, count in Counter(each.name for each in found.inputs).items():
+        if count > 1:
+            raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
     if time is None and not counted:
         if table.header is None:
             raise ImportDataError('the times of the rows: give --time COLUMN[:unit] or --rate HZ')

@@ -25,22 +25,21 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError, reason_of
-from shipdrag_ros.nmea.reading import DAY_NS, START, Checksum, SentenceReader, checksum_of, days_of
-from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
+from shipdrag_ros.nmea.sentences import (
+    DAY_NS,
+    MAGNETIC,
+    READERS,
+    START,
+    TIMED,
+    Checksum,
+    Mounting,
+    SentenceReader,
+    checksum_of,
+    days_of,
+)
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS, Channel
-from shipdrag_ros.sources.format import (
-    CERTAIN,
-    DATE,
-    LIKELY,
-    NO,
-    TRANSDUCER,
-    Format,
-    Head,
-    Job,
-    Option,
-    head_of,
-)
+from shipdrag_ros.sources import format
 from shipdrag_ros.sources.formats.nmea.record import (
     ROLLOVER_DAYS,
     SentenceClock,
@@ -459,22 +458,22 @@ _SENTENCE = re.compile(r'[$!](?:[A-Z][A-Z0-9]{4}|P[A-Z0-9]{2,}),[^*]*(\*[0-9A-Fa
 _WRAPPED = re.compile(r'[$!](PCDIN|MXPGN|PDGY),')
 
 
-def _score(head: Head) -> float:
+def _score(head: format.Head) -> float:
     share = head.share(_SENTENCE.search)
     if share == 0.0 or head.share(_WRAPPED.search) > 0.5:
-        return NO
-    return CERTAIN if share > 0.5 else LIKELY
+        return format.NO
+    return format.CERTAIN if share > 0.5 else format.LIKELY
 
 
-def _without_checksums(head: Head) -> bool:
+def _without_checksums(head: format.Head) -> bool:
     """Say whether the logger has cut off all checksums: none of the first sentences has one."""
     found = [match for line in head.lines if (match := _SENTENCE.search(line))]
     return len(found) > 1 and not any(match[1] for match in found)
 
 
-def _open(job: Job, log: Log) -> NmeaResult:
+def _open(job: format.Job, log: Log) -> NmeaResult:
     checksum = job.options.get('no_checksum')
-    cut_off = checksum is None and _without_checksums(head_of(job.source))
+    cut_off = checksum is None and _without_checksums(format.head_of(job.source))
     return read_nmea(
         job.source,
         log,
@@ -485,16 +484,16 @@ def _open(job: Job, log: Log) -> NmeaResult:
     )
 
 
-FORMAT = Format(
+FORMAT = format.Format(
     name='nmea',
     kind='an NMEA 0183 log',
     about=__doc__,
     score=_score,
     read=_open,
     options=(
-        DATE,
-        TRANSDUCER,
-        Option(
+        format.DATE,
+        format.TRANSDUCER,
+        format.Option(
             '--no-checksum',
             '',
             'take sentences without a checksum too; one that is there must be right',

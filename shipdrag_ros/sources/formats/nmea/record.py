@@ -18,8 +18,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.nmea.reading import DAY_NS, Sentence, SentenceSource, SentenceTime, days_of
-from shipdrag_ros.nmea.sentences import NoValue
+from shipdrag_ros.nmea.sentences import (
+    DAY_NS,
+    NoValue,
+    Sentence,
+    SentenceSource,
+    SentenceTime,
+    days_of,
+)
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.log import Rejected
 from shipdrag_ros.sources.stream import SourcedValues

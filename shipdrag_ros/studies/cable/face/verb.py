@@ -1,5 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag cable`: drag of a towed cable, and the line that may replace it."""
+"""
+Drag of a cable that is towed along the flow, 0.5 rho C0 l d V^2, and the range of speeds in which
+its tangent at V0 may replace it. C0 is that of a smooth cylinder of the same length over
+diameter, unless --rough or --c0 is given.
+
+Options
+-------
+--rough
+    C0 of a very rough cylinder (a log) in place of a smooth one
+--c0 X
+    C0 on length times diameter [-]; ropes have 0.01 to 0.04
+--tolerance X
+    relative error that the tangent may have [-]
+--density RHO
+    density of the water [kg/m^3]
+"""
 
 from __future__ import annotations
 
@@ -13,7 +28,7 @@ import numpy as np
 from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
-from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, styled
+from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.studies.cable.drag import (
     LONGEST,
     PUBLISHED_RANGE,
@@ -51,9 +66,7 @@ def coefficient_picture(cable: Cable) -> Figure:
     """
     Draw C0 against l/d, with the place of a cable in it.
     """
-    with styled():
-        figure = new_figure(9.0, 3.4)
-        axis = figure.subplots()
+    with one_axis(9.0, 3.4) as (figure, axis):
         slenderness = np.geomspace(SHORTEST, LONGEST, 200)
         for surface, style in SURFACES.items():
             axis.semilogx(
@@ -63,8 +76,7 @@ def coefficient_picture(cable: Cable) -> Figure:
                 **style,
             )
         axis.semilogx([cable.slenderness], [cable.c0], 'o', color='#1a1a1a', label='this cable')
-        axis.set_xlabel('length over diameter [-]')
-        axis.set_ylabel('C0, on length times diameter [-]')
+        axis.set(xlabel='length over diameter [-]', ylabel='C0, on length times diameter [-]')
         axis.legend()
     return figure
 
@@ -86,16 +98,17 @@ def tangent_picture(tangent: Tangent, tolerance: float) -> Figure:
         top.plot(speed, tangent.force_n(speed), label='tangent at V0', **LINES['tangent'])
         top.plot(speed, per_unit * speed, label='C V', **LINES['C V'])
         top.plot([v0], [tangent.drag_n], 'o', color='#1a1a1a', label=f'V0 = {v0:g} m/s')
-        top.set_ylim(-1.1 * tangent.drag_n, 1.05 * float(drag[-1]))
-        top.set_ylabel('force [N]')
+        top.set(ylim=(-1.1 * tangent.drag_n, 1.05 * float(drag[-1])), ylabel='force [N]')
         moving, its_u = speed[1:], u[1:]
         bottom.plot(moving, 100.0 * tangent_error(its_u), **LINES['tangent'])
         bottom.plot(moving, 100.0 * naive_error(moving), **LINES['C V'])
         bottom.axhline(0.0, color=BLUE, linewidth=1.0)
-        bottom.set_ylim(-105.0, 105.0)
-        bottom.set_ylabel('error of the lines [%]')
-        bottom.set_xlabel('speed [m/s]')
-        bottom.set_xlim(0.0, speed[-1])
+        bottom.set(
+            ylim=(-105.0, 105.0),
+            ylabel='error of the lines [%]',
+            xlabel='speed [m/s]',
+            xlim=(0.0, speed[-1]),
+        )
         for axis in (top, bottom):
             _shade(axis, low * v0, min(high * v0, speed[-1]))
         top.legend(loc='upper left')
@@ -118,11 +131,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Drag of a cable that is towed along the flow, 0.5 rho C0 l d V^2, and the range of '
-        'speeds in which its tangent at V0 may replace it. C0 is that of a smooth cylinder of '
-        'the same length over diameter, unless --rough or --c0 is given.'
-    )
     for name, meaning, unit, most in (
         ('--length', 'length of the cable', 'm', 1e6),
         ('--diameter', 'diameter of the cable', 'm', 10.0),
@@ -142,28 +150,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         const=CableSurface.ROUGH,
         default=CableSurface.SMOOTH,
         dest='drag',
-        help='C0 of a very rough cylinder (a log) in place of a smooth one',
     )
-    surface.add_argument(
-        '--c0',
-        type=number(0.0, 10.0, above=True),
-        metavar='X',
-        dest='drag',
-        help='C0 on length times diameter [-]; ropes have 0.01 to 0.04',
+    surface.add_argument('--c0', type=number(0.0, 10.0, above=True), metavar='X', dest='drag')
+    parser.add_argument(
+        '--tolerance', type=number(0.0, 10.0, above=True), default=0.1, metavar='X'
     )
     parser.add_argument(
-        '--tolerance',
-        type=number(0.0, 10.0, above=True),
-        default=0.1,
-        metavar='X',
-        help='relative error that the tangent may have [-]',
-    )
-    parser.add_argument(
-        '--density',
-        type=number(900.0, 1100.0, unit='kg/m^3'),
-        default=1025.0,
-        metavar='RHO',
-        help='density of the water [kg/m^3]',
+        '--density', type=number(900.0, 1100.0, unit='kg/m^3'), default=1025.0, metavar='RHO'
     )
     add_report(parser, of='result')
     add_json(parser)

@@ -1,5 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag residual`: residual resistance from shape, and where it may not be used."""
+"""
+Fit a published form of the residual-resistance coefficient to tests of several hulls, and predict
+others. Such a form meets the hulls it was made from and misleads for others, so every prediction
+says whether it may be used: not outside the convex hull of the data, not beyond their leverage,
+not where the data leave it open, and not where a trend contradicts physics. Columns: L_B, B_T,
+Fr, and C_B or slenderness (L / V^(1/3)), the other follows; lcb (x_c / L) for Sakhnovsky.
+
+Options
+-------
+DATA.csv
+    table with a header
+--form
+    {fit.AUTO}: the one that predicts left-out hulls best
+--target COLUMN
+    column of the residual resistance: coefficient c_R, or force per weight
+--predict NEW.csv
+    table of hulls and Froude numbers
+--ship FILE
+    ship file with a baseline of coefficients, to which --write gives the fitted c_R as wave
+    resistance
+--lcb X
+    centre of buoyancy of that ship over L, as in the data
+--write FILE
+    ship file to write; holds the Froude numbers at which the hull is accepted, refused if there
+    are none
+"""
 
 from __future__ import annotations
 
@@ -18,21 +43,9 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.fit import (
-    AUTO,
-    FORMS,
-    ResidualFit,
-    fit_residual,
-    leave_hulls_out,
-)
-from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
-from shipdrag_ros.studies.surface import words as fit_words
-from shipdrag_ros.studies.surface.face.verb import (
-    left_out_picture,
-    prediction_documents,
-    residual_picture,
-)
+from shipdrag_ros.studies.surface.face import verb
 from shipdrag_ros.studies.surface.fit import Prediction
 
 if TYPE_CHECKING:
@@ -45,50 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Fit a published form of the residual-resistance coefficient to tests of several hulls, '
-        'and predict others. Such a form meets the hulls it was made from and misleads for '
-        'others, so every prediction says whether it may be used: not outside the convex hull '
-        'of the data, not beyond their leverage, not where the data leave it open, and not where '
-        'a trend contradicts physics. Columns: L_B, B_T, Fr, and C_B or slenderness '
-        '(L / V^(1/3)), the other follows; lcb (x_c / L) for Sakhnovsky.'
-    )
-    parser.add_argument('data', type=Path, metavar='DATA.csv', help='table with a header')
-    parser.add_argument(
-        '--form',
-        required=True,
-        choices=(*FORMS, AUTO),
-        help=f'{AUTO}: the one that predicts left-out hulls best',
-    )
-    parser.add_argument(
-        '--target',
-        required=True,
-        metavar='COLUMN',
-        help='column of the residual resistance: coefficient c_R, or force per weight',
-    )
-    parser.add_argument(
-        '--predict', type=Path, metavar='NEW.csv', help='table of hulls and Froude numbers'
-    )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file with a baseline of coefficients, to which --write gives the fitted c_R '
-        'as wave resistance',
-    )
-    parser.add_argument(
-        '--lcb',
-        type=number(-0.2, 0.2),
-        metavar='X',
-        help='centre of buoyancy of that ship over L, as in the data',
-    )
-    parser.add_argument(
-        '--write',
-        type=unused_file('.yaml'),
-        metavar='FILE',
-        help='ship file to write; holds the Froude numbers at which the hull is accepted, '
-        'refused if there are none',
-    )
+    parser.add_argument('data', type=Path, metavar='DATA.csv')
+    parser.add_argument('--form', required=True, choices=(*fit.FORMS, fit.AUTO))
+    parser.add_argument('--target', required=True, metavar='COLUMN')
+    parser.add_argument('--predict', type=Path, metavar='NEW.csv')
+    parser.add_argument('--ship', type=Path, metavar='FILE')
+    parser.add_argument('--lcb', type=number(-0.2, 0.2), metavar='X')
+    parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
     add_report(parser, of='fit')
     add_json(parser)
 
@@ -101,18 +77,18 @@ def run(options: argparse.Namespace) -> int:
     if (options.ship is None) != (options.write is None):
         raise DataError('--write', ['--ship FILE and --write FILE belong together; give both'])
     ship = None if options.ship is None else Ship.load(options.ship)
-    needed: tuple[str, ...] = REQUIRED
-    if options.form != AUTO and FORMS[options.form].needs_lcb:
-        needed = (*REQUIRED, 'lcb')
-    if options.target in (*REQUIRED, *OPTIONAL):
+    needed: tuple[str, ...] = fit.REQUIRED
+    if options.form != fit.AUTO and fit.FORMS[options.form].needs_lcb:
+        needed = (*fit.REQUIRED, 'lcb')
+    if options.target in (*fit.REQUIRED, *fit.OPTIONAL):
         raise DataError(
             '--target',
             [f'{options.target!r} is a ratio of the hull; name the column of its resistance'],
         )
-    table = read_numbers(options.data, (*needed, options.target), optional=OPTIONAL)
-    hulls = Hulls.of(str(options.data), table.names, table.values)
+    table = read_numbers(options.data, (*needed, options.target), optional=fit.OPTIONAL)
+    hulls = fit.Hulls.of(str(options.data), table.names, table.values)
     values = table.column(options.target)
-    found = fit_residual(hulls, values, form=options.form)
+    found = fit.fit_residual(hulls, values, form=options.form)
     predictions = [] if options.predict is None else _predictions(options.predict, found)
     source = f'{options.data.name}, {len(values)} rows'
     seen = shown(found, predictions, values, target=options.target, source=source)
@@ -121,18 +97,18 @@ def run(options: argparse.Namespace) -> int:
         written = with_residual(ship, found, lcb=options.lcb)
         options.write.write_text(written.to_yaml(), encoding='utf-8')
         output.log(f'ship file with the fitted wave resistance in {options.write}')
-    output.json({**found.to_dict(), 'predictions': prediction_documents(predictions)})
+    output.json({**found.to_dict(), 'predictions': verb.prediction_documents(predictions)})
     return 0
 
 
-def _predictions(path: Path, found: ResidualFit) -> list[Prediction]:
-    needed = (*REQUIRED, 'lcb') if found.form.needs_lcb else REQUIRED
-    table = read_numbers(path, needed, optional=OPTIONAL)
-    return found.predict(Hulls.of(str(path), table.names, table.values))
+def _predictions(path: Path, found: fit.ResidualFit) -> list[Prediction]:
+    needed = (*fit.REQUIRED, 'lcb') if found.form.needs_lcb else fit.REQUIRED
+    table = read_numbers(path, needed, optional=fit.OPTIONAL)
+    return found.predict(fit.Hulls.of(str(path), table.names, table.values))
 
 
 def shown(
-    found: ResidualFit,
+    found: fit.ResidualFit,
     predictions: Sequence[Prediction],
     values: Float64,
     *,
@@ -156,22 +132,22 @@ def shown(
     def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
         drawn = [
             (
-                residual_picture(values - found.fit.residuals, values, target),
+                verb.residual_picture(values - found.fit.residuals, values, target),
                 'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
                 'the line everywhere; a bow or a slope shows a term that the form lacks.',
             )
         ]
-        error, _, leverage = leave_hulls_out(found.form, found.hulls, values)
+        error, _, leverage = fit.leave_hulls_out(found.form, found.hulls, values)
         if np.any(np.isfinite(error)):
             caption = (
                 'Each hull predicted from the others, so the error to expect of a new one. To the '
                 'right of 1 a hull is more unusual (leverage) than any of the others: there the '
                 'form goes beyond its data, and its predictions are marked as not to be used.'
             )
-            drawn.append((left_out_picture(error, leverage, target), caption))
+            drawn.append((verb.left_out_picture(error, leverage, target), caption))
         return {_FIT: drawn}
 
-    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    asked = [('Predictions', verb.predictions_table(predictions))] if predictions else []
     tables = (
         *asked,
         ('Coefficients of the form', coefficients(found)),
@@ -192,7 +168,7 @@ def shown(
     )
 
 
-def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
+def sentence(found: fit.ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
     """
     Say in words what was found.
     """
@@ -208,7 +184,7 @@ def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction])
     return said
 
 
-def technical(found: ResidualFit) -> str:
+def technical(found: fit.ResidualFit) -> str:
     """
     Say how well the data determine the form.
     """
@@ -238,7 +214,7 @@ def what_it_is(target: str) -> str:
     )
 
 
-def coefficients(found: ResidualFit) -> Table:
+def coefficients(found: fit.ResidualFit) -> Table:
     """
     Show the coefficients of the form, by the terms that they stand before.
     """
@@ -253,7 +229,7 @@ def coefficients(found: ResidualFit) -> Table:
     )
 
 
-def domain(found: ResidualFit) -> Table:
+def domain(found: fit.ResidualFit) -> Table:
     """
     Show the ranges of the data.
     """

@@ -7,15 +7,66 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shipdrag_ros.display import Section, Table
+from shipdrag_ros.report.drawing import BLUE, one_axis
 from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
-from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
-from shipdrag_ros.studies.sensitivity.face.pictures import mimic_picture, particulars_picture
-from shipdrag_ros.studies.sensitivity.mimics import WORST
+from shipdrag_ros.studies.sensitivity.coasting import WORST, CoastStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+_PALE = '#c3d3df'
+
+
+def particulars_picture(found: CoastStudy) -> Figure:
+    """
+    Draw the change of the record by each value, the largest on top.
+    """
+    order = (*found.selection.kept, *found.selection.dropped)
+    table = found.losses.table[[found.losses.names.index(name) for name in order]]
+    places = np.arange(len(order))[::-1]
+    with one_axis(9.0, 0.8 + 0.28 * len(order)) as (figure, axis):
+        axis.barh(
+            places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
+        )
+        axis.barh(
+            places,
+            np.nan_to_num(table[:, 4:6].mean(axis=1)),
+            color=BLUE,
+            height=0.35,
+            label='wrong by the stated standard deviation',
+        )
+        axis.axvline(1.0, color='#555555', linewidth=0.8, label='noise of one sample')
+        axis.set_xscale('log')
+        axis.set_yticks(places, order)
+        axis.set_xlabel('root mean square change of the record [sd of log and position]')
+        axis.grid(visible=False, axis='y')
+        axis.legend(loc='lower right')
+    return figure
+
+
+def mimic_picture(found: CoastStudy) -> Figure:
+    """
+    Draw how much of each effect is left when a value is blamed for it.
+    """
+    places = np.arange(len(found.mimics))[::-1]
+    with one_axis(9.0, 0.8 + 0.28 * len(places)) as (figure, axis):
+        left = [mimic.left for mimic in found.mimics]
+        axis.barh(places, left, color=BLUE, height=0.65)
+        for place, mimic in zip(places, found.mimics):
+            text = f'{mimic.particular.key} {mimic.error:+.0%}'
+            axis.text(mimic.left + 0.01, place, text, va='center', fontsize=7)
+        axis.set_yticks(places, [mimic.effect.name for mimic in found.mimics])
+        axis.set_xlim(0.0, 1.5)
+        axis.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])
+        axis.set_xlabel('part of the effect that is left [1]')
+        axis.grid(visible=False, axis='y')
+    return figure
+
 
 LOSSES = (
     'Change of the record by a wrong value, in standard deviations of log and position; of r(v) '

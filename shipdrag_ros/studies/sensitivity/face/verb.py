@@ -1,5 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag sensitivity`: which derivatives, or which values of a ship file, matter."""
+"""
+Change one number of a model at a time, by 10 and 50 per cent up and down, and show how far the
+motion moves: root mean square of its differences. With a manoeuvring model: which derivatives
+matter in a zigzag or a turning circle, a check of the model without the others, and which
+manoeuvre shows which derivative. With a ship file: which of its values must be known well for a
+coastdown to be judged right, and which effect a wrong one is taken for.
+
+Options
+-------
+--model
+    manoeuvring model (default: {_MODEL})
+--ship FILE
+    ship file with a baseline, in its place
+--manoeuvre NAME
+    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {coast.KIND} or
+    {coast.KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {coast.KIND} from
+    {coast.SPEED_FRACTION:g} of the highest speed of the baseline)
+--keep N
+    how many to keep (default: {_KEEP} derivatives; with --ship those values of which 10 per cent
+    move the record beyond its noise)
+"""
 
 from __future__ import annotations
 
@@ -11,9 +31,9 @@ from shipdrag_ros.cli.arguments import add_json, add_report
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.manoeuvring.manoeuvre import parse
 from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
+from shipdrag_ros.studies.manoeuvring.simulate import parse
+from shipdrag_ros.studies.sensitivity import coast
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting, steering
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
@@ -26,36 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Change one number of a model at a time, by 10 and 50 per cent up and down, and show how '
-        'far the motion moves: root mean square of its differences. With a manoeuvring model: '
-        'which derivatives matter in a zigzag or a turning circle, a check of the model without '
-        'the others, and which manoeuvre shows which derivative. With a ship file: which of its '
-        'values must be known well for a coastdown to be judged right, and which effect a wrong '
-        'one is taken for.'
-    )
     subject = parser.add_mutually_exclusive_group()
     # without a default of argparse, which would not say that both are given
-    subject.add_argument(
-        '--model', choices=list(_MODELS), help=f'manoeuvring model (default: {_MODEL})'
-    )
-    subject.add_argument(
-        '--ship', type=Path, metavar='FILE', help='ship file with a baseline, in its place'
-    )
-    parser.add_argument(
-        '--manoeuvre',
-        metavar='NAME',
-        help='zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship '
-        f'{KIND} or {KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {KIND} from '
-        f'{SPEED_FRACTION:g} of the highest speed of the baseline)',
-    )
-    parser.add_argument(
-        '--keep',
-        type=int,
-        metavar='N',
-        help=f'how many to keep (default: {_KEEP} derivatives; with --ship those values of which '
-        '10 per cent move the record beyond its noise)',
-    )
+    subject.add_argument('--model', choices=list(_MODELS))
+    subject.add_argument('--ship', type=Path, metavar='FILE')
+    parser.add_argument('--manoeuvre', metavar='NAME')
+    parser.add_argument('--keep', type=int, metavar='N')
     add_report(parser, of='result')
     add_json(parser)
 
@@ -81,6 +77,6 @@ def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]
 
 def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = Ship.load(options.ship)
-    coast = parse_coast(ship, KIND if options.manoeuvre is None else options.manoeuvre)
-    found = study_coast(ship, coast, keep=options.keep)
+    asked = coast.KIND if options.manoeuvre is None else options.manoeuvre
+    found = study_coast(ship, coast.parse_coast(ship, asked), keep=options.keep)
     return coasting.shown(found), found.to_dict()

@@ -1,5 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag surface`: a polynomial surface of measured coefficients, and its degree."""
+"""
+Fit a polynomial surface to a table of measured or computed coefficients, in any number of inputs.
+The degree is raised while that lowers the residual variance by more than chance: the rule of the
+order of a coastdown fit. Inputs are scaled inside; the coefficients are those of raw powers.
+
+Options
+-------
+DATA.csv
+    table with a header
+--inputs COLUMN[,COLUMN]...
+    columns that the surface is over, alpha,beta for instance
+--target COLUMN
+    column of what was measured
+--max-degree N
+    highest degree to try
+--predict NEW.csv
+    table with the same inputs, for which the surface is evaluated
+--export FILE.py
+    write the surface and its derivatives as plain Python functions of the inputs
+"""
 
 from __future__ import annotations
 
@@ -13,13 +32,12 @@ import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.display import Section
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.report.drawing import BLUE, VERMILION, new_figure, styled
+from shipdrag_ros.report.drawing import BLUE, VERMILION, one_axis
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.surface import words as fit_words
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
 
 if TYPE_CHECKING:
@@ -32,9 +50,7 @@ def degree_picture(surface: Surface) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    with styled():
-        figure = new_figure(9.0, 2.8)
-        axis = figure.subplots()
+    with one_axis(9.0, 2.8) as (figure, axis):
         axis.plot(surface.degrees, np.sqrt(surface.table.variance), color=BLUE, marker='o')
         if np.all(surface.table.variance > 0.0):
             axis.set_yscale('log')
@@ -42,8 +58,7 @@ def degree_picture(surface: Surface) -> Figure:
             surface.degree, color=VERMILION, linestyle='--', label=f'chosen: {surface.degree}'
         )
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axis.set_xlabel('degree')
-        axis.set_ylabel('RMSE')
+        axis.set(xlabel='degree', ylabel='RMSE')
         axis.legend()
     return figure
 
@@ -52,13 +67,10 @@ def residual_picture(fitted: Float64, measured: Float64, target: str) -> Figure:
     """
     Draw what a fit leaves, against what it says.
     """
-    with styled():
-        figure = new_figure(9.0, 2.8)
-        axis = figure.subplots()
+    with one_axis(9.0, 2.8) as (figure, axis):
         axis.plot(fitted, measured - fitted, '.', color='#888888', markersize=4, rasterized=True)
         axis.axhline(0.0, color=BLUE, linewidth=1.0)
-        axis.set_xlabel(f'{target}, fitted')
-        axis.set_ylabel('measured - fitted')
+        axis.set(xlabel=f'{target}, fitted', ylabel='measured - fitted')
     return figure
 
 
@@ -69,14 +81,11 @@ def contour_picture(surface: Surface, points: Float64, target: str) -> Figure:
     low, high = surface.domain.lower, surface.domain.upper
     x, y = np.meshgrid(np.linspace(low[0], high[0], 61), np.linspace(low[1], high[1], 61))
     value = surface.polynomial(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
-    with styled():
-        figure = new_figure(6.5, 4.6)
-        axis = figure.subplots()
+    with one_axis(6.5, 4.6) as (figure, axis):
         drawn = axis.contourf(x, y, value, levels=16, cmap='cividis')
         figure.colorbar(drawn, label=target)
         axis.plot(points[:, 0], points[:, 1], '.', color='white', markersize=2, rasterized=True)
-        axis.set_xlabel(surface.inputs[0])
-        axis.set_ylabel(surface.inputs[1])
+        axis.set(xlabel=surface.inputs[0], ylabel=surface.inputs[1])
     return figure
 
 
@@ -94,9 +103,7 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
     from matplotlib.ticker import NullFormatter, ScalarFormatter
 
     inside = leverage <= 1.0
-    with styled():
-        figure = new_figure(9.0, 3.0)
-        axis = figure.subplots()
+    with one_axis(9.0, 3.0) as (figure, axis):
         axis.semilogx(leverage[inside], error[inside], '.', color=BLUE, label='within')
         axis.semilogx(
             leverage[~inside], error[~inside], 'x', color=VERMILION, label='beyond the data'
@@ -118,42 +125,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.description = (
-        'Fit a polynomial surface to a table of measured or computed coefficients, in any '
-        'number of inputs. The degree is raised while that lowers the residual variance by '
-        'more than chance: the rule of the order of a coastdown fit. Inputs are scaled inside; '
-        'the coefficients are those of raw powers.'
-    )
-    parser.add_argument('data', type=Path, metavar='DATA.csv', help='table with a header')
-    parser.add_argument(
-        '--inputs',
-        required=True,
-        type=_names,
-        metavar='COLUMN[,COLUMN]...',
-        help='columns that the surface is over, alpha,beta for instance',
-    )
-    parser.add_argument(
-        '--target', required=True, metavar='COLUMN', help='column of what was measured'
-    )
-    parser.add_argument(
-        '--max-degree',
-        type=whole(LOWEST),
-        default=MAX_DEGREE,
-        metavar='N',
-        help='highest degree to try',
-    )
-    parser.add_argument(
-        '--predict',
-        type=Path,
-        metavar='NEW.csv',
-        help='table with the same inputs, for which the surface is evaluated',
-    )
-    parser.add_argument(
-        '--export',
-        type=new_file('.py'),
-        metavar='FILE.py',
-        help='write the surface and its derivatives as plain Python functions of the inputs',
-    )
+    parser.add_argument('data', type=Path, metavar='DATA.csv')
+    parser.add_argument('--inputs', required=True, type=_names, metavar='COLUMN[,COLUMN]...')
+    parser.add_argument('--target', required=True, metavar='COLUMN')
+    parser.add_argument('--max-degree', type=whole(LOWEST), default=MAX_DEGREE, metavar='N')
+    parser.add_argument('--predict', type=Path, metavar='NEW.csv')
+    parser.add_argument('--export', type=new_file('.py'), metavar='FILE.py')
     add_report(parser, of='surface')
     add_json(parser)
 
@@ -277,10 +254,10 @@ def shown(
             )
         return {_FIT: drawn}
 
-    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    asked = [('Predictions', predictions_table(predictions))] if predictions else []
     tables = (
-        ('Degrees tried; F and p of the step from the degree before', fit_words.degrees(surface)),
-        ('Coefficients of raw powers', fit_words.coefficients(surface)),
+        ('Degrees tried; F and p of the step from the degree before', degrees_table(surface)),
+        ('Coefficients of raw powers', coefficients_table(surface)),
         *asked,
     )
     notes = 'What these data can and cannot show' if surface.notes else ''
@@ -310,3 +287,65 @@ def _check_names(names: Sequence[str]) -> None:
     ]
     if problems:
         raise DataError('--export', problems)
+
+
+def degrees_table(surface: Surface) -> Table:
+    """
+    Show all degrees tried, as the table of S5 with the test beside it.
+    """
+    table = surface.table
+    rows = []
+    for row, degree in enumerate(surface.degrees):
+        first = np.isnan(table.f[row])
+        rows.append(
+            (
+                f'{degree}',
+                f'{table.coefficients[row]}',
+                f'{table.sse[row]:.4g}',
+                f'{np.sqrt(table.variance[row]):.4g}',
+                '-' if first else f'{table.f[row]:.3g}',
+                '-' if first else f'{table.p[row]:.2g}',
+                'chosen' if degree == surface.degree else '',
+            )
+        )
+    return Table(('degree', 'terms', 'SSE', 'RMSE', 'F', 'p', ''), tuple(rows))
+
+
+def coefficients_table(surface: Surface) -> Table:
+    """
+    Show the coefficients of raw powers of the inputs.
+    """
+    return Table(
+        ('term', 'coefficient', 'sd'),
+        tuple(
+            (_term(surface.inputs, powers), f'{value:.6g}', f'{sd:.2g}')
+            for powers, value, sd in zip(
+                surface.polynomial.powers.tolist(), surface.coefficients, surface.sd
+            )
+        ),
+    )
+
+
+def predictions_table(found: Sequence[Prediction]) -> Table:
+    """
+    Show predictions and why some may not be used.
+    """
+    return Table(
+        ('row', 'value', 'sd', 'use'),
+        tuple(
+            (
+                f'{number}',
+                f'{each.value:.6g}',
+                f'{each.sd:.2g}' if np.isfinite(each.sd) else 'open',
+                'yes' if each.inside else 'NO: ' + '; '.join(each.reasons),
+            )
+            for number, each in enumerate(found, start=1)
+        ),
+    )
+
+
+def _term(inputs: Sequence[str], powers: Sequence[int]) -> str:
+    factors = [
+        name if power == 1 else f'{name}^{power}' for name, power in zip(inputs, powers) if power
+    ]
+    return ' '.join(factors) or '1'
