@@ -162,7 +162,8 @@ class Observation:
             )
         speed_m_s = _speed(record.steady)
         # the first mean is of as much time at most
-        since_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
+        first_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
+        since_ns = max(window.before.start_ns, first_ns)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
         heading_rad, heading_sd = _heading(window, since_ns, parameters)
