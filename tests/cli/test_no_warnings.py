@@ -88,14 +88,15 @@ def test_odd_records(name: str, ship: Path, tmp_path: Path) -> None:
     page = str(tmp_path / 'page.html')
     said = told('replay', bag, '--ship', str(ship), '--report', page)
     said += told('diagnose', bag, '--ship', str(ship), '--report', page)
-    for start, end in ((610, 1200), (700, 720)):
+    for start, end in ((610, 1200), (620, 720), (700, 720)):
         window = ('--window', str(start), str(end))
-        for estimator in ESTIMATORS if start == 610 else ESTIMATORS[:1]:
+        for estimator in ESTIMATORS if start == 620 else ESTIMATORS[:1]:
             parameters = tmp_path / 'parameters.yaml'
             parameters.write_text(f'estimator: {estimator}\nfroude_min: 0.001\n')
             more = ('--parameters', str(parameters), '--json', str(tmp_path / 'found.json'))
             said += told('replay', bag, '--ship', str(ship), *window, *more)
-        said += told('diagnose', bag, '--ship', str(ship), *window)
+        if start != 620:
+            said += told('diagnose', bag, '--ship', str(ship), *window)
     said += told('info', bag) + told('check', bag)
     assert said == []
 
