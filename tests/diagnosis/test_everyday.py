@@ -46,6 +46,14 @@ def test_the_filter_of_a_log_is_no_effect(seen_of: Callable[..., Observation]) -
     assert probability('log_lag=60')['log_lag',] > 0.9
 
 
+def test_light_air_is_no_wind(seen_of: Callable[..., Observation]) -> None:
+    def probability(*effects: str) -> Mapping[Names, float]:
+        return compare((seen_of(*effects),), SHIP, Facts(SHIP)).compare().probability
+
+    assert probability('wind=1.5')['wind',] < 0.05
+    assert probability('wind=12')['wind',] > 0.9
+
+
 def rows_of(time: Float64, value: Float64) -> tuple[Rows, Float64]:
     """Condense a log that is read until the stop and beyond; times count from it."""
     block = Block.of(Channel.SPEED_THROUGH_WATER, np.round(time * 1e9).astype(np.int64), value)
