@@ -14,3 +14,18 @@ from shipdrag_ros.bags.run import (
     open_runs,
 )
 from shipdrag_ros.bags.writer import BagWriter, Compression
+
+__all__ = [
+    'BagInfo',
+    'BagWriter',
+    'Compression',
+    'Mark',
+    'ResetMark',
+    'Run',
+    'RunSamples',
+    'SilenceMark',
+    'StopMark',
+    'TopicInfo',
+    'info',
+    'open_runs',
+]

@@ -13,7 +13,7 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -202,7 +202,9 @@ def _sections(module: ModuleType) -> dict[str, str]:
 
 def _helps(module: ModuleType) -> dict[str, str]:
     """Return what the docstring of a module says of arguments, names of the module filled in."""
-    text = _sections(module).get('Options', '').format_map(vars(arguments) | vars(module))
+    text = _sections(module).get('Options', '')
+    with suppress(LookupError, ValueError):  # a study of another package may write braces
+        text = text.format_map(vars(arguments) | vars(module))
     found = re.findall(r'^(\S+).*\n((?: .*\n?)+)', text, re.MULTILINE)
     return {name: ' '.join(lines.split()) for name, lines in found}
 

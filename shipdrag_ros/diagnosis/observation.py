@@ -85,6 +85,8 @@ class Observation:
         As she was in this run, without effects.
     stop_moved_s
         By how much the end of the lead-in is later than the stop was taken for at first.
+    notes
+        A sentence for each input that is left out.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Observation:
     context: Context
     ship: Ship
     stop_moved_s: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @property
     def stopped_ns(self) -> int:
@@ -160,6 +163,10 @@ class Observation:
                 f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
                 'that begins earlier'
             )
+        for input_ in window.motion:
+            if input_ not in record.white_sd:  # refused: its note says why
+                window = window.without(input_, 'not used')
+        assert window.before is not None
         speed_m_s = _speed(record.steady)
         # the first mean is of as much time at most
         first_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
@@ -172,7 +179,8 @@ class Observation:
         def rows_of(direction_rad: float, way_m_s: float) -> tuple[Rows, Float64]:
             found = RunRows.of(window, run_down, parameters, heading_rad=direction_rad)
             rows, variance = found.condensed(way_m_s, halved_s)
-            return rows._replace(time_s=rows.time_s + lead_in_s), variance
+            since_s = np.maximum(rows.time_s + lead_in_s, 0.0)  # rounding
+            return rows._replace(time_s=since_s), variance
 
         along = rows_of(heading_rad, speed_m_s)
         across, variance = rows_of(heading_rad + 0.5 * math.pi, 0.0)
@@ -181,7 +189,9 @@ class Observation:
         times = np.unique(np.concatenate([along[0].time_s, to_port[0].time_s]))
         shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s)
-        aside = Measured.of(*to_port, times) if placed.any() else None
+        # their noise is learnt from the steady record
+        learnt = to_port[0].time_s < lead_in_s - run_down.stop_sd_s
+        aside = Measured.of(*to_port, times) if learnt.any() else None
         return cls(
             name,
             lead_in_s,
@@ -199,6 +209,7 @@ class Observation:
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
             stop_moved_s,
+            record.notes,
         )
 
 
@@ -216,12 +227,15 @@ def _heading(window: Window, since_ns: int, parameters: Parameters) -> tuple[flo
         if parameters.heading_convention == 'compass':
             mean = 0.5 * math.pi - mean
         return mean, _COMPASS_SD_RAD
-    before = window.before.position
-    steady = before.time_ns >= since_ns
-    if steady.sum() < _LEAST_ROWS:
+    before, after = window.before.position, window.position
+    if not len(after):
         return 0.0, 0.0
-    time_s = (before.time_ns[steady] - before.time_ns[-1]) * 1e-9
-    slopes = np.polyfit(time_s, before.value[steady], 1)[0]
+    first = int(np.searchsorted(before.time_ns, since_ns))
+    # where few are before the stop, the course after it
+    found = before if len(before) - first > 1 else after
+    first = first if found is before else 0
+    time_s = (found.time_ns[first:] - found.time_ns[-1]) * 1e-9
+    slopes = np.polyfit(time_s, found.value[first:], 1)[0]
     return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
 
 

@@ -14,13 +14,14 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.steady import (
+    BIN_S,
     display_sd,
     steady_means,
     steady_since,
     weighted_white_sd,
 )
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows, bin_means
+from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
@@ -205,18 +206,28 @@ def _condensed(
     before, value = both[: len(before_s)], both[len(before_s) :]
     weight = stated_weight(both_s, both, np.concatenate([variance, series.variance]))
     white_sd = max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
-    if not _is_place(name) and len(before_s):
-        # behind a filter, and in a swell, readings err alike for seconds
-        edges = np.arange(before_s[0], before_s[-1], _ALIKE_S)
-        _, each, count = bin_means(before_s, before, edges)
-        white_sd = max(white_sd, weighted_white_sd(each, count.astype(np.float64)))
-    white_sd = known_sd or white_sd
     steady: _WeightedRows | None = None
     if len(before_s):
-        means = steady_means(before_s, before, weight[: len(before_s)], _FINE_S)
-        steady = (means[0], CODES[name], *means[1:])
+        own, rate = weight[: len(before_s)], 0.0
+        if _is_place(name):
+            rate = _rate(before_s, before)
+        else:
+            # behind a filter, and in a swell, readings err alike for seconds
+            _, each, total = steady_means(before_s, before, own, _ALIKE_S, 0.0)
+            white_sd = max(white_sd, weighted_white_sd(each, total))
+        at_s, mean, count = steady_means(before_s, before - rate * before_s, own, BIN_S, _FINE_S)
+        steady = (at_s, CODES[name], mean + rate * at_s, count)
+    white_sd = known_sd or white_sd
     coast = (time_s, CODES[name], value, weight[len(before_s) :])
     return _InputRows(coast, steady, white_sd, display_sd(series.value, white_sd))
+
+
+def _rate(time_s: Float64, value: Float64) -> float:
+    """Return how fast a value changes, by the median of its halves."""
+    half = len(value) // 2
+    if not half:
+        return 0.0
+    return float(np.median((value[half:] - value[:-half]) / (time_s[half:] - time_s[:-half])))
 
 
 def _is_place(name: str) -> bool:

@@ -275,17 +275,15 @@ def _found(
         result = replay(each, ship=ship, window=window, stop=stop, compare=False, progress=stage)
         ship, parameters = ship or result.ship, parameters or result.parameters
         sheet, of_run = _sheet(listener, each, ship)
-        for name in clocks_apart(result):
-            listener.log(
-                f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
-                'rejected; it is diagnosed all the same'
-            )
         lines = [*_cuts(result, window), *run_warnings(result)]
+        lines += [
+            f'the clock of {name} is too slow or too fast, and on board it is rejected; it is '
+            'diagnosed all the same'
+            for name in clocks_apart(result)
+        ]
         if stop is not None:
             lines.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
-        for line in lines:
-            listener.log(f'{each.name}: {line}')
-            warnings.append(f'{each.name}: {line}')
+        warnings += [f'{each.name}: {line}' for line in lines]
         windows = coast_windows(result)
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:

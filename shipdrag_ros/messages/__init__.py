@@ -18,3 +18,25 @@ from shipdrag_ros.messages.topics import (
     read_event,
 )
 from shipdrag_ros.messages.types import MalformedMessage
+
+__all__ = [
+    'DEFAULT_NODE',
+    'OUTPUT_TOPICS',
+    'TOPICS',
+    'Decoded',
+    'EncodedMessage',
+    'EventKind',
+    'EventNote',
+    'MalformedMessage',
+    'MatchedTopics',
+    'OutputMessage',
+    'OutputTopic',
+    'Source',
+    'Unreadable',
+    'decode',
+    'encode',
+    'event_message',
+    'input_type',
+    'match_inputs',
+    'read_event',
+]

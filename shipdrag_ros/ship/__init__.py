@@ -18,3 +18,26 @@ from shipdrag_ros.ship.sections import (
     Water,
 )
 from shipdrag_ros.ship.term import LearntTerm
+
+__all__ = [
+    'AIR_DENSITY_KG_M3',
+    'GRAVITY_M_S2',
+    'AddedMass',
+    'Air',
+    'Baseline',
+    'CoefficientBaseline',
+    'CoefficientSd',
+    'ConstantAddedMass',
+    'Fact',
+    'LearntTerm',
+    'MerchantAddedMass',
+    'Propeller',
+    'Propulsion',
+    'RunSheet',
+    'Ship',
+    'StatedEffect',
+    'TableAddedMass',
+    'TableBaseline',
+    'Water',
+    'parse_fact',
+]

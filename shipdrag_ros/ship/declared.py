@@ -298,7 +298,7 @@ def as_found(value: float, sd: float) -> Prior:
 
 @dataclass(frozen=True, kw_only=True)
 class DeclaredTerm:
-    """What an effect does; whether it can be so, `soundness` says."""
+    """What an effect does; whether it can be so, `term.problems_of` says."""
 
     name: str = declare(text(), 'what it is called')
     term: TermForm = declare(section(TermForm), 'what it is')

@@ -14,3 +14,26 @@ from shipdrag_ros.simulation.sensors import (
     standard_sensors,
 )
 from shipdrag_ros.simulation.surge import Truth, simulate
+
+__all__ = [
+    'STANDARD_INPUTS',
+    'STANDARD_SD',
+    'START_NS',
+    'STOP',
+    'Action',
+    'Columns',
+    'Effect',
+    'EngineOrder',
+    'Frame',
+    'GaussMarkov',
+    'Measure',
+    'Scenario',
+    'Scope',
+    'Sensor',
+    'Truth',
+    'Turn',
+    'sense',
+    'simulate',
+    'simulate_columns',
+    'standard_sensors',
+]

@@ -14,7 +14,7 @@ bursts, in port for instance), scatter and wander of unknown size. All of it is 
 the three sizes are given; these are averaged over
 a grid by their posterior weight. A run far off is an outlier with a small prior
 probability and is given less weight, not removed. Steps at unknown times are found by
-their Bayes factors (`change_points`).
+their Bayes factors (`search`).
 """
 
 from __future__ import annotations

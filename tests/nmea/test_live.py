@@ -157,3 +157,10 @@ def test_a_name_that_is_none_is_said_and_tried_again(host: str) -> None:
     with hearing(f'tcp://{host}:10110') as heard:
         until(lambda: 'again' in counts(heard).problem)
         assert 'label' in counts(heard).problem
+
+
+def test_what_is_no_serial_device_is_said(tmp_path: Path) -> None:
+    path = tmp_path / 'fifo'
+    os.mkfifo(path)
+    with hearing(f'serial:{path}:4800') as heard:
+        until(lambda: 'no serial device' in counts(heard).problem)

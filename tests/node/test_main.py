@@ -207,3 +207,8 @@ def test_an_input_that_is_not_well_hides_no_state() -> None:
 
 def test_without_a_terminal_there_is_no_line() -> None:
     assert terminal_line(io.StringIO()) is None
+
+
+def test_stray_arguments_are_a_usage_error(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(['coastdown_node', 'stray']) == 2
+    assert 'usage: coastdown_node' in capfd.readouterr().err

@@ -26,6 +26,23 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import effect_of, effects_in
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
+__all__ = [
+    'LIBRARY',
+    'OWN',
+    'action_of',
+    'carrying',
+    'confounders',
+    'declared',
+    'discriminating_measurements',
+    'effects_of',
+    'find',
+    'inseparable',
+    'parse',
+    'terms',
+    'using',
+    'values_of',
+]
+
 
 def _found() -> dict[str, Effect]:
     every = [*effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')]
