@@ -70,7 +70,7 @@ def model_of(value: Float64) -> RunModel:
         Ship.example(),
         STOP,
         speed_m_s=SPEED_M_S,
-        low_m_s=LOW_M_S,
+        range_m_s=(LOW_M_S, SPEED_M_S),
         weather=Weather(None, None),
     )
 

@@ -157,15 +157,7 @@ class Observation:
         """
         run_down = RunDown.of(window, ship)
         record = RunRows.of(window, run_down, parameters)
-        if record.steady_s < LEAST_S or window.before is None:
-            raise DiagnosisError(
-                f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
-                f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
-                'that begins earlier'
-            )
-        for input_ in window.motion:
-            if input_ not in record.white_sd:  # refused: its note says why
-                window = window.without(input_, 'not used')
+        window = _usable(window, record)
         assert window.before is not None
         speed_m_s = _speed(record.steady)
         # the first mean is of as much time at most
@@ -211,6 +203,20 @@ class Observation:
             stop_moved_s,
             record.notes,
         )
+
+
+def _usable(window: Window, record: RunRows) -> Window:
+    """Return a window without the inputs that were refused, if it can be diagnosed."""
+    if record.steady_s < LEAST_S or window.before is None:
+        raise DiagnosisError(
+            f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
+            f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
+            'that begins earlier'
+        )
+    for name in window.motion:
+        if name not in record.white_sd:  # a note of the record says why
+            window = window.without(name, 'not used')
+    return window
 
 
 def _stated_run_down(ship: Ship) -> tuple[float, float] | None:

@@ -93,8 +93,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         own,
         stop,
         speed_m_s=run.speed_m_s,
-        low_m_s=low,
-        top_m_s=top,
+        range_m_s=(low, top),
     )
     across = run.across
     value, blocks = [run.context.value], [run.context.whitener]

@@ -142,8 +142,7 @@ class RunModel:
         stop: StopPrior,
         *,
         speed_m_s: float,
-        low_m_s: float,
-        top_m_s: float = 0.0,
+        range_m_s: tuple[float, float],
         weather: Weather | None = None,
     ) -> RunModel:
         """
@@ -159,14 +158,14 @@ class RunModel:
             How many of them are before the stop.
         ship
         stop
-        speed_m_s, low_m_s
-            At the stop and at the end, roughly.
-        top_m_s
-            Up to which the law reaches besides, for other runs.
+        speed_m_s
+            At the stop, roughly.
+        range_m_s
+            Over which the law reaches: from the lowest to the highest speed, of other runs too.
         weather
             None: wind and depth are part of r.
         """
-        law = HullLaw.of(ship, low_m_s, max(top_m_s, speed_m_s))
+        law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)
         adds = () if weather is None else weather.influences(ship, law.speed_m_s)
         forces = law.forces(ship, tau_s, adds)
@@ -191,7 +190,7 @@ class RunModel:
             _grid(end, tau_s),
             start,
             families,
-            low_m_s,
+            range_m_s[0],
             speed_m_s,
             law,
             adds,

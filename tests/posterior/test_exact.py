@@ -29,12 +29,12 @@ def problem_of(
     variance = np.where(kind % KIND_COUNT == POSITION, 25.0, 0.02**2)
     rows = Rows(time_s, kind, np.zeros(120))
     empty = RunModel.of(
-        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, low_m_s=4.0
+        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, range_m_s=(4.0, 8.0)
     )
     exact = -predict(empty.forces, empty.start, empty.grid_s, rows)[0][0]
     rows = rows._replace(value=exact + np.sqrt(variance) * rng.standard_normal(120))
     return RunModel.of(
-        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, low_m_s=4.0
+        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, range_m_s=(4.0, 8.0)
     )
 
 

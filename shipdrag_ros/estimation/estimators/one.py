@@ -149,7 +149,7 @@ def estimate(
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s),
         speed_m_s=guess.speed_m_s,
-        low_m_s=guess.lowest * guess.speed_m_s,
+        range_m_s=(guess.lowest * guess.speed_m_s, guess.speed_m_s),
         weather=weather,
     )
     found = infer(problem, guess.seen, quick=quick)
