@@ -220,6 +220,8 @@ def coasts_of(
         If there is none.
     """
     seen = _found(listener, runs, given, progress)
+    for line in seen.warnings:  # a diagnosis has them among its notes
+        listener.log(line)
     if not (seen.coasts or (whole and seen.whole)):
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
