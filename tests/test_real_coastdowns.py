@@ -83,7 +83,7 @@ def test_a_refusal_needs_its_reason(script: ModuleType) -> None:
     silent, astern = said(script), said(script, reason='astern')
     assert judged(script, 'blueboat_221', silent, silent) == 'NO: no figure'
     assert judged(script, 'blueboat_221', silent, astern) == 'yes: refused, astern'
-    told = said(script, error='she goes ASTERN there; give another --window')
+    told = said(script, error='she goes ASTERN there; give another window')
     assert judged(script, 'blueboat_221', silent, told) == 'yes: refused, astern'
     assert judged(script, 'blueboat_222', silent, astern) == 'NO: no figure'
     figure = coastdown(37.0, 62.0, 0.0026, 0.0001, speed_m_s=[0.1, 0.3])

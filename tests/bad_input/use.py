@@ -204,13 +204,13 @@ COMMANDS = (
         'a window of 3 s',
         _replay('--window', '100', '103'),
         'no estimate from 100 to 103 s',
-        'give another --window',
+        'give another window',
     ),
     _use(
         'a window of steady sailing',
         _replay('--window', '10', '290'),
         'no estimate from 10 to 290 s: nothing of it is a coastdown',
-        'give another --window',
+        'give another window',
     ),
     _use(
         'a window in words',
