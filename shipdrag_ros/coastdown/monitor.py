@@ -473,12 +473,13 @@ class Monitor:
             for one in dated
             for event in self._all_of(one, regimes, number, otherwise, last_ns)
         ]
-        was = None if dated else regimes.dismissal(since_s)
-        if was is not None:
-            if ended_by is not None and not regimes.even:
-                was = cut_short(was, ended_by, regimes.gliding)
-            self._dismissed_s = was.end_ns / SECOND_NS
-            events += self._dismissals.take(was)
+        if not dated:
+            was = regimes.dismissal(since_s)
+            if was is not None:
+                if ended_by is not None and not regimes.even:
+                    was = cut_short(was, ended_by, regimes.gliding)
+                events += self._dismissals.take(was)
+            self._dismissed_s = regimes.taken_s  # the next bank is not asked about it again
         for first_s, last_s in regimes.whole_glides():
             if first_s >= self._followed_s:
                 events.append(WholeGlide(round(first_s * SECOND_NS), round(last_s * SECOND_NS)))

@@ -50,6 +50,7 @@ _INERTIA = ((0.01, 0.7), (0.1, 0.2))  # change in a second; it grows with the ro
 _QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
 _NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean of a log or a speed over ground
 _TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # radar: 4 to 10 m
+_NOISES = (_NOISE, _NOISE, _TRACK_NOISE)  # each kind has its own
 _SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
 _DRIFT = 0.01  # change of a current in a second, in open water
 _SWING_S = 40.0  # in which it is another one while she turns, or crosses an eddy
@@ -94,23 +95,36 @@ def _nothing() -> SpeedMixture:
 
 
 @lru_cache
-def _one_ship(logs: int, grounds: int, tracks: int, length_m: float) -> SpeedMixture:
-    """Return what sources read that measure her, in the order of the arguments."""
-    parts, count = [], logs + grounds + tracks
+def _own(kind: int) -> SpeedMixture:
+    """Return what an instrument of a kind errs by: a log, a speed over ground or a track."""
+    return _mixture([(sd**2 * _WHITE + _OWN, 1.0) for sd, _ in _NOISES[kind]])
+
+
+@lru_cache
+def _one_ship(counts: tuple[int, ...], length_m: float) -> SpeedMixture:
+    """
+    Return what so many logs, speeds over ground and tracks read that measure her.
+
+    Of each kind the sum over the root of its number, the noises of the last kind innermost:
+    how far instruments of one kind lie apart says nothing of her but how noisy they are.
+    """
+    parts, kinds = [], np.flatnonzero(counts)
+    root = np.sqrt(np.array(counts)[kinds])
+    over_ground = root * (kinds > 0)
     water = ((_SAME, 1.0 - TURNS), (_TURN, TURNS))
-    currents = list(product(CURRENT, water)) if 0 < logs < count else [((0.0, 1.0), (_SAME, 1.0))]
+    apart = counts[0] and len(kinds) > 1
+    currents = list(product(CURRENT, water)) if apart else [((0.0, 1.0), (_SAME, 1.0))]
     drift = _DRIFT**2 * _WALK * (len(currents) > 1)
-    ground = np.zeros((count, count))
-    ground[logs:, logs:] = 1.0
     for (level, a), (inertia, b), ((current, c), (kind, d)) in product(
         _LEVEL, (*_INERTIA, (_QUICK_M_M_S / length_m, _QUICK)), currents
     ):
-        shared = np.kron(np.ones((count, count)), level**2 * _SAME + inertia**2 * _WALK)
-        shared += np.kron(ground, current**2 * kind + drift)
-        for (log, e), (track, f) in product(_NOISE, _TRACK_NOISE if tracks else _NOISE):
-            own = np.kron(np.diag([log**2] * logs + [track**2] * (count - logs)), _WHITE)
-            own += np.kron(np.eye(count), _OWN)
-            parts.append((shared + own, 2.0 * a * b * c * d * e * f))  # 2: she sails ahead
+        shared = np.kron(np.outer(root, root), level**2 * _SAME + inertia**2 * _WALK)
+        shared += np.kron(np.outer(over_ground, over_ground), current**2 * kind + drift)
+        shared += np.kron(np.eye(len(kinds)), _OWN)
+        for noises in product(*(_NOISES[each] for each in kinds)):
+            own = np.kron(np.diag([sd**2 for sd, _ in noises]), _WHITE)
+            weight = 2.0 * a * b * c * d * math.prod(share for _, share in noises)
+            parts.append((shared + own, weight))  # 2: she sails ahead
     return _mixture(parts)
 
 
@@ -135,21 +149,36 @@ def _log_densities(precision: Float64, factor: Float64, speed: Float64) -> Float
     return each
 
 
+def _ahead(speeds: Mapping[int, Float64], craft: Craft) -> float:
+    """Return the log evidence that some sources measure one ship, which sails ahead."""
+    of_kinds: list[list[Float64]] = [[], [], []]
+    for source, speed in speeds.items():
+        track = _KIND[source] >= FIRST_TRACK
+        of_kinds[0 if _KIND[source] == _LOG else 1 + track].append(speed)
+    precision, factor = _one_ship(tuple(map(len, of_kinds)), craft.length_m)
+    sums, scatter = [], np.zeros(())
+    for kind, read in enumerate(map(np.array, of_kinds)):
+        if len(read):
+            own, size = _own(kind)
+            off = read - read.mean(axis=0)
+            apart = (len(read) - 1) * size - 0.5 * np.einsum('ji,nik,jk->n', off, own, off)
+            sums.append(read.sum(axis=0) / math.sqrt(len(read)))
+            scatter = np.add.outer(scatter, apart)
+    factor = (factor.reshape(-1, scatter.size) + scatter.ravel()).ravel()
+    return _evidence((precision, factor), np.concatenate(sums))
+
+
 def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
     """Return the log evidence that some sources measure one ship."""
-    logs = sum(_KIND[source] == _LOG for source in speeds)
-    tracks = sum(_KIND[source] >= FIRST_TRACK for source in speeds)
-    mixture = _one_ship(logs, len(speeds) - logs - tracks, tracks, craft.length_m)
-    ahead = _evidence(mixture, np.concatenate(list(speeds.values())))
+    ahead = _ahead(speeds, craft)
     of_logs = {source: each for source, each in speeds.items() if _KIND[source] == _LOG}
-    through = float(np.mean(list(of_logs.values()))) if logs else 0.0
+    through = float(np.mean(list(of_logs.values()))) if of_logs else 0.0
     if through >= 0.0:
         return ahead
     # she makes way astern: over ground a speed has no sign
     pace = through / craft.slow_m_s
     rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
-    other = {**speeds, **{source: -each for source, each in of_logs.items()}}
-    astern = _evidence(mixture, np.concatenate(list(other.values())))
+    astern = _ahead({**speeds, **{source: -each for source, each in of_logs.items()}}, craft)
     return min(rare, 0.0) + float(np.logaddexp(ahead, astern))
 
 

@@ -14,7 +14,7 @@ from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_s
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.joined import with_log_track, with_whole_glides
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarlier, WeighedFact
-from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.errors import DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.replaying import Listener, WindowedRun, WindowSpan, refuse_two_ships
@@ -103,9 +103,14 @@ def diagnose_runs(
         earlier=earlier,
         progress=progress,
     )
-    found = with_whole_glides(
-        alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
-    )
+    try:
+        found = with_whole_glides(
+            alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
+        )
+    except ShipdragError:
+        for line in seen.warnings:  # no notes hold them
+            listener.log(line)
+        raise
     unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
     found = replace(found, notes=(*found.notes, *seen.warnings, *unused))
     if seen.whole:

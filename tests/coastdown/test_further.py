@@ -134,3 +134,14 @@ def test_two_logs_of_one_driver_in_a_wrong_unit_do_not_outvote_the_positions(shi
     left_out = watched(ship, block)[0].left_out()
     assert {'speed_through_water', 'speed_through_water_2'} <= set(left_out)
     assert 'position' not in left_out
+
+
+def test_noisy_positions_beside_a_quiet_speed_over_ground_are_no_contradiction(ship: Ship) -> None:
+    block = sailed(
+        ship,
+        Sensor(channel=FIRST, sd=0.05),
+        Sensor(channel=Channel.SPEED_OVER_GROUND, sd=0.1),
+        Sensor(channel=Channel.POSITION, sd=10.0),
+        Sensor(channel=Channel.POSITION_2, sd=10.0),
+    )
+    assert not watched(ship, block)[0].contradictions()

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown import Monitor
@@ -246,6 +246,7 @@ def long_records(ship, long_record) -> list:
 
 @settings(max_examples=5, deadline=None)
 @given(start_s=st.integers(1, 2000), globe=st.booleans())
+@example(start_s=686, globe=False)
 def test_a_monitor_that_starts_later_says_the_same(
     ship, long_records, start_s: int, globe: bool
 ) -> None:
@@ -263,6 +264,11 @@ def test_a_monitor_that_starts_later_says_the_same(
 
     assert bits(known(part)) == bits(known(whole))
     assert known(whole)
+
+
+def test_a_slow_down_is_told_that_follows_a_glide_and_even_power(long_records) -> None:
+    slowed = [one for one in long_records[0][1] if isinstance(one, NotCoastdown)]
+    assert any(2300 * S < one.start_ns - START_NS < 2340 * S for one in slowed)
 
 
 def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:

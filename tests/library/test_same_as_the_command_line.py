@@ -62,6 +62,8 @@ def test_a_diagnosis(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert json_text(found.to_dict()) == out.read_text()
     printed = capsys.readouterr().out
     assert found.summary().splitlines()[0] in printed
+    said = found.summary().splitlines()
+    assert len(set(filter(None, said))) == len([*filter(None, said)])  # nothing is said twice
     answer = json.loads(out.read_text())
     assert answer['verdict'] == found.verdict
     # what is needed to be given to the next one

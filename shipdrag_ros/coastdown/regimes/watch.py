@@ -203,9 +203,14 @@ class RegimeFilter:
         return self._setting.told_s + self._zero_s
 
     @property
+    def taken_s(self) -> int:
+        """Second since the epoch up to which the record has been taken."""
+        return self._next * self._width
+
+    @property
     def caught_up(self) -> bool:
         """Whether the record before it was woken has been taken."""
-        return self._next * self._width > self._woken
+        return self.taken_s > self._woken
 
     @property
     def _zero_s(self) -> int:
@@ -246,7 +251,7 @@ class RegimeFilter:
     @property
     def asleep(self) -> bool:
         """Whether she has been under even power for long."""
-        awake_s = self._next * self._width - self._woken
+        awake_s = self.taken_s - self._woken
         return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
 
     @property
