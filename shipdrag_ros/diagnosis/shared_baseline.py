@@ -217,6 +217,23 @@ def factor(run: Normal, others: Shared, along: Float64) -> Factor:
     )
 
 
+def tail_weight(away: Float64) -> Float64:
+    """
+    Return the precision that gives the slope of a heavy-tailed density.
+
+    A baseline may be far worse than it says.
+
+    Parameters
+    ----------
+    away : (n,)
+        From what is stated, in standard deviations.
+    """
+    log_odds = np.log(WIDER * (1.0 - WIDER_CHANCE) / WIDER_CHANCE)
+    wider = expit(0.5 * away**2 * (1.0 - WIDER**-2) - log_odds)
+    result: Float64 = 1.0 - wider * (1.0 - WIDER**-2)
+    return result
+
+
 @dataclass(frozen=True)
 class SharedBaseline:
     """
@@ -323,10 +340,8 @@ class SharedBaseline:
         """Return what runs share, with the prior of the baseline."""
         away = self.z(None) - self.mean
         weight = np.ones(len(away))
-        n = len(self.names)  # a baseline may be far worse than it says
-        log_odds = np.log(WIDER * (1.0 - WIDER_CHANCE) / WIDER_CHANCE)
-        wider = expit(0.5 * away[:n] ** 2 * (1.0 - WIDER**-2) - log_odds)
-        weight[:n] = 1.0 - wider * (1.0 - WIDER**-2)
+        n = len(self.names)
+        weight[:n] = tail_weight(away[:n])
         prior = Normal(np.diag(weight), -weight * away)
         return share(normals, prior, self.along, usual_scatter=float(self.unit[0]))
 

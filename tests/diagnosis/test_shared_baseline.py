@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
-from shipdrag_ros.diagnosis.shared_baseline import Normal, factor, share
+from shipdrag_ros.diagnosis.shared_baseline import Normal, factor, share, tail_weight
 
 ALONG = np.array([1.0, 1.0])
 PRIOR = Normal(np.eye(2) * 1e-4, np.zeros(2))
@@ -57,3 +58,14 @@ def test_a_run_that_differs_is_held_against_the_others() -> None:
     found = factor(odd, others, ALONG)
     assert found.value == pytest.approx(0.2, abs=0.03)
     assert found.away > 8.0
+
+
+@pytest.mark.parametrize('away', [-8.0, -2.5, 0.3, 1.0, 3.0, 20.0])
+def test_a_baseline_may_be_three_times_worse_than_stated_in_one_case_of_ten(away: float) -> None:
+    def log_density(z: float) -> float:
+        return float(
+            np.logaddexp(np.log(0.9) + norm.logpdf(z), np.log(0.1) + norm.logpdf(z, 0, 3))
+        )
+
+    slope = (log_density(away + 1e-5) - log_density(away - 1e-5)) / 2e-5
+    assert tail_weight(np.array([away]))[0] * away == pytest.approx(-slope, rel=1e-4)
