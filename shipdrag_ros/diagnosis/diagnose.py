@@ -336,6 +336,7 @@ def observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
+    notes += [f'{run.name}: {note}' for run in seen for note in run.notes]
     notes += [f'left out: {name}: {why}' for name, why in refused.items()]
     notes += [
         f'{run.name}: the shaft ran down in {run.context.stop.shaft_s:.2g} s, where the ship file '

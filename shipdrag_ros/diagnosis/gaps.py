@@ -43,8 +43,9 @@ def gap_of(seen: Sequence[Observation], residuals: Sequence[RunResidual]) -> Gap
         speeds.append(residual.along[after & (kind == LOG)])
         ahead = residual.along[after & (kind == POSITION)]
         if run.across is not None and len(ahead):
-            to_port = residual.rest[: len(run.across)][run.across.rows.time_s >= run.lead_in_s]
-            places.append(np.hypot(ahead, to_port))
+            when = run.along.rows.time_s[after & (kind == POSITION)]
+            to_port = residual.rest[: len(run.across)]
+            places.append(np.hypot(ahead, np.interp(when, run.across.rows.time_s, to_port)))
     whole = np.concatenate([each.whitened for each in residuals])
     return Gap(_rms(speeds), _rms(places), float(np.mean(whole**2)))
 

@@ -8,7 +8,6 @@ coastdown leaves over a fit would hold the very effect that is sought.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,46 +38,15 @@ class Measured:
     rows: Rows
     variance: Float64
 
+    @classmethod
+    def of(cls, rows: Rows, variance: Float64, times: Float64) -> Measured:
+        """
+        Find rows among the times of all rows of the observation, (m,), ascending [s].
+        """
+        return cls(np.searchsorted(times, rows.time_s), rows, variance)
+
     def __len__(self) -> int:
         return len(self.at)
-
-
-@dataclass(frozen=True)
-class CondensedRows:
-    """
-    Means of the samples of one input over times in which the motion is even.
-
-    Attributes
-    ----------
-    time_s, value, variance : (n,)
-    kind
-        Of `inference.rows.CODES`.
-    """
-
-    time_s: Float64
-    kind: int
-    value: Float64
-    variance: Float64
-
-
-def measured(parts: Sequence[CondensedRows], times: Float64) -> Measured:
-    """
-    Put parts in the order of time.
-
-    Parameters
-    ----------
-    parts
-        Of one direction.
-    times : (m,)
-        Of all rows of the observation, ascending [s].
-    """
-    time = np.concatenate([part.time_s for part in parts])
-    order = np.argsort(time, kind='stable')
-    kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
-    value = np.concatenate([part.value for part in parts])[order]
-    variance = np.concatenate([part.variance for part in parts])[order]
-    rows = Rows(time[order], kind.astype(np.int64), value)
-    return Measured(np.searchsorted(times, time[order]), rows, variance)
 
 
 def whitener_of(

@@ -9,29 +9,23 @@ hundred hold all that a run can show.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from shipdrag_ros.diagnosis.context import Context, Stop, stop_time_s
-from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, measured, whitener_of
+from shipdrag_ros.diagnosis.measured import Measured, damping_of, whitener_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
-from shipdrag_ros.estimation.steady import BIN_S, white_sd
+from shipdrag_ros.estimation.steady import BIN_S
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.learning import LEAST_S
-from shipdrag_ros.inference.rows import CODES, LOG, OUTLIER, OVER_GROUND, POSITION, bin_means
+from shipdrag_ros.inference.rows import POSITION, Rows
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.rows import FIRST_S, GROWTH, LONGEST_PART, LONGEST_S, NEIGHBOURS
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
 
-_ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as independent
-_LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
 _KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
@@ -92,6 +86,8 @@ class Observation:
         As she was in this run, without effects.
     stop_moved_s
         By how much the end of the lead-in is later than the stop was taken for at first.
+    notes
+        A sentence for each input that is left out.
     """
 
     name: str
@@ -109,6 +105,7 @@ class Observation:
     context: Context
     ship: Ship
     stop_moved_s: float = 0.0
+    notes: tuple[str, ...] = ()
 
     @property
     def stopped_ns(self) -> int:
@@ -161,35 +158,36 @@ class Observation:
         """
         run_down = RunDown.of(window, ship)
         record = RunRows.of(window, run_down, parameters)
-        if record.steady_s < LEAST_S or window.before is None:
-            raise DiagnosisError(
-                f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
-                f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
-                'that begins earlier'
-            )
+        window = _usable(window, record)
+        assert window.before is not None
+        speed_m_s = _speed(record.steady)
+        # the first mean is of as much time at most
+        first_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
+        since_ns = max(window.before.start_ns, first_ns)
         if run_down.stop_sd_s > _KNOWN_S:
             run_down = _stopped(window, run_down, record)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
-        since_ns = run_down.stop_ns + round(float(record.steady.time_s[0]) * 1e9)
-        series = {
-            input_: _joined(getattr(window.before, input_), getattr(window, input_), since_ns)
-            for input_ in record.white_sd
-        }
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
-        seconds = {
-            input_: np.asarray((found.time_ns - since_ns) * 1e-9, np.float64)
-            for input_, found in series.items()
-        }
-        heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
-        edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
-        noise_of = {name: (sd, record.display_sd[name]) for name, sd in record.white_sd.items()}
-        parts, across = _condensed_all(series, seconds, edges, noise_of, heading_rad, lead_in_s)
-        times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
-        speed = _speed(parts, lead_in_s)
+        heading_rad, heading_sd = _heading(window, since_ns, parameters)
+        halved_s = 2.0 / float(damping_of(ship, np.array([speed_m_s]))[0][0])
+
+        def rows_of(direction_rad: float, way_m_s: float) -> tuple[Rows, Float64]:
+            found = RunRows.of(window, run_down, parameters, heading_rad=direction_rad)
+            rows, variance = found.condensed(way_m_s, halved_s)
+            since_s = np.maximum(rows.time_s + lead_in_s, 0.0)  # rounding
+            return rows._replace(time_s=since_s), variance
+
+        along = rows_of(heading_rad, speed_m_s)
+        across, variance = rows_of(heading_rad + 0.5 * math.pi, 0.0)
+        placed = across.kind == POSITION
+        to_port = Rows(*(each[placed] for each in across)), variance[placed]
+        times = np.unique(np.concatenate([along[0].time_s, to_port[0].time_s]))
         shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
-        stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
+        stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s)
+        # their noise is learnt from the steady record
         margin_s = ONSET_SD_S if run_down.stop_sd_s > _KNOWN_S else 0.0
-        to_port = measured(across, times) if across else None
+        learnt = to_port[0].time_s < lead_in_s - margin_s
+        aside = Measured.of(*to_port, times) if learnt.any() else None
         return cls(
             name,
             lead_in_s,
@@ -198,16 +196,31 @@ class Observation:
             *(_stated_run_down(ship) or (run_down.shaft_s, run_down.shaft_sd_s)),
             heading_rad,
             heading_sd,
-            speed,
-            measured(parts, times),
-            to_port,
+            speed_m_s,
+            Measured.of(*along, times),
+            aside,
             np.zeros((0, 0))
-            if to_port is None
-            else whitener_of(to_port, ship, speed, lead_in_s, margin_s),
+            if aside is None
+            else whitener_of(aside, ship, speed_m_s, lead_in_s, margin_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
             stop_moved_s,
+            record.notes,
         )
+
+
+def _usable(window: Window, record: RunRows) -> Window:
+    """Return a window without the inputs that were refused, if it can be diagnosed."""
+    if record.steady_s < LEAST_S or window.before is None:
+        raise DiagnosisError(
+            f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
+            f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
+            'that begins earlier'
+        )
+    for name in window.motion:
+        if name not in record.white_sd:  # a note of the record says why
+            window = window.without(name, 'not used')
+    return window
 
 
 def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
@@ -240,91 +253,7 @@ def _joined(before: Series, after: Series, since_ns: int) -> Series:
     )
 
 
-def _edges(lead_in_s: float, end_s: float) -> Float64:
-    """Return the edges of the bins, one of them at the stop."""
-    steady = np.arange(lead_in_s, 0.0, -BIN_S)[::-1]
-    widths: list[float] = []
-    total = 0.0
-    longest = max(LONGEST_S, (end_s - lead_in_s) / LONGEST_PART)
-    while total < end_s - lead_in_s:
-        widths.append(min(FIRST_S * GROWTH ** len(widths), longest))
-        total += widths[-1]
-    return np.concatenate([[-1.0], steady, lead_in_s + np.cumsum(widths)])
-
-
-def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
-    """Say what does not stand out from its neighbours."""
-    away = np.abs(value - median_filter(value, NEIGHBOURS, mode='nearest'))
-    keep: NDArray[np.bool_] = away <= OUTLIER * max(sd, float(np.median(away)))
-    return keep
-
-
-def _condensed(
-    time_s: Float64,
-    value: Float64,
-    edges: Float64,
-    noise: tuple[float, float],
-    kind: int,
-    lead_in_s: float,
-) -> CondensedRows:
-    """
-    Return means, by the noise of a sample and what its last digit hides.
-
-    Behind a filter, and in a swell, samples err alike for seconds: what their means scatter by
-    in the steady record says how many count for one. Rounding errs alike while the signal
-    stands, and averages out as it moves on.
-    """
-    when, mean, count = bin_means(time_s, value, edges)
-    steady = time_s < lead_in_s
-    sd, display = noise
-    if kind != POSITION and steady.any():
-        evenly = np.arange(0.0, lead_in_s, _ALIKE_S)
-        _, means, counts = bin_means(time_s[steady], value[steady], evenly)
-        sd = max(sd, white_sd(means) * math.sqrt(float(np.median(counts))))
-    variance = sd**2 / count
-    if display > _LEAST_DISPLAY * sd and len(mean) > 1:
-        # both are sd of a uniform spread; as many errors are independent as digits are passed
-        moved = np.clip(np.abs(np.gradient(mean)) / math.sqrt(12.0), display, None)
-        variance += display**2 / np.minimum((moved / display) ** 2, count)
-    return CondensedRows(when, kind, mean, variance)
-
-
-def _condensed_all(
-    series: dict[str, Series],
-    seconds: dict[str, Float64],
-    edges: Float64,
-    noise_of: Mapping[str, tuple[float, float]],
-    heading_rad: float,
-    lead_in_s: float,
-) -> tuple[list[CondensedRows], list[CondensedRows]]:
-    """Return the rows along the heading, and those to port of it."""
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    along: list[CondensedRows] = []
-    across: list[CondensedRows] = []
-    for input_, found in series.items():
-        noise, time = noise_of[input_], seconds[input_]
-        sd = noise[0]
-        if input_ != 'position':
-            keep = _kept(found.value, sd)
-            along.append(
-                _condensed(time[keep], found.value[keep], edges, noise, CODES[input_], lead_in_s)
-            )
-            continue
-        east, north = (found.value - found.value[0]).T
-        ahead, to_port = cos * east + sin * north, cos * north - sin * east
-        keep = _kept(ahead, sd) & _kept(to_port, sd)
-        along.append(_condensed(time[keep], ahead[keep], edges, noise, POSITION, lead_in_s))
-        across.append(_condensed(time[keep], to_port[keep], edges, noise, POSITION, lead_in_s))
-    return along, across
-
-
-def _heading(
-    window: Window,
-    series: dict[str, Series],
-    seconds: dict[str, Float64],
-    lead_in_s: float,
-    parameters: Parameters,
-) -> tuple[float, float]:
+def _heading(window: Window, since_ns: int, parameters: Parameters) -> tuple[float, float]:
     """Return direction through water in the lead-in, and its sd: compass, or else course."""
     assert window.before is not None
     yaw = window.before.heading.value
@@ -333,23 +262,25 @@ def _heading(
         if parameters.heading_convention == 'compass':
             mean = 0.5 * math.pi - mean
         return mean, _COMPASS_SD_RAD
-    if 'position' not in series:
+    before, after = window.before.position, window.position
+    if not len(after):
         return 0.0, 0.0
-    steady = seconds['position'] < lead_in_s
-    time = seconds['position'][steady]
-    place = series['position'].value[steady]
-    slopes = [float(np.polyfit(time - time.mean(), place[:, i], 1)[0]) for i in range(2)]
+    first = int(np.searchsorted(before.time_ns, since_ns))
+    # where few are before the stop, the course after it
+    found = before if len(before) - first > 1 else after
+    first = first if found is before else 0
+    time_s = (found.time_ns[first:] - found.time_ns[-1]) * 1e-9
+    slopes = np.polyfit(time_s, found.value[first:], 1)[0]
     return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
 
 
-def _speed(parts: list[CondensedRows], lead_in_s: float) -> float:
-    for part in sorted(parts, key=lambda part: part.kind):
-        steady = part.time_s < lead_in_s
-        if steady.sum() < _LEAST_ROWS:
+def _speed(steady: Rows) -> float:
+    """Return the speed in the lead-in, by the first input that shows it."""
+    for kind in np.unique(steady.kind).tolist():
+        chosen = steady.kind == kind
+        if chosen.sum() < _LEAST_ROWS:
             continue
-        if part.kind in (LOG, OVER_GROUND):
-            return float(np.median(part.value[steady]))
-        return float(np.polyfit(part.time_s[steady], part.value[steady], 1)[0])
-    raise DiagnosisError(
-        f'{lead_in_s:.0f} s before the stop hold too few samples of any speed or position'
-    )
+        if kind != POSITION:
+            return float(np.median(steady.value[chosen]))
+        return float(np.polyfit(steady.time_s[chosen], steady.value[chosen], 1)[0])
+    raise DiagnosisError('the steady record holds too few samples of any speed or position')

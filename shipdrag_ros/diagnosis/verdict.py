@@ -251,7 +251,11 @@ def ratio_before_the_stop(seen: Observation) -> float:
     ground = rows.value[steady & (rows.kind == OVER_GROUND)]
     if not len(ground):
         placed = steady & (rows.kind == POSITION)
-        ground = np.diff(rows.value[placed]) / np.diff(rows.time_s[placed])
+        half = int(placed.sum()) // 2  # far apart, where the noise of places is nothing
+        time_s, place = rows.time_s[placed], rows.value[placed]
+        ground = (
+            (place[-half:] - place[:half]) / (time_s[-half:] - time_s[:half]) if half else ground
+        )
     if not len(of_log) or not len(ground) or not np.median(ground) > 0.0:
         return float('nan')
     return float(np.median(of_log) / np.median(ground))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -13,18 +14,22 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.steady import (
-    condense,
+    BIN_S,
     display_sd,
+    steady_means,
     steady_since,
     weighted_white_sd,
 )
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64, Int64
 
 LEAST_STAMPS = 12  # of an input: fewer do not show its noise
+_ALIKE_S = 12.0  # beyond which such errors are as good as independent
+_LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 _WeightedRows = tuple[Float64, int, Float64, Float64]
 
@@ -60,9 +65,26 @@ class RunRows:
     notes: tuple[str, ...]
 
     @classmethod
-    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> RunRows:
+    def of(
+        cls,
+        window: Window,
+        run_down: RunDown,
+        parameters: Parameters,
+        *,
+        heading_rad: float | None = None,
+    ) -> RunRows:
         """
         Take what a window offers.
+
+        Parameters
+        ----------
+        window
+        run_down
+            Its stop is time 0.
+        parameters
+            The known standard deviations are used.
+        heading_rad
+            Along which positions count, from east; None: along their track.
 
         Raises
         ------
@@ -90,7 +112,9 @@ class RunRows:
         each_input, refused = {}, {}
         for name in inputs:
             try:
-                each_input[name] = _condensed(name, window, zero_ns, since, known[name])
+                each_input[name] = _condensed(
+                    name, window, zero_ns, since, known[name], heading_rad
+                )
             except EstimationError as error:
                 refused[name] = error
         if not each_input:
@@ -111,25 +135,41 @@ class RunRows:
         """Length of the steady record [s]."""
         return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
 
-    def variance(self, rows: Rows, weight: Float64) -> Float64:
-        """
-        Return the variance of the white noise of rows that are worth so many samples.
-        """
+    def _variance(self, rows: Rows, weight: Float64) -> Float64:
+        """Return that of the white noise of rows that are worth so many samples."""
         of_kind = np.zeros(len(CODES))
         for name, sd in self.white_sd.items():
             of_kind[CODES[name]] = sd**2
         result: Float64 = of_kind[rows.kind] / weight
         return result
 
-    def steady_variance(self) -> Float64:
+    def condensed(
+        self, speed_m_s: float, halved_s: float, *, quick: bool = False
+    ) -> tuple[Rows, Float64]:
         """
-        Return that of the steady rows, with what the display hides from their means.
+        Return all rows as means, and the variance of their white noise.
+
+        Parameters
+        ----------
+        speed_m_s, halved_s
+            At the stop, and the time in which it halves, roughly.
+        quick
+            Whether fewer means will do.
         """
-        of_kind = np.zeros(len(CODES))
-        for name, sd in self.display_sd.items():
-            of_kind[CODES[name]] = sd**2
-        result: Float64 = self.variance(self.steady, self.steady_weight)
-        return result + of_kind[self.steady.kind]
+        white = self._variance(self.coast, self.coast_weight)
+        coast, after = condense(self.coast, white, speed_m_s, halved_s, quick=quick)
+        rows = Rows(*(np.concatenate([a, b]) for a, b in zip(self.steady, coast)))
+        before = self._variance(self.steady, self.steady_weight)
+        variance: Float64 = np.concatenate([before, after])
+        for name, hidden in self.display_sd.items():
+            own = rows.kind == CODES[name]
+            if hidden > _LEAST_DISPLAY * self.white_sd[name] and own.sum() > 1:
+                # rounding errs alike while a speed stays on one digit; as many errors are
+                # independent as digits are passed
+                count = self.white_sd[name] ** 2 / variance[own]
+                passed = np.abs(np.gradient(rows.value[own])) / math.sqrt(12.0) / hidden
+                variance[own] += hidden**2 / np.clip(passed**2, 1.0, np.maximum(count, 1.0))
+        return rows, variance
 
 
 class _InputRows(NamedTuple):
@@ -142,7 +182,12 @@ class _InputRows(NamedTuple):
 
 
 def _condensed(
-    name: str, window: Window, zero_ns: int, since_s: float, known_sd: float
+    name: str,
+    window: Window,
+    zero_ns: int,
+    since_s: float,
+    known_sd: float,
+    heading_rad: float | None,
 ) -> _InputRows:
     """Take one input as it is from the stop on, and as means from `since_s` up to it."""
     series = window.series(name)
@@ -157,16 +202,32 @@ def _condensed(
     both_s = np.concatenate([before_s, time_s])
     both = np.concatenate([before, value])
     if _is_place(name):
-        both = _distance(both_s, both)
+        both = _distance(both_s, both) if heading_rad is None else _ahead(both, heading_rad)
     before, value = both[: len(before_s)], both[len(before_s) :]
     weight = stated_weight(both_s, both, np.concatenate([variance, series.variance]))
-    white_sd = known_sd or max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
+    white_sd = max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
     steady: _WeightedRows | None = None
     if len(before_s):
-        means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
-        steady = (means[0], CODES[name], *means[1:])
+        own, rate = weight[: len(before_s)], 0.0
+        if _is_place(name):
+            rate = _rate(before_s, before)
+        else:
+            # behind a filter, and in a swell, readings err alike for seconds
+            _, each, total = steady_means(before_s, before, own, _ALIKE_S, 0.0)
+            white_sd = max(white_sd, weighted_white_sd(each, total))
+        at_s, mean, count = steady_means(before_s, before - rate * before_s, own, BIN_S, _FINE_S)
+        steady = (at_s, CODES[name], mean + rate * at_s, count)
+    white_sd = known_sd or white_sd
     coast = (time_s, CODES[name], value, weight[len(before_s) :])
     return _InputRows(coast, steady, white_sd, display_sd(series.value, white_sd))
+
+
+def _rate(time_s: Float64, value: Float64) -> float:
+    """Return how fast a value changes, by the median of its halves."""
+    half = len(value) // 2
+    if not half:
+        return 0.0
+    return float(np.median((value[half:] - value[:-half]) / (time_s[half:] - time_s[:-half])))
 
 
 def _is_place(name: str) -> bool:
@@ -230,6 +291,11 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
 def _distance(time_s: Float64, position: Float64) -> Float64:
     scale = 0.5 * float(np.ptp(time_s))
     return along_track((time_s - time_s[0]) / scale - 1.0, position)
+
+
+def _ahead(position: Float64, heading_rad: float) -> Float64:
+    result: Float64 = (position - position[0]) @ [math.cos(heading_rad), math.sin(heading_rad)]
+    return result
 
 
 _ORDER = 12  # of the polynomial that stands for the motion

@@ -146,16 +146,17 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
 
 
 @compiled
-def condense(
-    time_s: Float64, value: Float64, weight: Float64, fine_s: float
+def steady_means(
+    time_s: Float64, value: Float64, weight: Float64, bin_s: float, fine_s: float
 ) -> tuple[Float64, Float64, Float64]:
     """
-    Return means over `BIN_S` of a record that is steady or moves evenly.
+    Return means over `bin_s` of a record that is steady.
 
     Parameters
     ----------
     time_s, value, weight : (n,)
         n >= 1; the weight is 1 for a sample that is as good as most.
+    bin_s
     fine_s
         At the end of the record means are over `FINE_S` for so long: the stop
         may have been earlier than it was taken for.
@@ -178,7 +179,7 @@ def condense(
         split = np.searchsorted(time_s, time_s[-1] - fine_s)
     edges = np.zeros(1, np.int64)
     if split > 0:
-        edges = _parts(time_s[:split], BIN_S)
+        edges = _parts(time_s[:split], bin_s)
     if split < len(time_s):
         edges = np.concatenate((edges, split + _parts(time_s[split:], FINE_S)[1:]))
     bins = len(edges) - 1

@@ -38,7 +38,10 @@ _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # 
 _PORT, _HEADING = EXTRAS, EXTRAS + 1  # behind the extras: place to port, and first heading
 _FREE = EXTRAS + 2  # shaft speed of a propeller that the water turns
 _SCATTER = EXTRAS + 3  # of the resistance from run to run
-_LOCAL = EXTRAS + 4
+_AIR = EXTRAS + 4, EXTRAS + 5  # that is light, to the east and to the north
+_LOCAL = EXTRAS + 6
+_OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
+_STEP_M_S = 0.1  # of differences
 _NOTHING = Action()
 
 
@@ -268,7 +271,7 @@ class ShipRuns:
         """Where a search begins: the baseline as it is stated."""
         found = np.zeros(self.size)
         for run, place in zip(self.runs, self.places):
-            found[place[:-4]] = run.model.start
+            found[place[_OF_MOTION]] = run.model.start
             found[place[self.coefficients + _FREE]] = priors.FREE_SHAFT.mean
         found[: self.coefficients] = 0.0
         return found
@@ -348,19 +351,23 @@ class ShipRuns:
         mean, precision = np.zeros(self.size), np.ones(self.size)
         k = self.coefficients
         for run, place in zip(self.runs, self.places):
-            own = run.model.families
-            alike = [each for each in own if each.name == name] or own
+            all_ = run.model.families
+            alike = [each for each in all_ if each.name == name] or all_
             family = alike[number % len(alike)]  # a run without a log has fewer
-            mean[place[k:-4]], precision[place[k:-4]] = family.mean[k:], family.precision[k:]
+            own = place[_OF_MOTION][k:]
+            mean[own], precision[own] = family.mean[k:], family.precision[k:]
             mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
             precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0
             mean[place[k + motion.STOP]] = run.stop_s
             precision[place[k + _PORT]] = 1e-6  # of where she was, nothing is known
             precision[place[k + _HEADING]] = max(run.heading_sd_rad, EXACT) ** -2.0
             precision[place[k + _SCATTER]] = max(run.scatter, EXACT) ** -2.0
+            calm = priors.sheltered(run.model.speed_m_s)
+            for i in _AIR:
+                precision[place[k + i]] = (calm * priors.LIGHT_AIR.sd) ** -2.0
             at = place[k + motion.CURRENT]
             if precision[at] < 1e10:
-                precision[at] = priors.CALM_CURRENT.sd**-2.0
+                precision[at] = (calm * priors.CALM_CURRENT.sd) ** -2.0
         return mean, precision
 
     def linearise(
@@ -394,13 +401,14 @@ class ShipRuns:
         run = self.runs[j]
         still, speed = self.still(j, at)
         z = at[self.size : self.size + len(hypothesis.unknowns)]
-        actions = hypothesis.actions(run.frame, j, z)
+        air = self.air(at)
+        actions = [*hypothesis.actions(run.frame, j, z), air]
         whole = sum(actions, still)
         steps = []
         for i in range(len(z)):
             stepped = z.copy()
             stepped[i] += _STEP_Z
-            more = sum(hypothesis.actions(run.frame, j, stepped), still)
+            more = sum(hypothesis.actions(run.frame, j, stepped), still + air)
             steps.append(batch.add(more, speed))
         without = [
             batch.add(sum((a for i, a in enumerate(actions) if i != form), still), speed)
@@ -408,7 +416,14 @@ class ShipRuns:
         ]
         base, acting = batch.add(still, speed), batch.add(whole, speed)
         turned = batch.add(whole + Action(free_shaft=_STEP_Z), speed)
-        return _Places(base, acting, steps, without, turned, sum(actions, _NOTHING))
+        winds = (_STEP_M_S, 0.0), (0.0, _STEP_M_S)
+        blown = [batch.add(whole + Action(wind_m_s=wind), speed) for wind in winds]
+        return _Places(base, acting, steps, without, turned, blown, sum(actions, _NOTHING))
+
+    def air(self, at: Float64) -> Action:
+        """Return what light air does that blows in every hypothesis."""
+        east, north = (float(at[self.places[0][self.coefficients + i]]) for i in _AIR)
+        return Action(wind_m_s=(east, north))
 
     def still(self, j: int, at: Float64) -> tuple[Action, float]:
         """Return what acts in a run without effects, and her steady speed."""
@@ -422,15 +437,13 @@ class ShipRuns:
         self, j: int, hypothesis: Explanation, at: Float64, plan: _Places, shown: SimulatedRows
     ) -> RunTable | None:
         run, model, place, k = self.runs[j], self.runs[j].model, self.places[j], self.coefficients
-        own, q = at[place[:-4]], len(hypothesis.unknowns)
+        own, q = at[place[_OF_MOTION]], len(hypothesis.unknowns)
         rows, n = model.rows, len(model.rows.time_s)
         residual, speed = motion.predict(model.forces, own, model.grid_s, rows)
-        forces = model.forces
-        if hypothesis.ways:
-            forces = _with(forces, plan.action, run.frame, self.runs[j])
+        forces = _with(model.forces, plan.action, run.frame, self.runs[j])
+        table = residual
+        if forces is not model.forces:
             table, speed = motion.predict(forces, own, model.grid_s, rows)
-        else:
-            table = residual
         extra = len(hypothesis.forms) * _FORMS
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
@@ -449,6 +462,9 @@ class ShipRuns:
         for i, column in enumerate(plan.steps):
             along[first + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_Z
             rest[first + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
+        for i, column in zip(_AIR, plan.blown):
+            along[1 + k + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_M_S
+            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_M_S
         rest[1 + k + _FREE] = (shown.rest[plan.turned] - shown.rest[plan.acting]) / _STEP_Z
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
@@ -482,7 +498,7 @@ class ShipRuns:
         """
         Return columns (6, n) of something smooth in a run, of unit relative size.
         """
-        return self._smooth(j, where, self.runs[j].model.forces, at[self.places[j][:-4]])
+        return self._smooth(j, where, self.runs[j].model.forces, at[self.places[j][_OF_MOTION]])
 
     def _smooth(self, j: int, where: str, forces: motion.Forces, own: Float64) -> Float64:
         run = self.runs[j]
@@ -514,6 +530,7 @@ class _Places(NamedTuple):
     steps: list[int]
     without: list[int]
     turned: int
+    blown: list[int]
     action: Action
 
 

@@ -177,9 +177,21 @@ FREE_SHAFT = Declared(
     '',
     'four-quadrant open-water data of B4-70',
 )
-SHELTERED_M_S = 5.0
-"""Below it current and wind are weaker, with the square of the speed: slow craft are tried in
-basins."""
+_SHELTERED_M_S = 5.0
+
+
+def sheltered(speed_m_s: float) -> float:
+    """
+    Return by how much current and wind are weaker, 0 .. 1: slow craft are tried in basins.
+
+    Parameters
+    ----------
+    speed_m_s
+        At the stop.
+    """
+    return min(1.0, speed_m_s / _SHELTERED_M_S) ** 2
+
+
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15)

@@ -244,8 +244,7 @@ def _extras(
             shape = priors.RUN_DOWN_SHAPE.sd
             sd[motion.TAU] = math.hypot(shape, stop.run_down_sd_s / stop.run_down_s)
     if any(code % KIND_COUNT != LOG for code in kinds):
-        sheltered = min(1.0, mean[motion.SPEED] / priors.SHELTERED_M_S)
-        sd[motion.CURRENT] = priors.CURRENT.sd * sheltered**2
+        sd[motion.CURRENT] = priors.CURRENT.sd * priors.sheltered(mean[motion.SPEED])
     for code in kinds:
         own = motion.own(code)
         if code % KIND_COUNT == POSITION:

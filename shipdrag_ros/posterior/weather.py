@@ -214,7 +214,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
     effect = _of('wind_apparent')
     blows = _chance(priors.WINDY.mean, effect, ship)
     z, weight = _nodes(3, 5, 3)
-    sheltered = min(1.0, float(speed[-1]) / ABOVE / priors.SHELTERED_M_S) ** 2
+    sheltered = priors.sheltered(float(speed[-1]) / ABOVE)
     light = priors.LIGHT_AIR.sd
     ensembles = []
     for chance, sds in (

@@ -10,16 +10,19 @@ import pytest
 
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.observation import Observation, _condensed
-from shipdrag_ros.estimation.steady import display_sd, white_sd
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.run_down import RunDown
+from shipdrag_ros.estimation.steady import white_sd
+from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import NONE, Names
-from shipdrag_ros.inference.rows import LOG
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 
 SHIP = Ship.example()
 LEAD_IN_S = 1200.0
-EDGES = np.arange(0.0, LEAD_IN_S + 301.0, 6.0)
 
 
 def steady(seed: int, lag_s: float) -> tuple[Float64, Float64]:
@@ -43,33 +46,49 @@ def test_the_filter_of_a_log_is_no_effect(seen_of: Callable[..., Observation]) -
     assert probability('log_lag=60')['log_lag',] > 0.9
 
 
+def test_light_air_is_no_wind(seen_of: Callable[..., Observation]) -> None:
+    def windy(effect: str) -> float:
+        found = compare((seen_of(effect),), SHIP, Facts(SHIP)).compare().probability
+        return sum(each for names, each in found.items() if 'wind' in names)
+
+    assert windy('wind=1.5') < 0.1
+    assert windy('wind=12') > 0.6
+
+
+def rows_of(time: Float64, value: Float64) -> tuple[Rows, Float64]:
+    """Condense a log that is read until the stop and beyond; times count from it."""
+    block = Block.of(Channel.SPEED_THROUGH_WATER, np.round(time * 1e9).astype(np.int64), value)
+    window = Window.from_block(block, round(LEAD_IN_S * 1e9), round(time[-1] * 1e9), before_ns=0)
+    record = RunRows.of(window, RunDown.of(window, SHIP), Parameters())
+    return record.condensed(7.0, np.inf)
+
+
 def test_noise_behind_a_filter_is_that_of_its_means() -> None:
     # N = 4, seeds 0..3: samples err alike for 4 s, which their neighbours do not show
     for seed in range(4):
         time, value = steady(seed, 4.0)
-        of_sample = white_sd(value)
-        rows = _condensed(time, 7.0 + value, EDGES, (of_sample, 0.0), LOG, LEAD_IN_S)
-        scatter = np.var(rows.value)
-        assert 0.5 < np.median(rows.variance) / scatter < 2.0
-        assert of_sample**2 / 30.0 < 0.1 * scatter
+        rows, variance = rows_of(time, 7.0 + value)
+        late = rows.time_s > 0.0  # over longer means it is noise that wanders, which is learnt
+        assert 0.3 < np.mean((rows.value - 7.0)[late] ** 2 / variance[late]) < 2.0
+        assert white_sd(value) ** 2 / 30.0 < 0.1 * np.var(rows.value)
 
 
 def test_white_noise_stays_as_it_is() -> None:
     rng = np.random.default_rng(5)
     time = np.arange(0.5, LEAD_IN_S + 300.0)
-    value = 7.0 + 0.05 * rng.standard_normal(len(time))
-    rows = _condensed(time, value, EDGES, (0.05, 0.0), LOG, LEAD_IN_S)
-    assert np.median(rows.variance) == pytest.approx(0.05**2 / 6.0, rel=0.5)
+    rows, variance = rows_of(time, 7.0 + 0.05 * rng.standard_normal(len(time)))
+    # a mean of so many readings, 30 of which are in one of the steady record
+    assert variance[10] == pytest.approx(0.05**2 / 30.0, rel=0.5)
+    assert 0.5 < np.mean((rows.value - 7.0) ** 2 / variance) < 1.5
 
 
 def test_a_coarse_display_hides_more_while_the_speed_stands() -> None:
     time = np.arange(0.1, LEAD_IN_S + 300.0, 0.2)
     true = 3.02 - 0.01 * np.maximum(time - LEAD_IN_S, 0.0)
     shown = 0.05 * np.round(true / 0.05)
-    noise = (white_sd(shown), display_sd(shown[time > LEAD_IN_S], white_sd(shown)))
-    rows = _condensed(time, shown, EDGES, noise, LOG, LEAD_IN_S)
-    error = np.abs(rows.value - np.interp(rows.time_s, time, true))
-    assert (error < 3.0 * np.sqrt(rows.variance)).all()
-    before, after = rows.time_s < LEAD_IN_S - 20.0, rows.time_s > LEAD_IN_S + 20.0
-    assert np.sqrt(rows.variance[before]).min() > 0.01
-    assert np.median(rows.variance[after]) < np.median(rows.variance[before])
+    rows, variance = rows_of(time, shown)
+    error = np.abs(rows.value - np.interp(rows.time_s + LEAD_IN_S, time, true))
+    assert (error < 3.0 * np.sqrt(variance)).all()
+    before, after = rows.time_s < -20.0, rows.time_s > 20.0
+    assert np.sqrt(variance[before]).min() > 0.01
+    assert np.median(variance[after]) < np.median(variance[before])

@@ -34,7 +34,7 @@ def test_an_observation_is_condensed_and_knows_the_stop(seen: Observation) -> No
     assert seen.heading_rad == pytest.approx(0.7, abs=0.01)
     # it ends with the last whole bin
     assert seen.duration_s == pytest.approx(1200.0, abs=15.0)
-    assert 1100.0 < seen.lead_in_s <= 1200.0
+    assert 1100.0 < seen.lead_in_s < 1200.5
     assert seen.speed_m_s == pytest.approx(8.0, abs=0.05)
     assert len(seen.along) < 500
     assert set(seen.along.rows.kind.tolist()) == {0, 1, 2}

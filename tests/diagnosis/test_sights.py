@@ -5,13 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
+from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.sights import sight
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.inference.decision import NONE
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
+from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 
 
 def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(
@@ -26,3 +34,47 @@ def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(
             assert family.mean[at] == pytest.approx(slow.speed_m_s)
             assert family.precision[at] == pytest.approx((0.3 * slow.speed_m_s) ** -2)
     assert alone.law.speed_m_s[-1] < fast.speed_m_s < beside.law.speed_m_s[-1]
+
+
+LEAD_IN_S = 900.0
+
+
+def window_of(
+    ship: Ship, *inputs: str, late_s: float = 0.0, every_s: int = 1, since_s: float = 0.0
+) -> Window:
+    """Cut a run of given inputs; positions every so often, from some time on."""
+    scenario = Scenario(speed_m_s=6.0, lead_in_s=LEAD_IN_S, duration_s=1200.0, heading_rad=1.2)
+    block = sense(simulate(ship, scenario), standard_sensors(inputs=inputs), seed=3)
+    after_s = (block.stamp_ns - START_NS) * 1e-9
+    placed = block.channel == Channel.POSITION
+    block = block[~placed | ((after_s >= since_s) & (np.round(after_s) % every_s == 0.0))]
+    stop_ns = START_NS + round((LEAD_IN_S + late_s) * 1e9)
+    return Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=START_NS)
+
+
+@pytest.mark.parametrize(
+    ('inputs', 'how'),
+    [
+        (('position',), {}),
+        (('speed_through_water', 'position'), {'every_s': 60}),
+        (('speed_through_water', 'position'), {'since_s': LEAD_IN_S}),
+        (('speed_through_water', 'position'), {'late_s': 30.0}),
+        (('speed_through_water', 'position'), {'late_s': -30.0}),
+    ],
+    ids=['positions alone', 'a position a minute', 'positions from the stop on', 'late', 'early'],
+)
+def test_nothing_is_missing_whatever_is_measured_and_whoever_dates_the_stop(
+    cargo: Ship, inputs: tuple[str, ...], how: dict[str, Any]
+) -> None:
+    window = window_of(cargo, *inputs, **how)
+    found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
+    assert {each.names: each.probability for each in found.candidates}[NONE] > 0.6
+    assert found.before is not None
+    assert found.before.chi2_per_sample < 1.5
+
+
+def test_no_position_is_lost_at_either_end_of_the_lead(cargo: Ship) -> None:
+    seen = Observation.of(window_of(cargo, 'position'), cargo, Parameters(), name='run')
+    steady = seen.along.rows.time_s < seen.lead_in_s
+    assert seen.along.rows.time_s[0] < 31.0
+    assert seen.along.rows.time_s[steady][-1] > seen.lead_in_s - 6.0

@@ -27,7 +27,6 @@ from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
-from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -141,14 +140,12 @@ def estimate(
     record = RunRows.of(window, run_down, parameters)
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
-    white = record.variance(record.coast, record.coast_weight)
-    coast, variance = condense(record.coast, white, guess.speed_m_s, halved_s, quick=quick)
-    steady = record.steady
+    rows, variance = record.condensed(guess.speed_m_s, halved_s, quick=quick)
     weather = _weather(window, run_down, guess.seen)
     problem = RunModel.of(
-        Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
-        np.concatenate([record.steady_variance(), variance]),
-        len(steady.time_s),
+        rows,
+        variance,
+        len(record.steady.time_s),
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s),
         speed_m_s=guess.speed_m_s,
