@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.context import Context, Stop, stop_time_s
+from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.measured import Measured, damping_of, whitener_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
@@ -28,7 +28,6 @@ from shipdrag_ros.ship import Fact, Ship
 
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
-_KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
 
 
 @dataclass(frozen=True)
@@ -164,8 +163,6 @@ class Observation:
         # the first mean is of as much time at most
         first_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
         since_ns = max(window.before.start_ns, first_ns)
-        if run_down.stop_sd_s > _KNOWN_S:
-            run_down = _stopped(window, run_down, record)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
         heading_rad, heading_sd = _heading(window, since_ns, parameters)
@@ -185,8 +182,7 @@ class Observation:
         shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s)
         # their noise is learnt from the steady record
-        margin_s = ONSET_SD_S if run_down.stop_sd_s > _KNOWN_S else 0.0
-        learnt = to_port[0].time_s < lead_in_s - margin_s
+        learnt = to_port[0].time_s < lead_in_s - run_down.stop_sd_s
         aside = Measured.of(*to_port, times) if learnt.any() else None
         return cls(
             name,
@@ -201,7 +197,7 @@ class Observation:
             aside,
             np.zeros((0, 0))
             if aside is None
-            else whitener_of(aside, ship, speed_m_s, lead_in_s, margin_s),
+            else whitener_of(aside, ship, speed_m_s, lead_in_s, run_down.stop_sd_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
             stop_moved_s,
@@ -226,22 +222,6 @@ def _usable(window: Window, record: RunRows) -> Window:
 def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
     """Return the run-down of the thrust and its sd, where the ship file states it."""
     return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
-
-
-def _stopped(window: Window, run_down: RunDown, record: RunRows) -> RunDown:
-    """Move the stop to where the speed begins to fall, if there is a speed."""
-    assert window.before is not None
-    for input_ in ('speed_through_water', 'speed_over_ground'):
-        if input_ in record.white_sd:
-            both = _joined(getattr(window.before, input_), getattr(window, input_), 0)
-            stop_s = stop_time_s(
-                np.asarray((both.time_ns - run_down.stop_ns) * 1e-9, np.float64),
-                both.value,
-                sd_m_s=record.white_sd[input_],
-                run_down_s=run_down.shaft_s,
-            )
-            return replace(run_down, stop_ns=run_down.stop_ns + round(stop_s * 1e9))
-    return run_down
 
 
 def _joined(before: Series, after: Series, since_ns: int) -> Series:

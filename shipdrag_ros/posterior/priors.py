@@ -194,7 +194,7 @@ def sheltered(speed_m_s: float) -> float:
 
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
-SMOOTH_SIZES = (0.015, 0.05, 0.15)
+SMOOTH_SIZES = (0.015, 0.05, 0.15, 0.5, 1.5)
 """Points of its size in time, relative to r or to the speed, all alike."""
 SMALL_COMPONENTS = 0.25
 """Size of the components of a weak current or wind, which is as probable as a usual one."""
