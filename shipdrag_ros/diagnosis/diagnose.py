@@ -38,6 +38,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
+from shipdrag_ros.simulation.effect import Effect
 from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
@@ -248,8 +249,7 @@ def compare(
         before = 0.0 if earlier is None else earlier.log_weight(hypothesis)
         return facts.log_likelihood(hypothesis) + before
 
-    own = effects_of(seen[0].ship).values()
-    effects = [effect for effect in own if not effect.missing(seen[0].ship)]
+    effects = effects_about(seen)
     since_ns = [run.context.stop.since_ns for run in seen]
     chance = _OTHER_DAYS if max(since_ns) - min(since_ns) > _DAY_NS else _ONE_DAY
     return Comparing(
@@ -260,6 +260,16 @@ def compare(
         () if earlier is None else earlier.ways(effects),
         math.log(chance),
     )
+
+
+def effects_about(seen: Sequence[Observation]) -> list[Effect]:
+    """Return the effects that her ship file and the instruments of her runs can show."""
+    ship, read = seen[0].ship, {name for run in seen for name in run.inputs}
+    return [
+        effect
+        for effect in effects_of(ship).values()
+        if not effect.missing(ship) and (not effect.errs_in or read.intersection(effect.errs_in))
+    ]
 
 
 def stated_in(

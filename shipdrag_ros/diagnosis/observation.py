@@ -19,9 +19,9 @@ from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.steady import BIN_S
-from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S
-from shipdrag_ros.inference.rows import POSITION, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, POSITION, Input, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
@@ -116,6 +116,11 @@ class Observation:
         """Length of the coastdown."""
         return float(self.time_s[-1]) - self.lead_in_s
 
+    @property
+    def inputs(self) -> set[str]:
+        """Kinds of input of motion that were read."""
+        return {Input(code % KIND_COUNT).key for code in np.unique(self.along.rows.kind).tolist()}
+
     @classmethod
     def of(
         cls,
@@ -155,6 +160,7 @@ class Observation:
         EstimationError
             If no input has enough samples.
         """
+        window = window.by_rep103(parameters.heading_convention)
         run_down = RunDown.of(window, ship)
         record = RunRows.of(window, run_down, parameters)
         window = _usable(window, record)
@@ -165,7 +171,7 @@ class Observation:
         since_ns = max(window.before.start_ns, first_ns)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
-        heading_rad, heading_sd = _heading(window, since_ns, parameters)
+        heading_rad, heading_sd = _heading(window, since_ns)
         halved_s = 2.0 / float(damping_of(ship, np.array([speed_m_s]))[0][0])
 
         def rows_of(direction_rad: float, way_m_s: float) -> tuple[Rows, Float64]:
@@ -224,23 +230,12 @@ def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
     return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
 
 
-def _joined(before: Series, after: Series, since_ns: int) -> Series:
-    first = int(np.searchsorted(before.time_ns, since_ns))
-    return Series(
-        np.concatenate([before.time_ns[first:], after.time_ns]),
-        np.concatenate([before.value[first:], after.value]),
-        np.concatenate([before.variance[first:], after.variance]),
-    )
-
-
-def _heading(window: Window, since_ns: int, parameters: Parameters) -> tuple[float, float]:
+def _heading(window: Window, since_ns: int) -> tuple[float, float]:
     """Return direction through water in the lead-in, and its sd: compass, or else course."""
     assert window.before is not None
     yaw = window.before.heading.value
     if len(yaw):
         mean = math.atan2(float(np.sin(yaw).mean()), float(np.cos(yaw).mean()))
-        if parameters.heading_convention == 'compass':
-            mean = 0.5 * math.pi - mean
         return mean, _COMPASS_SD_RAD
     before, after = window.before.position, window.position
     if not len(after):

@@ -178,6 +178,16 @@ class Window:
         before = None if self.before is None else alone(self.before)
         return replace(alone(self), before=before, notes=(*self.notes, *notes))
 
+    def by_rep103(self, heading_convention: str) -> Window:
+        """
+        Return the same with yaw from east, anticlockwise, of whatever convention it was sent in.
+        """
+        if heading_convention != 'compass':
+            return self
+        before = None if self.before is None else self.before.by_rep103(heading_convention)
+        yaw = replace(self.heading, value=0.5 * np.pi - self.heading.value)
+        return replace(self, heading=yaw, before=before)
+
     @property
     def motion(self) -> tuple[str, ...]:
         """Inputs that show how the ship moves: the first of each kind, and others heard."""

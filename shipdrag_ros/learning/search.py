@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.diagnose import moved_stops, observed, stated_in
+from shipdrag_ros.diagnosis.diagnose import effects_about, moved_stops, observed, stated_in
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import inverse_of
@@ -35,7 +35,6 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.declared import TermParameter
 from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
-from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
 _FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds first
@@ -238,7 +237,7 @@ def _comparing(
     library: bool,
 ) -> Comparing:
     """Return a comparison of forms, beside the library or not."""
-    own = [e for e in effects_of(ship).values() if not e.missing(ship)] if library else []
+    own = effects_about(seen) if library else []
     effects = [*own, *(each[0].effect for each in ways.values())]
     known = stated_in(runs, seen, ship).log_likelihood
     comparing = Comparing(ship_runs(seen, ship), ship, effects, known)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.diagnose import effects_about
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.sights import sight
 from shipdrag_ros.estimation import Window
@@ -78,3 +79,25 @@ def test_no_position_is_lost_at_either_end_of_the_lead(cargo: Ship) -> None:
     steady = seen.along.rows.time_s < seen.lead_in_s
     assert seen.along.rows.time_s[0] < 31.0
     assert seen.along.rows.time_s[steady][-1] > seen.lead_in_s - 6.0
+
+
+def test_a_compass_says_what_yaw_from_east_says(cargo: Ship) -> None:
+    def turned(window: Window) -> Window:
+        yaw = replace(window.heading, value=0.5 * np.pi - window.heading.value)
+        return replace(window, heading=yaw, before=window.before and turned(window.before))
+
+    window = window_of(cargo, 'speed_through_water', 'heading')
+    by_yaw = Observation.of(window, cargo, Parameters(), name='run')
+    parameters = Parameters(heading_convention='compass')
+    by_compass = Observation.of(turned(window), cargo, parameters, name='run')
+    assert len(by_yaw.context.at_yaw) > 10
+    assert by_compass.heading_rad == pytest.approx(by_yaw.heading_rad, abs=1e-9)
+    np.testing.assert_allclose(by_compass.context.value, by_yaw.context.value, atol=1e-9)
+
+
+@pytest.mark.parametrize('input_', ['position', 'speed_through_water'])
+def test_an_instrument_that_was_not_read_is_no_explanation(cargo: Ship, input_: str) -> None:
+    seen = Observation.of(window_of(cargo, input_), cargo, Parameters(), name='run')
+    names = {effect.name for effect in effects_about([seen])}
+    assert {'fouling', 'current'} <= names
+    assert ('log_scale' in names) == ('radar_scale' not in names) == (input_ != 'position')
