@@ -128,7 +128,7 @@ def test_without_a_stated_baseline_r_is_written_as_a_table() -> None:
 
 
 def test_fouling_that_the_stated_baseline_hides_is_seen_against_the_learnt_one() -> None:
-    fouled = [coast(scaled(*TRUE), 'fouling=0.12', seed=77)]
+    fouled = [coast(scaled(*TRUE), 'fouling=0.15', seed=77)]
     assert diagnose(fouled, SHIP, PARAMETERS).candidates[0].names == ()
     found = diagnose(fouled, learnt(5).ship, PARAMETERS)
     assert found.candidates[0].names
@@ -137,15 +137,16 @@ def test_fouling_that_the_stated_baseline_hides_is_seen_against_the_learnt_one()
 
 
 def test_runs_that_scatter_raise_no_alarm_against_the_learnt_baseline() -> None:
-    pair = [
-        coast(scaled(*(1.025 * TRUE)), seed=78),
-        coast(scaled(*(0.975 * TRUE)), seed=79, heading_rad=0.3 + math.pi),
+    # light air explains one more each way, but not two
+    runs = [
+        coast(scaled(*((1.0 + part) * TRUE)), seed=seed, heading_rad=0.3 + math.pi * (seed >= 80))
+        for seed, part in zip(range(78, 82), (0.02, -0.02, 0.02, -0.02), strict=True)
     ]
     found = learnt(5).ship
     assert found.baseline is not None
     without = replace(found, baseline=replace(found.baseline, run_scatter=0.0))
-    assert diagnose(pair, found, PARAMETERS).nothing > 0.3
-    assert diagnose(pair, without, PARAMETERS).nothing < 0.1
+    assert diagnose(runs, found, PARAMETERS, advise=False).nothing > 0.3
+    assert diagnose(runs, without, PARAMETERS, advise=False).nothing < 0.1
 
 
 def test_what_is_stated_of_friction_and_wave_together_counts() -> None:
