@@ -453,11 +453,13 @@ def format_of(source: Path, options: Mapping[str, Any]) -> Format:
         If it is of none that is known, or a bag that needs no import.
     """
     known = formats.found()
-    asked = next((each for each in known if each.chosen_by in options), None)
+    for each in known:
+        if each.chosen_by in options:
+            return each
     head = head_of(source)
     if head.raw.startswith(MAGIC) or (source.is_dir() and any(source.glob('*.mcap'))):
         raise ImportDataError(f'{str(source)!r} is a bag already: `shipdrag replay` takes it')
-    return asked or best_of(known, head)
+    return best_of(known, head)
 
 
 def job_of(declared: Format, source: Path, options: Mapping[str, Any]) -> Job:
