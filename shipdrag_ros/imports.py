@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Imports: quick ones, and those that an extra of the package brings."""
+"""Imports: quick ones, those that an extra of the package brings, and those of other packages."""
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
+from typing import TypeVar
+
+_T = TypeVar('_T')
 
 EXTRA_OF = {
     'matplotlib': 'report',
@@ -80,3 +85,36 @@ def uncollected() -> Iterator[None]:
     finally:
         if was_on:
             gc.enable()
+
+
+def of_other_packages(
+    group: str, accept: Callable[[object], _T], *, own: str
+) -> Iterator[tuple[EntryPoint, _T]]:
+    """
+    Yield what packages that are installed beside this one declare as entry points, by name.
+
+    One that cannot be loaded or accepted is left out with a warning.
+
+    Parameters
+    ----------
+    group
+        Of the entry points.
+    accept
+        Returns what was loaded, or raises what is wrong with it.
+    own
+        Package whose entry points are known without an installation.
+    """
+    for entry in sorted(entry_points(group=group)):
+        if entry.module.startswith(f'{own}.'):
+            continue
+        try:
+            found = accept(entry.load())
+        except Exception as error:  # whatever the code of a stranger does
+            warnings.warn(
+                f'{entry.name!r} ({entry.value}) of {group} is left out: {error}; mend or '
+                'uninstall its package',
+                RuntimeWarning,
+                stacklevel=2,
+            )
+            continue
+        yield entry, found

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from importlib.metadata import entry_points
 from os import PathLike
 from pathlib import Path
 from pkgutil import iter_modules
@@ -40,10 +41,12 @@ FORMER_KEYS = {
     'shaft_stopped_fraction': _JUDGED,
 }
 """Keys that a parameter file had before, and what replaces each."""
-# every module of that folder is one; listed without importing it
+ESTIMATOR_GROUP = 'shipdrag.estimators'
+# every module of that folder is one, and each entry point; listed without importing it
+_FOLDER = Path(__file__).parent / 'estimation' / 'estimators'
+OWN_ESTIMATORS = tuple(module.name for module in iter_modules([str(_FOLDER)]))
 ESTIMATORS = tuple(
-    module.name
-    for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
+    dict.fromkeys((*OWN_ESTIMATORS, *sorted(entry_points(group=ESTIMATOR_GROUP).names)))
 )
 """Values of the parameter `estimator`."""
 SPEEDS_M_S = (2.0, 1.0)

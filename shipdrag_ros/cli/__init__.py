@@ -68,7 +68,6 @@ _OWN = tuple(
     for name, summary in _SUMMARIES.items()
 )
 _SECTION = re.compile(r'^(\w+)\n-+\n', re.MULTILINE)
-_WITHOUT_EFFECTS = ('effect', 'completion', 'doctor', 'info', 'check', 'recover', 'import')
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -164,12 +163,21 @@ def verbs() -> tuple[Verb, ...]:
     return (*_OWN, *of_studies)
 
 
+class _Top(argparse.HelpFormatter):
+    """List the verbs of studies apart, as papers."""
+
+    def _format_action(self, action: argparse.Action) -> str:
+        text = super()._format_action(action)
+        return f'{text}\npapers:\n' if action.dest == next(reversed(_SUMMARIES)) else text
+
+
 def parser(*of: str) -> argparse.ArgumentParser:
     """
     Return the parser of the command line, with the arguments of the verbs `of`.
     """
     top = argparse.ArgumentParser(
         prog='shipdrag',
+        formatter_class=_Top,
         description='Hydrodynamic resistance of a ship from its coastdowns. '
         'Exit status: 0 done, 1 user error, 2 usage.',
     )
@@ -187,7 +195,7 @@ def parser(*of: str) -> argparse.ArgumentParser:
             if examples := known.examples or sections.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
-            if known.name not in _WITHOUT_EFFECTS:
+            if known.name != 'effect':  # each of its parts has what it needs
                 add_effects(added)
             added.set_defaults(run=module.run)
             _explain(added, _helps(arguments) | _helps(module))

@@ -124,7 +124,7 @@ def _show(output: Output, found: LearntBaseline) -> None:
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
         f'{low:.2f} to {high:.2f} m/s.'
     )
-    output.heading('LearntBaseline over stated')
+    output.heading('Learnt baseline over the one before')
     stated = found.stated_sd
     rows = []
     for i, name in enumerate(found.names):

@@ -26,7 +26,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.ship import LearntTerm
 from shipdrag_ros.ship.expression import unit_text
-from shipdrag_ros.simulation.effects import LIBRARY, OWN
+from shipdrag_ros.simulation.effects import LIBRARY, terms
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def _check(files: list[Path], output: Output) -> int:
 def _list(output: Output) -> int:
     rows, document = [], []
     for effect in LIBRARY.values():
-        where = 'library' if effect.name in OWN else 'learnt'
+        where = 'learnt' if terms([effect.name]) else 'library'
         sizes = ', '.join(f'{q.name} [{q.unit or "-"}]' for q in effect.parameters)
         rows.append((effect.name, effect.scope.value, sizes, where))
         names = [q.name for q in effect.parameters]

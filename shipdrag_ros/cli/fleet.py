@@ -71,13 +71,13 @@ def run(options: argparse.Namespace) -> int:
     from shipdrag_ros.fleet.update import update
 
     output = Output(options.json)
-    store = Store(options.out)
     found = find(options.folders, without=options.out)
     if not (found.sources or found.skipped):
         raise FleetError(
             f'no bag lies below {", ".join(map(repr, options.folders))}: no .mcap file, directory '
             'of rosbag2, .csv table or log of a format that `shipdrag import` knows'
         )
+    store = Store(options.out)
     output.log(
         f'{len(found.sources)} bag(s) found; {found.left_alone} other file(s) left alone; '
         'starting workers'

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from shipdrag_ros.trend import ShipTrend
 
 
+_LISTED = 4
 _CLOSED: dict[str, str | bool | int | float | list[str]] = {
     'enable_external_access': 'false',
     'python_enable_replacements': 'false',
@@ -67,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
     need('pyarrow')
     output = Output(options.json)
     if options.sql is not None:
+        if any((options.csv, options.parquet, options.report, options.pages)):
+            raise FleetError('--sql: leave out --csv, --parquet, --report and --pages, or --sql')
         _answer(output, options.store, options.sql)
         return 0
     if options.pages is not None and options.report is None:
@@ -179,6 +182,8 @@ def _answer(output: Output, store: Path, query: str) -> None:
 
 
 def _cell(value: object) -> str:
+    if isinstance(value, list) and len(value) > _LISTED:
+        return f'{len(value)} values'  # all are in the JSON
     return '-' if value is None else f'{value:.6g}' if isinstance(value, float) else f'{value}'
 
 

@@ -325,7 +325,7 @@ def read_logs(
         if len(group) == 1:
             runs.append(group[0].run)
             continue
-        joined, said = join([(each.run.paths[0].name, each.log) for each in group])
+        joined, _, said = join([(each.run.paths[0].name, each.log) for each in group])
         notes += said
         whole = LogRun(joined, [each.run.paths[0] for each in group])
         whole.name = ', '.join(each.run.name for each in group)

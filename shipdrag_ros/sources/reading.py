@@ -11,8 +11,9 @@ of two, and refused.
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.contents import Contents, FileChannel
 from shipdrag_ros.bags.mcap_file import BagFiles, is_bag
 from shipdrag_ros.bags.message_index import Messages
+from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.run import BATCH
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import ImportDataError
@@ -160,13 +162,18 @@ def read_joined(parts: Sequence[tuple[Format, Job]]) -> Joined:
     """
     logs = [Log() for _ in parts]
     results = [declared.read(job, log) for (declared, job), log in zip(parts, logs, strict=True)]
-    joined, notes = join([(job.source.name, log) for (_, job), log in zip(parts, logs)])
-    return Joined(joined, results, notes)
+    joined, lost, notes = join([(job.source.name, log) for (_, job), log in zip(parts, logs)])
+    return Joined(joined, [_without(*each) for each in zip(results, lost, strict=True)], notes)
 
 
-def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[str]]:
+def _without(result: ImportResult, lost: Counter[str]) -> ImportResult:
+    written = {name: n - lost[name] for name, n in result.written.items() if n > lost[name]}
+    return replace(result, written=written)
+
+
+def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[Counter[str]], list[str]]:
     """
-    Put logs together; what is left out is said.
+    Put logs together; what is left out of each is counted by input, and said.
 
     Parameters
     ----------
@@ -179,17 +186,23 @@ def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[str]]:
         If they hold a ship at two places at a time.
     """
     if len(logs) == 1:
-        return logs[0][1], []
+        return logs[0][1], [Counter()], []
     blocks = [_block(log) for _, log in logs]
     names = [name for name, _ in logs]
     refuse_two_ships([LogTrack(*each) for each in zip(names, blocks, strict=True)])
-    taken, notes = _taken(blocks, names)
+    taken, lost = _taken(blocks)
     whole = in_arrival_order(taken)
     joined = Log()
     about = {name: log.attachments.get(ATTACHMENT, '') for name, log in logs}
     joined.attach(ATTACHMENT, strict_yaml.dump({'sources': about}))
     joined.write_samples(whole)
-    return joined, notes
+    notes = [
+        f'{name}: {", ".join(sorted(counts))} not taken for the time that an earlier file gives '
+        'it too.'
+        for name, counts in zip(names, lost, strict=True)
+        if counts
+    ]
+    return joined, lost, notes
 
 
 def _block(log: Log) -> Block:
@@ -199,32 +212,25 @@ def _block(log: Log) -> Block:
     return concatenate([item for item in LogRun(log, []).inputs() if isinstance(item, Block)])
 
 
-def _taken(blocks: Sequence[Block], names: Sequence[str]) -> tuple[list[Block], list[str]]:
-    """Leave out of each block the spans that earlier ones give of the same input, and say so."""
+def _taken(blocks: Sequence[Block]) -> tuple[list[Block], list[Counter[str]]]:
+    """Leave out of each block the spans that earlier ones give of the same input; count them."""
     covered: dict[str, list[tuple[int, int]]] = {}
-    left, notes = [], []
-    for block, name in zip(blocks, names, strict=True):
+    left, lost = [], []
+    for block in blocks:
         keep = np.ones(len(block), np.bool_)
         own: list[tuple[str, tuple[int, int]]] = []
-        lost = set()
         for number in np.unique(block.channel):
             of_channel = block.channel == number
             stamps = block.stamp_ns[of_channel]
             name_of = Channel(number).input
             own.append((name_of, (int(stamps.min()), int(stamps.max()))))
             for start, end in covered.get(name_of, []):
-                if start <= stamps.max() and stamps.min() <= end:
-                    lost.add(name_of)
                 keep[of_channel & (block.stamp_ns >= start) & (block.stamp_ns <= end)] = False
         left.append(block[keep])
-        if lost:
-            notes.append(
-                f'{name}: {", ".join(sorted(lost))} not taken for the time that an earlier file '
-                'gives it too.'
-            )
+        lost.append(Counter(Channel(each).input for each in block.channel[~keep]))
         for name_of, span in own:
             covered.setdefault(name_of, []).append(span)
-    return left, notes
+    return left, lost
 
 
 class LogPart:
@@ -444,11 +450,16 @@ def format_of(source: Path, options: Mapping[str, Any]) -> Format:
     Raises
     ------
     ImportDataError
-        If it is of none that is known.
+        If it is of none that is known, or a bag that needs no import.
     """
     known = formats.found()
-    asked = next((each for each in known if each.chosen_by in options), None)
-    return asked or best_of(known, head_of(source))
+    for each in known:
+        if each.chosen_by in options:
+            return each
+    head = head_of(source)
+    if head.raw.startswith(MAGIC) or (source.is_dir() and any(source.glob('*.mcap'))):
+        raise ImportDataError(f'{str(source)!r} is a bag already: `shipdrag replay` takes it')
+    return best_of(known, head)
 
 
 def job_of(declared: Format, source: Path, options: Mapping[str, Any]) -> Job:

@@ -9,12 +9,12 @@ study of its own by an entry point of the group `shipdrag.papers`, `NAME = PACKA
 
 from __future__ import annotations
 
-import warnings
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
 from pkgutil import iter_modules
 from typing import NamedTuple
+
+from shipdrag_ros.imports import of_other_packages
 
 GROUP = 'shipdrag.papers'
 
@@ -46,20 +46,12 @@ def found(taken: frozenset[str] = frozenset()) -> tuple[tuple[str, Study], ...]:
         for name in own
         if (study := getattr(import_module(name), 'STUDY', None)) is not None
     }
-    for entry in sorted(entry_points(group=GROUP)):
-        if entry.module in own:
-            continue
-        try:
-            study = entry.load()
-            if not isinstance(study, Study) or study.verb in (taken | {*studies}):
-                raise TypeError(f'{study!r}, expected a Study with a verb that is not taken')
-        except Exception as error:  # whatever the code of a stranger does
-            warnings.warn(
-                f'the study {entry.name!r} ({entry.value}) is left out: {error}; mend or '
-                'uninstall its package',
-                RuntimeWarning,
-                stacklevel=2,
-            )
-            continue
+
+    def accept(study: object) -> Study:
+        if not isinstance(study, Study) or study.verb in (taken | {*studies}):
+            raise TypeError(f'{study!r}, expected a Study with a verb that is not taken')
+        return study
+
+    for entry, study in of_other_packages(GROUP, accept, own=__name__):
         studies[study.verb] = (entry.module, study)
     return tuple(studies.values())

@@ -10,6 +10,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.trend.series import YEAR_NS
 from shipdrag_ros.trend.ship_trend import ShipTrend, are_priced
 
+_SPREAD = '; ± is two standard deviations'
 _CLEAN = {
     'ship file': 'the clean hull of the ship file',
     'first months': 'the mean of the first months',
@@ -54,20 +55,21 @@ def ranked_by(trends: Sequence[ShipTrend]) -> str:
     Say what the ranking goes by.
     """
     if are_priced(trends):
-        return 'Ranked by what the added resistance costs a year.'
+        return f'Ranked by what the added resistance costs a year{_SPREAD}.'
     return (
         'Ranked by the effective power that the added resistance takes: not every ship file has '
-        'prices (`economics`).'
+        f'prices (`economics`){_SPREAD}.'
     )
 
 
 def amount(figure: Parameter) -> str:
     """
-    Return an amount of money or of fuel and its standard deviation, to two digits of it.
+    Return an amount of money or of fuel and two standard deviations, to two digits of these.
     """
-    decimals = decimals_of(figure.sd) if figure.sd > 0.0 else 2
-    value, sd = (round(each, decimals) for each in (figure.value, figure.sd))
-    return f'{value:,.{max(decimals, 0)}f} ± {sd:,.{max(decimals, 0)}f}'
+    spread = 2.0 * figure.sd
+    decimals = decimals_of(spread) if spread > 0.0 else 2
+    value, spread = (round(each, decimals) for each in (figure.value, spread))
+    return f'{value:,.{max(decimals, 0)}f} ± {spread:,.{max(decimals, 0)}f}'
 
 
 def lines(trend: ShipTrend) -> list[str]:
@@ -81,7 +83,7 @@ def lines(trend: ShipTrend) -> list[str]:
         found.append(
             f'Added resistance {percent(trend.now)} % over {_CLEAN[series.clean]}, at '
             f'{knots:.1f} kn ({series.reference_speed_m_s:.2f} m/s); growth between cleanings '
-            f'{percent(trend.growth_per_year)} % a year.'
+            f'{percent(trend.growth_per_year)} % a year{_SPREAD}.'
         )
     if trend.scatter is not None:
         found.append(f'Runs scatter by {100.0 * trend.scatter:.1f} % beyond their own error.')
@@ -157,13 +159,13 @@ def _speed_lost(trend: ShipTrend) -> str:
 
 def percent(found: Parameter | None) -> str:
     """
-    Return a share and its standard deviation in percent; '-' where not known.
+    Return a share and two standard deviations in percent; '-' where not known.
     """
     return '-' if found is None else _plus_minus(found, 100.0)
 
 
 def _plus_minus(found: Parameter, unit: float) -> str:
-    return f'{found.value * unit:.1f} ± {found.sd * unit:.1f}'
+    return f'{found.value * unit:.1f} ± {2.0 * found.sd * unit:.1f}'
 
 
 def _cleaning(trend: ShipTrend) -> str:

@@ -38,6 +38,7 @@ def test_learns_from_two_bags_what_simulate_and_diagnose_take(
     assert found['scatter']['value'] is None
     assert found['relative_sd']['before'] == {'friction': 0.02, 'wave': 0.1}
     assert 'WARNING: 2 run(s) do not show how runs differ' in shown.err
+    assert 'Learnt baseline over the one before' in shown.err
     assert Ship.load(out).baseline != Ship.load(ship_file).baseline
     assert main(['diagnose', bags[0], '--ship', str(out), '--json']) == 0
     assert json.loads(capsys.readouterr().out)['verdict'] == 'none'

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from shipdrag_ros.cli import main
@@ -16,3 +18,13 @@ def test_a_number_of_workers_that_is_none_is_refused(
         main(['fleet', 'x', '-o', 'y', f'--workers={given}'])
     assert ended.value.code == 2
     assert 'expected a whole number from 1 to 1024' in capsys.readouterr().err
+
+
+def test_where_no_bag_lies_no_store_is_left(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = tmp_path / 'store'
+    (tmp_path / 'empty').mkdir()
+    assert main(['fleet', str(tmp_path / 'empty'), '-o', str(store)]) == 1
+    assert 'no bag lies below' in capsys.readouterr().err
+    assert not store.exists()

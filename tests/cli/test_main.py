@@ -81,6 +81,9 @@ def test_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
     for verb in cli.verbs():
         assert f'    {verb.name}' in captured
         assert verb.summary in ' '.join(captured.split())
+    own, papers = captured.split('\npapers:\n')
+    assert '    recover ' in own
+    assert '    cable ' in papers
 
 
 @pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
@@ -89,6 +92,13 @@ def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> No
     captured = capsys.readouterr().out
     assert f'usage: shipdrag {verb}' in captured
     assert 'None' not in captured
+
+
+@pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
+def test_each_verb_takes_effects(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    line = [verb, 'list', '--help'] if verb == 'effect' else [verb, '--help']
+    assert stopped(line) == 0
+    assert '--effects DIR' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])

@@ -145,7 +145,7 @@ def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
         'high=1e9),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
     )
     monkeypatch.setattr(library, '__path__', [*library.__path__, str(tmp_path)])
-    monkeypatch.setattr(library, 'LIBRARY', library._found())
+    monkeypatch.setattr(library, 'LIBRARY', library._every.__wrapped__())
     monkeypatch.delitem(sys.modules, f'{library.__name__}.ice')
     truth = simulate(CARGO, SCENARIO, effects=[parse('ice=1e5')])
     extra = truth.specific_resistance(5.0) * CARGO.mass_kg - CARGO.resistance_n(5.0)

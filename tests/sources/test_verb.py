@@ -203,6 +203,33 @@ def test_dates_and_checksums_that_a_log_lacks_are_given(
     assert '--date YYYY-MM-DD' in capsys.readouterr().err
 
 
+def test_a_bag_needs_no_import(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table, bag = tmp_path / 'a.csv', tmp_path / 'a.mcap'
+    table.write_text('time,speed_through_water\n0,8\n1,8\n')
+    assert main(['import', str(table), '-o', str(bag)]) == 0
+    for source in (bag, tmp_path):
+        assert main(['import', str(source), '-o', str(tmp_path / 'b.mcap')]) == 1
+        assert 'is a bag already: `shipdrag replay` takes it' in capsys.readouterr().err
+
+
+def test_of_several_files_what_went_into_the_bag_is_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = tmp_path / 'a.csv', tmp_path / 'b.csv'
+    first.write_text('time,speed_through_water\n1e9,8\n1000000001,8\n')
+    second.write_text('time,speed_through_water,heading\n1e9,7,1\n1000000002,7,1\n')
+    line = ['import', str(first), str(second), '-o', str(tmp_path / 'c.mcap'), '--json']
+    assert main(line) == 0
+    shown = capsys.readouterr()
+    files = json.loads(shown.out)['files']
+    assert [each['written'] for each in files] == [
+        {'speed_through_water': 2},
+        {'speed_through_water': 1, 'heading': 2},
+    ]
+    assert 'c.mcap: 3 messages of 2 rows' in shown.err
+    assert 'b.csv: speed_through_water not taken for the time' in shown.err
+
+
 def test_a_format_of_another_package_is_found_by_its_entry_point(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -57,7 +57,9 @@ def test_one_that_cannot_be_loaded_is_named_and_breaks_nothing(tmp_path: Path) -
     done = shipdrag(tmp_path, 'cable', '--length', '50', '--diameter', '0.1', '--speed', '3')
     assert done.returncode == 0
     assert 'it ran' not in done.stdout
-    assert "the study 'broken' (broken:STUDY) is left out: No module named" in done.stderr
+    assert "'broken' (broken:STUDY) of shipdrag.papers is left out: No module named" in done.stderr
     for name in ('thief', 'other'):
-        assert f"the study '{name}' ({name}:STUDY) is left out: Study(verb=" in done.stderr
+        assert (
+            f"'{name}' ({name}:STUDY) of shipdrag.papers is left out: Study(verb=" in done.stderr
+        )
     assert done.stderr.count('is left out') == 3

@@ -68,7 +68,14 @@ def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, caps
     assert main(['trend', str(fleet_store), '--sql', 'selec']) == 1
     assert main(['trend', str(fleet_store), '--sql', 'select * from trends']) == 1
     assert main(['trend', str(fleet_store), '--sql', '']) == 1
+    assert (
+        main(['trend', str(fleet_store), '--sql', question, '--csv', str(tmp_path / 'x.csv')]) == 1
+    )
     said = capsys.readouterr().err
+    assert '--sql: leave out --csv' in said
+    assert not (tmp_path / 'x.csv').exists()
+    assert main(['trend', str(fleet_store), '--sql', 'select froude from coastdowns limit 1']) == 0
+    assert '77 values' in capsys.readouterr().out
     assert 'the tables are runs (ship, date, added_percent' in said
     assert 'begin with SELECT' in said
 

@@ -93,11 +93,17 @@ def test_what_ranks_stands_first_with_its_error(priced):
     trends = fleet_trends(seen, {'Slow': priced, 'Fast': priced}, {})
     table = words.ranking(trends)
     assert table.columns[2] == 'costs [USD a year]'
-    assert words.ranked_by(trends) == 'Ranked by what the added resistance costs a year.'
+    assert words.ranked_by(trends).startswith('Ranked by what the added resistance costs a year;')
     shown = [float(row[2].replace(',', '').split(' ± ')[0]) for row in table.rows]
     costs = [trend.costs.usd_per_year for trend in trends]
     assert shown == sorted(shown, reverse=True)
     assert shown == pytest.approx([each.value for each in costs], rel=0.05)
+    # as in all other texts, and said
+    spread = [float(row[2].replace(',', '').split(' ± ')[1]) for row in table.rows]
+    assert spread == pytest.approx([2.0 * each.sd for each in costs], rel=0.05)
+    now = trends[0].now
+    assert f' ± {200.0 * now.sd:.1f} % over' in words.lines(trends[0])[0]
+    assert words.lines(trends[0])[0].endswith('; ± is two standard deviations.')
     for trend, each in zip(trends, costs, strict=True):  # linear in what was added
         assert each.sd / each.value == pytest.approx(trend.now.sd / trend.now.value)
         # and in JSON and CSV

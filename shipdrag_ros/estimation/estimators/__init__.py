@@ -3,7 +3,8 @@
 The estimators: every module in this folder is one.
 
 A new estimator is a new module with an `ESTIMATOR` of its own name. The parameter `estimator`,
-the report and the documentation find it here; a module is imported when it is asked for.
+the report and the documentation find it here; a module is imported when it is asked for. One of
+another package is an entry point of the group `shipdrag.estimators`, `NAME = PACKAGE:ESTIMATOR`.
 """
 
 from __future__ import annotations
@@ -14,12 +15,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, wraps
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import EstimationError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.parameters import FORMER_ESTIMATORS, Parameters
+from shipdrag_ros.parameters import (
+    ESTIMATOR_GROUP,
+    FORMER_ESTIMATORS,
+    OWN_ESTIMATORS,
+    Parameters,
+)
 from shipdrag_ros.ship import Ship
 
 _P = ParamSpec('_P')
@@ -116,9 +123,28 @@ def named(name: str) -> Estimator:
     ----------
     name
         One of `parameters.ESTIMATORS`, or of `parameters.FORMER_ESTIMATORS`.
+
+    Raises
+    ------
+    EstimationError
+        If one of another package cannot be loaded.
     """
-    known = FORMER_ESTIMATORS.get(name, name)
-    found = import_module(f'{__name__}.{known}').ESTIMATOR
-    assert isinstance(found, Estimator)
+    found = _load(FORMER_ESTIMATORS.get(name, name))
     live = None if found.live is None else shielded(found.live)
     return replace(found, estimate=shielded(found.estimate), live=live)
+
+
+def _load(name: str) -> Estimator:
+    if name in OWN_ESTIMATORS:
+        found = import_module(f'{__name__}.{name}').ESTIMATOR
+        assert isinstance(found, Estimator)
+        return found
+    try:
+        found = next(iter(entry_points(group=ESTIMATOR_GROUP, name=name))).load()
+        if not isinstance(found, Estimator) or found.name != name:
+            raise TypeError(f'{found!r}, expected an Estimator of this name')
+    except Exception as error:  # whatever the code of a stranger does
+        raise EstimationError(
+            f'the estimator {name!r} cannot be loaded: {error!r}; mend or remove its package'
+        ) from error
+    return found

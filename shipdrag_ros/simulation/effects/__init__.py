@@ -4,7 +4,8 @@ The library of effects: declared in `data/effects.yaml`, or a module in this fol
 
 A new effect is an entry of that file, or where no formula of a term holds it a new module with an
 `EFFECT`, of which all but what it does may stand in `data/effects_of_modules.yaml`; simulation,
-command line, diagnosis and documentation find it here.
+command line, diagnosis and documentation find it here. A package installed beside this one adds
+an effect of its own by an entry point of the group `shipdrag.effects`, `NAME = PACKAGE:EFFECT`.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module, resources
 from itertools import combinations
 from pkgutil import iter_modules
-from types import MappingProxyType
 
 from shipdrag_ros.errors import EffectFileError, SimulationError
+from shipdrag_ros.imports import of_other_packages
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.ship.term import check_name
@@ -28,7 +29,6 @@ from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
 __all__ = [
     'LIBRARY',
-    'OWN',
     'action_of',
     'carrying',
     'confounders',
@@ -44,21 +44,41 @@ __all__ = [
 ]
 
 
-def _found() -> dict[str, Effect]:
-    every = [*effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')]
-    for module in iter_modules(__path__):
-        effect = import_module(f'{__name__}.{module.name}').EFFECT
-        assert isinstance(effect, Effect)
-        every.append(effect)
-    return {effect.name: effect for effect in sorted(every, key=lambda effect: effect.name)}
+GROUP = 'shipdrag.effects'
 
 
-_EVERY = _found()
-LIBRARY: Mapping[str, Effect] = MappingProxyType(_EVERY)
+@cache
+def _every() -> dict[str, Effect]:
+    every: dict[str, Effect] = {}
+
+    def accept(effect: object) -> Effect:
+        if not isinstance(effect, Effect) or effect.name in every:
+            raise TypeError(f'{effect!r}, expected an Effect with a name that is not taken')
+        return effect
+
+    own = [*effects_in(resources.files('shipdrag_ros') / 'data' / 'effects.yaml')]
+    own += [import_module(f'{__name__}.{module.name}').EFFECT for module in iter_modules(__path__)]
+    every |= {effect.name: accept(effect) for effect in own}
+    for _, effect in of_other_packages(GROUP, accept, own=__name__):
+        every[effect.name] = effect
+    return dict(sorted(every.items()))
 
 
-OWN = frozenset(LIBRARY)
-"""Names of the library itself, without terms that are added."""
+class _Library(Mapping[str, Effect]):
+    """Read when it is first used, as a module of another package may import much of this one."""
+
+    def __getitem__(self, name: str) -> Effect:
+        return _every()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_every())
+
+    def __len__(self) -> int:
+        return len(_every())
+
+
+LIBRARY: Mapping[str, Effect] = _Library()
+
 _TERMS: dict[str, LearntTerm] = {}  # that this process has seen, by name
 
 
@@ -96,14 +116,14 @@ def using(terms: Sequence[LearntTerm]) -> Iterator[None]:
     ...     pass
     """
     effects = {term.name: declared(term) for term in terms}
-    if known := [name for name in effects if name in _EVERY]:
+    if known := [name for name in effects if name in LIBRARY]:
         raise EffectFileError(known[0], ['name: there is an effect of this name; give another'])
-    _EVERY.update(effects)
+    _every().update(effects)
     try:
         yield
     finally:
         for name in effects:
-            del _EVERY[name]
+            del _every()[name]
 
 
 def effects_of(ship: Ship) -> Mapping[str, Effect]:
@@ -119,7 +139,7 @@ def terms(names: Collection[str] | None = None) -> tuple[LearntTerm, ...]:
     """
     Return the learnt terms among some effects; of None, those added to the library.
     """
-    return tuple(_TERMS[name] for name in (_EVERY if names is None else names) if name not in OWN)
+    return tuple(_TERMS[name] for name in (LIBRARY if names is None else names) if name in _TERMS)
 
 
 def carrying(ship: Ship, more: Sequence[LearntTerm] | None = None) -> Ship:
