@@ -68,7 +68,7 @@ def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) 
 
 def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[McapFile]]:
     """Sort the parts of a recording by their number."""
-    if len(parts) < 2 or METADATA not in parts[0].contents.metadata:
+    if len(parts) < 2 or any(METADATA not in part.contents.metadata for part in parts):
         return bag, parts
     numbered: dict[int, McapFile] = {}
     for part in parts:
