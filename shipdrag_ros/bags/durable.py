@@ -13,7 +13,6 @@ import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from fcntl import LOCK_EX, LOCK_NB, flock
 from itertools import chain, count, islice, starmap
 from pathlib import Path
 from time import monotonic
@@ -77,8 +76,6 @@ class LiveFile:
         try:
             # unbuffered: what could not be written must not be tried again on closing
             self._file = open(path, 'xb', buffering=0, opener=writer.private_opener)  # noqa: SIM115
-            with suppress(OSError):  # not every file system has locks
-                flock(self._file, LOCK_EX | LOCK_NB)
         except FileExistsError:
             raise NameTakenError(f'{str(path)!r} exists') from None
         except OSError as error:

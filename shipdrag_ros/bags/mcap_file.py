@@ -390,7 +390,13 @@ def _rosbag2(path: Path) -> BagFiles:
         raise BagError(f'{str(path)!r} is compressed with {packed!r}; {CONVERT}')
     files: list[Path] = []
     missing: list[str] = []
-    for name in about.get('relative_file_paths') or ():
+    listed = about.get('relative_file_paths') or []
+    if not isinstance(listed, list):
+        raise BagError(
+            f'{str(path / "metadata.yaml")!r}: relative_file_paths is {listed!r}, expected a list '
+            'of files; remove metadata.yaml to read the .mcap files beside it'
+        )
+    for name in listed:
         # older versions put the directory before the name, or leave the compression out
         file = path / Path(str(name)).name
         found = [each for each in (file, Path(f'{file}.zstd')) if each.is_file()]

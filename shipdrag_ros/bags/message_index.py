@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.messages.gather import OCTETS, PLACES, long_word
 from shipdrag_ros.samples import Int64, UInt8
 
 CHANNELS = 1 << 16
@@ -186,27 +187,8 @@ def index_messages(
     return Indexed(found[:n], others[:m], notes)
 
 
-@compiled(inline=True, uncounted=True)
-def _uint64(data: Any, place: Any) -> Any:
-    at = _U(place)
-    return (
-        _U(data[at])
-        | _U(data[at + _U(1)]) << _U(8)
-        | _U(data[at + _U(2)]) << _U(16)
-        | _U(data[at + _U(3)]) << _U(24)
-        | _U(data[at + _U(4)]) << _U(32)
-        | _U(data[at + _U(5)]) << _U(40)
-        | _U(data[at + _U(6)]) << _U(48)
-        | _U(data[at + _U(7)]) << _U(56)
-    )
-
-
-_GIVEN = 'Array({}, 1, "C", readonly=True)'
-_OCTETS, _PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
-
-
 @compiled(
-    f'UniTuple(i8, 2)({_OCTETS}, {_PLACES}, {_PLACES}, {_OCTETS}, '
+    f'UniTuple(i8, 2)({OCTETS}, {PLACES}, {PLACES}, {OCTETS}, '
     'i8[::1], i8[::1], u2[::1], i8[::1], i8[::1], i8[::1], i8[:, ::1])',
     uncounted=True,
 )
@@ -235,7 +217,7 @@ def _index(
             if content > limit:
                 kind = _CUT_OFF
             else:
-                length = np.int64(_uint64(data, at + 1))
+                length = np.int64(long_word(data, at + 1))
                 if data[_U(at)] == 0:
                     kind = _NO_RECORD
                 elif length < 0 or length > limit - content:  # from 2^63 on it is negative
@@ -248,7 +230,7 @@ def _index(
                     kind = _TOO_SHORT
                 else:
                     number = data[_U(content)] | np.uint16(data[_U(content + 1)]) << 8
-                    time = np.int64(_uint64(data, content + 6))
+                    time = np.int64(long_word(data, content + 6))
                     if time < 0:
                         kind = _NO_TIME
                     elif wanted[number]:
@@ -266,7 +248,7 @@ def _index(
     return n, m
 
 
-@compiled(f'void({_OCTETS}, {_PLACES}, {_PLACES}, u1[::1])', uncounted=True)
+@compiled(f'void({OCTETS}, {PLACES}, {PLACES}, u1[::1])', uncounted=True)
 def _pack(data: UInt8, start: Int64, end: Int64, packed: UInt8) -> None:
     at = 0
     for i in range(len(start)):

@@ -4,7 +4,9 @@ Which recordings are removed so that a disk never fills.
 
 The oldest parts go first. A part that holds a coastdown, and the one before it
 with its steady lead, is kept until nothing else is left, or for ever where nobody
-has said how much to keep. A file that any process writes is locked, and stays.
+has said how much to keep; one that still grows may hold one yet. What a compaction
+left that was killed is worth nothing. A file that any process writes is locked, and
+stays.
 """
 
 from __future__ import annotations
@@ -15,13 +17,14 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from fcntl import LOCK_EX, LOCK_NB, flock
+from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, LOCK_UN, flock
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO
 
 from shipdrag_ros.bags.contents import contents_of
 from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC, Buffer
+from shipdrag_ros.bags.recover import SUFFIX
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import reason_of
 from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
@@ -29,6 +32,7 @@ from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
 DAY_S = 86_400.0
 SHARE = 0.5  # of the disk, where nobody has said how much
 _PART = re.compile(r'(coastdown_\d{8}T\d{6}Z)_\d{3,}(_\d+)?\.mcap')
+_LEFT = re.compile(rf'\.?{_PART.pattern}{re.escape(SUFFIX)}(\.part)?')  # of a compaction
 _BLOCK_BYTES = 4096  # what even an empty file costs
 
 
@@ -171,15 +175,16 @@ class Retention:
         return int(self._keep.share * disk.f_blocks * disk.f_frsize)
 
     def _parts(self) -> list[_BagPart]:
-        """Return the parts in the order of their recording."""
+        """Return what compactions left, and the parts in the order of their recording."""
         parts = []
         paths: list[Path] = []
         with suppress(FileNotFoundError):  # there is no recording yet
-            paths = sorted(self._directory.iterdir())
+            paths = sorted(self._directory.iterdir(), key=lambda path: (not _is_left(path), path))
         for path in paths:
             with suppress(FileNotFoundError):  # somebody has just removed it
                 about = path.lstat()
-                if _PART.fullmatch(path.name) and stat.S_ISREG(about.st_mode):
+                known = _PART.fullmatch(path.name) or _is_left(path)
+                if known and stat.S_ISREG(about.st_mode):
                     size = max(about.st_size, _BLOCK_BYTES)
                     parts.append(_BagPart(path, size, about.st_mtime))
         return parts
@@ -189,9 +194,11 @@ class Retention:
         worth = set()
         before: _BagPart | None = None
         for part in parts:
-            if part not in self._holds:
+            if _is_left(part.path):
+                continue
+            if part not in self._holds and not _is_written(part.path):
                 self._holds[part] = self._judged(part.path)
-            if self._holds[part]:
+            if self._holds.get(part, True):
                 worth.add(part)
                 if before is not None and _recording(before.path) == _recording(part.path):
                     worth.add(before)
@@ -226,6 +233,21 @@ class Retention:
 
 def _no_link(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
+
+
+def _is_left(path: Path) -> bool:
+    return _LEFT.fullmatch(path.name) is not None
+
+
+def _is_written(path: Path) -> bool:
+    """Say whether a process still writes a file, which is locked then."""
+    with suppress(OSError), open(path, 'rb', opener=_no_link) as file:
+        try:
+            flock(file, LOCK_SH | LOCK_NB)
+            flock(file, LOCK_UN)  # at once: who has just made it locks it next
+        except BlockingIOError:
+            return True
+    return False
 
 
 def _recording(path: Path) -> str:

@@ -68,7 +68,7 @@ def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) 
 
 def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[McapFile]]:
     """Sort the parts of a recording by their number."""
-    if len(parts) < 2 or METADATA not in parts[0].contents.metadata:
+    if len(parts) < 2 or any(METADATA not in part.contents.metadata for part in parts):
         return bag, parts
     numbered: dict[int, McapFile] = {}
     for part in parts:
@@ -147,10 +147,11 @@ class BagInfo:
 
 def info(run: Run) -> BagInfo:
     """
-    Say what is in a run; nothing but its index is read where it has one.
+    Say what is in a run; nothing but its index is read where it has one, and of a part it.
     """
     start_ns, end_ns = run.span_ns or (None, None)
-    found = {topic.input for topic in run.topics}
+    topics = run.topics_inside()
+    found = {topic.input for topic in topics}
     compressions = {kind for part in run.parts for kind in part.contents.compressions}
     if run.paths != tuple(part.path for part in run.parts):
         compressions = set()  # those of a bag made for the moment, of a log
@@ -161,10 +162,10 @@ def info(run: Run) -> BagInfo:
         start_ns=start_ns,
         end_ns=end_ns,
         duration_s=_duration_s(run.span_ns),
-        messages=sum(topic.messages for topic in run.topics),
+        messages=sum(topic.messages for topic in topics),
         compression=', '.join(sorted(kind or 'none' for kind in compressions)) or 'none',
         indexed=all(part.contents.indexed for part in run.parts),
-        topics=run.topics,
+        topics=topics,
         missing_inputs=tuple(name for name in TOPICS if name not in found and name not in FURTHER),
         attachments={name: len(text.encode()) for name, text in run.attachments.items()},
         software=run.software,
@@ -182,6 +183,7 @@ def _duration_s(span_ns: tuple[int, int] | None) -> float:
 BATCH = 1 << 14
 # of one message that rosbag2 has packed for itself; inputs have some hundred bytes
 _MESSAGE_LIMIT_BYTES = 1 << 20
+_ALL_NS = (0, sys.maxsize)
 
 
 @dataclass(frozen=True)
@@ -263,7 +265,7 @@ class Run:
     ) -> None:
         self.name = bag.name
         self.parts = tuple(parts)
-        self._limits_ns = (0, sys.maxsize)
+        self._limits_ns = _ALL_NS
         self._message_compression = bag.message_compression
         self._warnings = list(bag.warnings)
         counts: Counter[tuple[str, str]] = Counter()
@@ -349,6 +351,18 @@ class Run:
         found = copy.copy(self)
         found._limits_ns = (first, last)
         return found
+
+    def topics_inside(self) -> tuple[TopicInfo, ...]:
+        """
+        Return what is in it, by name; a part is read for it.
+        """
+        if self._limits_ns == _ALL_NS:
+            return self.topics
+        keys = [(each.topic, each.type) for each in self.topics]
+        counts = np.zeros(len(keys), np.int64)
+        for batch in self.messages(keys):
+            counts += np.bincount(batch.channel, minlength=len(keys))
+        return tuple(self._topic(key, n) for key, n in zip(keys, counts.tolist()) if n)
 
     def note(self, warnings: Iterable[str]) -> None:
         """

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from enum import Enum
+from fcntl import LOCK_EX, LOCK_NB, flock
 from itertools import chain
 from pathlib import Path
 from typing import Any, Self
@@ -123,14 +124,17 @@ CHUNK_RANGE = 1 << 14, 1 << 20
 
 def private_opener(path: str, flags: int) -> int:
     """
-    Open a file that is made: not readable by everybody, and never through a link.
+    Open a file that is made: not readable by everybody, never through a link, and locked.
 
     Parameters
     ----------
     path, flags
         As `open` hands them to its `opener`.
     """
-    return os.open(path, flags | os.O_NOFOLLOW, 0o640)
+    file = os.open(path, flags | os.O_NOFOLLOW, 0o640)
+    with suppress(OSError):  # not every file system has locks
+        flock(file, LOCK_EX | LOCK_NB)
+    return file
 
 
 def sync_directory(path: Path) -> None:

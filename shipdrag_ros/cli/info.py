@@ -7,7 +7,7 @@ nothing.
 Options
 -------
 BAG
-    MCAP file, rosbag2 directory, or log
+    MCAP file, rosbag2 directory, or log; BAG@START:END is this part alone [s from its start]
 
 Examples
 --------
@@ -22,9 +22,9 @@ from dataclasses import asdict
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import BagInfo, info
-from shipdrag_ros.cli.arguments import add_bags, add_json, add_remap, bag
+from shipdrag_ros.cli.arguments import add_bags, add_json, add_remap
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import open_sources
+from shipdrag_ros.cli.windowed import open_parts, windowed_bag
 from shipdrag_ros.display import Table
 
 
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, bag)
+    add_bags(parser, windowed_bag)
     add_remap(parser)
     add_json(parser)
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     Show what is in the bags.
     """
     output = Output(options.json)
-    found = [info(each) for each in open_sources(options.bags, output, remap=dict(options.remap))]
+    found = [info(each) for each in open_parts(options.bags, output, remap=dict(options.remap))]
     for about in found:
         _show(output, about)
     output.json({'bags': [asdict(about) for about in found]})

@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         if found.steps:
             output.table(table(found))
         else:
-            output.say(f'None of {len(rows)} coastdowns has a curve over a step of speed.')
+            output.say(f'None of {len(found.runs)} coastdowns has a curve over a step of speed.')
     if not rows:
         output.say('The store holds no coastdown: no table.')
     if options.report is not None:

@@ -8,7 +8,7 @@ network, which may come and go; with bags or logs it plays them. It only reads, 
 Options
 -------
 BAG
-    bag or log to play
+    bag or log to play; BAG@START:END is this part alone [s from its start]
 --speed X
     seconds of a bag in a second [-]
 --ship FILE
@@ -48,9 +48,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_remap, add_ship, bag, number, whole
+from shipdrag_ros.cli.arguments import add_remap, add_ship, number, whole
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import open_sources
+from shipdrag_ros.cli.windowed import open_parts, windowed_bag
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.ship import Ship
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG')
+    parser.add_argument('bags', nargs='*', type=windowed_bag, metavar='BAG')
     _add_server(parser)
     parser.add_argument(
         '--speed', type=number(0.0, FASTEST, above=True), default=10.0, metavar='X'
@@ -144,7 +144,7 @@ def _source(
     from shipdrag_ros.live.source import BagSource, NodeSource
 
     if options.bags:
-        runs = open_sources(options.bags, output, remap=dict(options.remap))
+        runs = open_parts(options.bags, output, remap=dict(options.remap))
         player = BagSource(runs, ship=ship, speed=options.speed, past=past)
         with contextlib.closing(player) as bags:
             yield bags, None

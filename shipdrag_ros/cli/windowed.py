@@ -113,17 +113,31 @@ def open_windowed(
     """
     from shipdrag_ros.library.replaying import WindowedRun  # who only reads bags needs no replay
 
-    output = output or Output()
+    opened = _opened(bags, output or Output(), remap)
+    return [WindowedRun(run, own or window) for run, own in opened]
+
+
+def open_parts(
+    bags: Sequence[WindowedBag], output: Output, *, remap: Mapping[str, str]
+) -> list[Run]:
+    """
+    Open bags as `open_windowed` does; of one with a window, this part alone.
+    """
+    return [run.part(*own) if own else run for run, own in _opened(bags, output, remap)]
+
+
+def _opened(
+    bags: Sequence[WindowedBag], output: Output, remap: Mapping[str, str]
+) -> list[tuple[Run, WindowSpan | None]]:
     whole = [each.path for each in bags if each.window is None]
     left = open_sources(whole, output, remap=remap) if whole else []
-    found = []
+    found: list[tuple[Run, WindowSpan | None]] = []
     for each in bags:
         if each.window is not None:
             runs = open_sources([each.path], output, remap=remap)
-            found += [WindowedRun(run, each.window) for run in runs]
-            continue
-        files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
-        here = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
-        found += [WindowedRun(run, window) for run in here]
-        left = [run for run in left if run not in here]
-    return found + [WindowedRun(run, window) for run in left]
+        else:
+            files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
+            runs = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
+            left = [run for run in left if run not in runs]
+        found += [(run, each.window) for run in runs]
+    return found + [(run, None) for run in left]

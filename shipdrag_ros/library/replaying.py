@@ -16,9 +16,8 @@ from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
-from shipdrag_ros.replay.playback import SHIP_FILE
+from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, told_beside
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.told_stop import StopTime, told_beside
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 

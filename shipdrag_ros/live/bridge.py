@@ -479,9 +479,9 @@ class Bridge:
         for status in statuses:
             age_s = status.number('age')
             rejected = {
-                key.removeprefix('rejected '): int(float(text))
-                for key, text in status.values.items()
-                if key.startswith('rejected ') and text.replace('.', '', 1).isdigit()
+                key.removeprefix('rejected '): int(status.number(key) or 0)
+                for key in status.values
+                if key.startswith('rejected ')
             }
             rows.append(
                 {

@@ -258,6 +258,8 @@ class PastRun:
         """
         values = note.values
         yaw = values.get('heading_rad')
+        if yaw is not None and not math.isfinite(float(yaw)):
+            raise ValueError(f'heading_rad is {yaw}')
         own = curve if curve is not None and 'estimator' in values else None
         _, _, why_not = note.text.partition('no estimate: ')
         return cls(

@@ -33,8 +33,9 @@ from shipdrag_ros.samples import (
     UInt8,
 )
 
-FieldNumbers = Callable[[Float64, Float64], Float64]
-"""Of (n, 2) values and variances, the (n,) numbers of a field."""
+FieldNumbers = int | Callable[[Float64], Float64]
+"""A column of (n, 4) values and variances, 0 where not known, or the (n,) numbers made of them."""
+_X, _Y, _VARIANCE_X, _VARIANCE_Y = range(4)
 
 # stand for the numbers of a message until their places in it are known
 _MARKS: dict[str, tuple[str, tuple[float, ...]]] = {
@@ -162,9 +163,10 @@ def _rows(channel: Channel, block: Block) -> NDArray[np.uint8]:
     if (seconds != seconds.astype(np.int32)).any():
         raise ValueError('a stamp is beyond what a message can hold, 1901 to 2038')
     fields['seconds'], fields['nanoseconds'] = seconds, nanoseconds
+    given = np.hstack((block.value, np.where(np.isnan(block.variance), 0.0, block.variance)))
     with np.errstate(over='ignore'):  # too large for float32: infinite, and rejected as such
         for path, numbers in _ENCODERS[channel].numbers.items():
-            fields[path] = numbers(block.value, block.variance)
+            fields[path] = given[:, numbers] if isinstance(numbers, int) else numbers(given)
     return rows
 
 
@@ -197,40 +199,20 @@ def _kind(kinds: Mapping[str, str], path: str) -> str:
     return kinds[path.partition('[')[0]]
 
 
-def _x(value: Float64, variance: Float64) -> Float64:
-    return value[:, 0]
-
-
-def _y(value: Float64, variance: Float64) -> Float64:
-    return value[:, 1]
-
-
-def _variance_x(value: Float64, variance: Float64) -> Float64:
-    return _known(variance[:, 0])
-
-
-def _variance_y(value: Float64, variance: Float64) -> Float64:
-    return _known(variance[:, 1])
-
-
-def _kind_of_covariance(value: Float64, variance: Float64) -> Float64:
+def _kind_of_covariance(given: Float64) -> Float64:
     fix = types.class_of(types.NAV_SAT_FIX)
-    known = _known(variance).any(axis=1)
+    known = given[:, _VARIANCE_X:].any(axis=1)
     kinds = fix.COVARIANCE_TYPE_UNKNOWN, fix.COVARIANCE_TYPE_DIAGONAL_KNOWN
     return np.take(np.array(kinds, np.float64), known.astype(np.intp))
 
 
-def _known(variance: Float64) -> Float64:
-    return np.where(np.isnan(variance), 0.0, variance)
-
-
 # of the C library, whose last bit is the same for one and for many
-def _sine_of_half(value: Float64, variance: Float64) -> Float64:
-    return np.array([*map(sin, (0.5 * value[:, 0]).tolist())])
+def _sine_of_half(given: Float64) -> Float64:
+    return np.array([*map(sin, (0.5 * given[:, _X]).tolist())])
 
 
-def _cosine_of_half(value: Float64, variance: Float64) -> Float64:
-    return np.array([*map(cos, (0.5 * value[:, 0]).tolist())])
+def _cosine_of_half(given: Float64) -> Float64:
+    return np.array([*map(cos, (0.5 * given[:, _X]).tolist())])
 
 
 class _Encoder(NamedTuple):
@@ -257,13 +239,13 @@ class _Encoder(NamedTuple):
 def _of_joint(name: str, *, moves: bool) -> _Encoder:
     joint = {'name': [name], 'position': np.array([nan]), 'velocity': np.array([nan])}
     moving = 'velocity[0]' if moves else 'position[0]'
-    return _Encoder(types.JOINT_STATE, '', {moving: _x}, joint)
+    return _Encoder(types.JOINT_STATE, '', {moving: _X}, joint)
 
 
 _SPEED = _Encoder(
     types.TWIST_WITH_COVARIANCE,
     'base_link',
-    {'twist.twist.linear.x': _x, 'twist.covariance[0]': _variance_x},
+    {'twist.twist.linear.x': _X, 'twist.covariance[0]': _VARIANCE_X},
 )
 _ENCODERS: dict[Channel, _Encoder] = {
     Channel.SPEED_THROUGH_WATER: _SPEED,
@@ -272,10 +254,10 @@ _ENCODERS: dict[Channel, _Encoder] = {
         types.POSE_WITH_COVARIANCE,
         'map',
         {
-            'pose.pose.position.x': _x,
-            'pose.pose.position.y': _y,
-            'pose.covariance[0]': _variance_x,
-            'pose.covariance[7]': _variance_y,
+            'pose.pose.position.x': _X,
+            'pose.pose.position.y': _Y,
+            'pose.covariance[0]': _VARIANCE_X,
+            'pose.covariance[7]': _VARIANCE_Y,
         },
         {'pose.pose.orientation.w': 1.0},
     ),
@@ -283,11 +265,11 @@ _ENCODERS: dict[Channel, _Encoder] = {
         types.NAV_SAT_FIX,
         'base_link',
         {
-            'latitude': _x,
-            'longitude': _y,
+            'latitude': _X,
+            'longitude': _Y,
             # in east, north, up
-            'position_covariance[4]': _variance_x,
-            'position_covariance[0]': _variance_y,
+            'position_covariance[4]': _VARIANCE_X,
+            'position_covariance[0]': _VARIANCE_Y,
             'position_covariance_type': _kind_of_covariance,
         },
         {'altitude': nan},  # and 0: STATUS_FIX, SERVICE_UNKNOWN
@@ -301,12 +283,12 @@ _ENCODERS: dict[Channel, _Encoder] = {
     **{each: _of_joint(each.name.lower(), moves=False) for each in PITCHES},
     Channel.RUDDER: _of_joint('rudder', moves=False),
     Channel.WIND_APPARENT: _Encoder(
-        types.TWIST, 'base_link', {'twist.linear.x': _x, 'twist.linear.y': _y}
+        types.TWIST, 'base_link', {'twist.linear.x': _X, 'twist.linear.y': _Y}
     ),
     Channel.DEPTH: _Encoder(
         types.RANGE,
         'base_link',
-        {'range': _x, 'variance': _variance_x},
+        {'range': _X, 'variance': _VARIANCE_X},
         {'max_range': inf},  # and 0: ULTRASOUND
     ),
 }

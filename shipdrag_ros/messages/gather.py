@@ -256,11 +256,11 @@ def _is_alike(data: Any, one: int, other: int, first: int, end: int) -> bool:
     """Say whether two messages have the same bytes from `first` to `end`."""
     at = first
     while at + 8 <= end:
-        if _long(data, one + at) != _long(data, other + at):
+        if long_word(data, one + at) != long_word(data, other + at):
             return False
         at += 8
     if at < end and end - first >= 8:  # the last eight, of which some are compared again
-        return bool(_long(data, one + end - 8) == _long(data, other + end - 8))
+        return bool(long_word(data, one + end - 8) == long_word(data, other + end - 8))
     while at < end:
         if data[_U(one + at)] != data[_U(other + at)]:
             return False
@@ -269,16 +269,16 @@ def _is_alike(data: Any, one: int, other: int, first: int, end: int) -> bool:
 
 
 @compiled(inline=True, uncounted=True)
-def _long(data: Any, at: int) -> Any:
+def long_word(data: Any, at: int) -> Any:
     return word(data, at + 4, False) << _U(32) | word(data, at, False)
 
 
 _GIVEN = 'Array({}, 1, "C", readonly=True)'
-_OCTETS, _PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
+OCTETS, PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
 
 
 @compiled(
-    f'i8({_OCTETS}, {_PLACES}, {_PLACES}, {_PLACES}, Array(i8, 2, "C", readonly=True), '
+    f'i8({OCTETS}, {PLACES}, {PLACES}, {PLACES}, Array(i8, 2, "C", readonly=True), '
     'i8[::1], f8[:, ::1], u1[::1])'
 )
 def gather(

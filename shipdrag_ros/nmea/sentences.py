@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from datetime import date
 from enum import Enum
 from functools import lru_cache
-from math import cos, hypot, pi, radians, remainder, sin
+from math import cos, hypot, isfinite, pi, radians, remainder, sin
 from typing import Any, NamedTuple, TypeVar
 
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
@@ -94,9 +94,9 @@ class Fields(dict[str, str]):
         text = self[name]
         if not text:
             raise NoValue('empty')
-        if not NUMBER.fullmatch(text):
+        if not NUMBER.fullmatch(text) or not isfinite(number := float(text)):
             raise NoValue('not a number', text)
-        return float(text)
+        return number
 
     def first(self, *choices: tuple[str, float]) -> float:
         """

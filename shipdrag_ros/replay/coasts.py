@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The samples of coastdowns that a replay has found, with the steady record before each."""
+"""
+The samples of coastdowns that a replay has found, with the steady record before each.
+
+Also the sound samples of a whole run, whatever was done in it.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shipdrag_ros.bags.run import Run
 from shipdrag_ros.coastdown import Monitor, validate
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -21,8 +26,16 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.given_window import parts_of_one_clock
-from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed
-from shipdrag_ros.samples import ALL_MOTION, SECOND_NS, Block, Reason, concatenate
+from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed, recorded_parameters
+from shipdrag_ros.samples import (
+    ALL_MOTION,
+    KIND,
+    SECOND_NS,
+    Block,
+    Channel,
+    Reason,
+    concatenate,
+)
 from shipdrag_ros.ship import Ship
 
 DISMISSED = (
@@ -206,3 +219,36 @@ def window_between(
         accepted = accepted[max(shown, key=lambda each: each[0])[1]]
     before = start_ns - before_ns if steady else None
     return Window.from_block(accepted, start_ns, end_ns, before_ns=before)
+
+
+def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameters]:
+    """
+    Read a run as it would be on board, without looking for a coastdown.
+
+    Parameters
+    ----------
+    run
+        From `open_runs`.
+    zeros
+        A log that reads exactly 0 for long is no frozen one: below some speed a
+        wheel stands still.
+
+    Returns
+    -------
+    block, parameters
+        Accepted samples in arrival order; the parameters attached to the bag,
+        by which they are accepted.
+
+    Raises
+    ------
+    ParameterError
+        If those attached cannot be used.
+    """
+    parameters = recorded_parameters(run)
+    block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    reason = validate(block, parameters)
+    accepted = reason == Reason.ACCEPTED
+    if zeros:
+        of_log = KIND[block.channel] == Channel.SPEED_THROUGH_WATER
+        accepted |= (reason == Reason.FROZEN) & of_log & (block.value[:, 0] == 0.0)
+    return block[np.flatnonzero(accepted)], parameters

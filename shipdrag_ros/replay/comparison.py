@@ -188,6 +188,8 @@ def _figures(message: OutputMessage | None) -> Float64:
         case FORECAST_PATH.type:
             places = [each.pose.position for each in content.poses]
             return np.array([axis for place in places for axis in (place.x, place.y)])
+        case _ if content.data.nbytes % 8:  # no whole figures
+            return np.empty(0)
         case _:
             return np.frombuffer(content.data.tobytes(), '<f8')
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.replay.coasts import accepted_samples
 from shipdrag_ros.replay.playback import ReplayResult
-from shipdrag_ros.replay.sailing import accepted_samples
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, Block, Channel, Float64
 
 _BIN_S = 10.0

@@ -8,8 +8,11 @@ Also one window of it, given by hand, through the same estimator.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
 
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
@@ -22,6 +25,7 @@ from shipdrag_ros.coastdown.events import (
     Update,
     WholeGlide,
 )
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS
@@ -30,13 +34,14 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.replay.told_stop import StopTime, told_ns, with_stop
-from shipdrag_ros.samples import Block, Channel, Reason
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Reason
 from shipdrag_ros.ship import Ship
 
 SHIP_FILE = 'ship.yaml'
 PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
+StopTime = float | datetime
+"""In s from the start of the bag, or as a time of day with its zone."""
 
 # done, of how many messages
 
@@ -363,3 +368,74 @@ def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
     return own_ship and (
         PARAMETERS_FILE not in run.attachments or _parameters(run, None) == parameters
     )
+
+
+def told_ns(run: Run, stop: StopTime) -> int:
+    """
+    Return when a stop was told [ns, time of arrival].
+
+    Raises
+    ------
+    BagError
+        If it lies outside of the bag.
+    """
+    span = run.span_ns
+    start_ns, end_ns = (0, -1) if span is None else span
+    said, at_s = (
+        (f'{stop} s', stop)
+        if not isinstance(stop, datetime)
+        else (stop.isoformat(), stop.timestamp() - start_ns / SECOND_NS)
+    )
+    length_s = (end_ns - start_ns) / SECOND_NS
+    if not 0.0 <= at_s <= length_s:
+        raise BagError(
+            f'stop at {said}: expected inside of {run.name!r}, which begins at {utc(start_ns)} '
+            f'and is {max(length_s, 0.0):.3f} s long'
+        )
+    return start_ns + round(at_s * SECOND_NS)
+
+
+def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
+    """
+    Say where coastdowns begin, beside a stop that was told.
+
+    Parameters
+    ----------
+    run, stop
+        As of `told_ns`.
+    starts_ns
+        Of the coastdowns that were found.
+    """
+    told = told_ns(run, stop)
+    begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
+    return (
+        f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
+        f'at: {begins or "there is none"}'
+    )
+
+
+def with_stop(items: Iterable[Block | Mark], at_ns: int | None) -> Iterator[Block | Mark]:
+    """
+    Put a stop between the samples of a run.
+
+    Parameters
+    ----------
+    items
+        In the order of arrival.
+    at_ns
+        Its time of arrival [ns].
+    """
+    for item in items:
+        if at_ns is None or not isinstance(item, Block) or not len(item):
+            yield item
+            continue
+        first = int(np.argmax(item.receive_ns >= at_ns)) if item.receive_ns[-1] >= at_ns else -1
+        if first < 0:
+            yield item
+            continue
+        yield item[:first]
+        yield StopMark(at_ns)
+        yield item[first:]
+        at_ns = None
+    if at_ns is not None:  # after the last sample
+        yield StopMark(at_ns)

@@ -24,6 +24,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from shipdrag_ros.samples import Float64
@@ -403,6 +404,17 @@ class HullState:
         many = len(self.steps)
         return self._averaged(Functional(self._jumps(), np.full(many, np.nan), np.ones(many)))
 
+    def keep(self, needed: NDArray[np.bool_]) -> None:
+        """
+        Forget the n x n numbers of settings that neither are needed nor weigh anything.
+
+        Parameters
+        ----------
+        needed : (g,)
+        """
+        for number in np.flatnonzero(~needed & (self.weights <= _NEGLIGIBLE)).tolist():
+            self._precision[number] = np.zeros((0, 0))
+
     def asked_for(self, number: int, after: Float64) -> tuple[Float64, Float64]:
         """
         Return how the runs ask for one more step under a setting, before its prior.
@@ -504,6 +516,8 @@ class OneMore:
         total = odds.sum() + none.sum()
         self._odds, self._none = odds / total, none / total
         self.probability = self._odds.sum(axis=(0, 1))
+        self._share = self._none + self._odds.sum(axis=(1, 2))
+        state.keep(self._share > _UNLIKELY)
 
     def level(self, years: Float64) -> Mixture:
         """
@@ -538,8 +552,7 @@ class OneMore:
         """
         mean = np.zeros(len(asked.columns))
         second = np.zeros(len(asked.columns))
-        share = self._none + self._odds.sum(axis=(1, 2))
-        for number in np.flatnonzero(share > _UNLIKELY).tolist():
+        for number in np.flatnonzero(self._share > _UNLIKELY).tolist():
             value, variance, gain = self.state.given(number, asked)
             mean += self._none[number] * value
             second += self._none[number] * (value**2 + variance)

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from shipdrag_ros.display import Section, Table, day, ship_speed, speed_unit
+from shipdrag_ros.fleet.store import same_time
 from shipdrag_ros.forecast.priors import GUST
 from shipdrag_ros.forecast.result import Band, Z
 from shipdrag_ros.forecast.words import clock, way
@@ -42,7 +43,7 @@ class SpeedStep:
 @dataclass(frozen=True)
 class Poster:
     """
-    The table of a ship, the fastest step first; `runs` are their times [ns].
+    The table of a ship, the fastest step first; `runs` are their times [ns], each run once.
     """
 
     ship: Ship
@@ -67,6 +68,8 @@ def poster(ship: Ship, rows: Sequence[Mapping[str, Any]]) -> Poster:
     and gusts.
     """
     used = [row for row in rows if row['resistance_m_s2'] is not None and not row['error']]
+    copies = same_time(used)
+    used = [row for number, row in enumerate(used) if number not in copies]
     unit, name = speed_unit(ship.mass_kg)
     step = (_STEP_KN if name == 'knots' else _STEP_M_S) * unit
     tops = [_known(row)[0].max(initial=0.0) for row in used]
@@ -164,7 +167,7 @@ def write_poster(path: Path, posters: Sequence[Poster]) -> None:
         path,
         'Stopping without engine',
         sections,
-        sentence='Engine stopped, helm amidships, through water, in the weather of her runs. '
+        sentence='Engine stopped, helm amidships, through water, in calm deep water. '
         'Beside the wheelhouse poster of IMO Resolution A.601(15), Appendix 2; it does not '
-        'replace it. Other weather, another loading or hull: other figures.',
+        'replace it. In wind, shallow water, another loading or hull: other figures.',
     )

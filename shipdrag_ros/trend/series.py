@@ -271,8 +271,6 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
             sd=point.sd / clean,
             sd_repeatable=point.sd_repeatable / clean,
         )
-        if point.used
-        else point
         for point in points
     ]
     note = (

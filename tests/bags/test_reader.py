@@ -213,6 +213,18 @@ def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(
     assert run.warnings == ('split_11.mcap is listed in metadata.yaml and is not there',)
 
 
+def test_a_split_bag_may_hold_files_of_another_tool(write_bag: WriteBag, block: Block) -> None:
+    own = write_bag('a.mcap', block[:100])
+    foreign(own.with_name('b.mcap'), block[:0])
+    own.with_name('metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
+        '  relative_file_paths: [a.mcap, b.mcap]\n'
+    )
+    (run,) = open_runs([own.parent])
+    assert [path.name for path in run.paths] == ['a.mcap', 'b.mcap']
+    assert_same(read_samples(run), block[:100])
+
+
 def test_attachments_are_read_and_a_difference_between_parts_is_told(tmp_path: Path) -> None:
     for part, text in enumerate(['a: 1\n', 'a: 1\n', 'a: 2\n']):
         with BagWriter(tmp_path / f'{part}.mcap', recording_id='r', part=part) as bag:
@@ -300,6 +312,13 @@ def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -
                 '{storage_identifier: mcap, relative_file_paths: [a.mcap]}'
             },
             'lists no file that is there',
+        ),
+        (
+            {
+                'metadata.yaml': 'rosbag2_bagfile_information: '
+                '{storage_identifier: mcap, relative_file_paths: 5}'
+            },
+            'relative_file_paths is 5, expected a list',
         ),
         (
             {

@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.bags.durable import LiveFile
+from shipdrag_ros.bags.recover import SUFFIX
 from shipdrag_ros.bags.retention import DAY_S, Keep, Removed, Retention
-from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.bags.writer import BagWriter, RecordWriter
 from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.messages.topics import RESISTANCE
 
@@ -106,6 +107,33 @@ def test_what_another_node_writes_in_the_same_folder_stays(tmp_path: Path, state
     assert removed == []
     # who wrote it is gone
     assert names(retention.tidy(now_s=2 * NOW_S)) == ['00_000']
+
+
+def test_a_part_that_still_grows_is_not_judged_and_keeps_the_one_before_it(tmp_path: Path) -> None:
+    before = part(tmp_path, 0)
+    file = LiveFile(
+        tmp_path / before.name.replace('_000', '_001'), recording_id='r', part=1, attachments={}
+    )
+    retention = Retention(tmp_path, Keep(days=1e-9))
+    assert retention.tidy(now_s=2 * NOW_S) == []
+    file.release()  # it is judged as it is now, though nothing was written since
+    assert names(retention.tidy(now_s=2 * NOW_S)) == ['00_000', '00_001']
+
+
+def test_what_a_killed_compaction_left_is_counted_and_goes_first(tmp_path: Path) -> None:
+    kept = part(tmp_path, 1)
+    left = [f'{kept.name}{SUFFIX}', f'.{kept.name}{SUFFIX}.part']
+    for name in left:
+        (tmp_path / name).write_bytes(b'half of a bag')
+    running = RecordWriter(tmp_path / f'.{kept.name.replace("_000", "_001")}{SUFFIX}.part')
+    retention = Retention(tmp_path, Keep(size_bytes=2 * 4096))
+    removed = retention.tidy(now_s=NOW_S)
+    assert {one.path.name for one in removed} == set(left)
+    assert retention.over_bytes == 0
+    assert set(tmp_path.iterdir()) == {kept, running.path}
+    running.close()
+    Retention(tmp_path, Keep(days=1e-9)).tidy(now_s=2 * NOW_S)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_where_nobody_said_how_much_a_coastdown_is_never_removed(tmp_path: Path) -> None:

@@ -49,6 +49,18 @@ def test_a_remapping_changes_what_is_heard(
     assert 'speed_through_water' in about['missing_inputs']
 
 
+def test_of_a_part_only_what_is_in_it_is_shown(
+    steady_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(['info', f'{steady_bag}@100:150', str(steady_bag), '--json']) == 0
+    part, whole = json.loads(capsys.readouterr().out)['bags']
+    assert whole['messages'] == 4 * 302
+    assert (part['duration_s'], part['messages']) == (50.0, 4 * 51)
+    assert part['start_ns'] - whole['start_ns'] == 100 * 10**9
+    assert {topic['rate_hz'] for topic in part['topics']} == {1.0}
+
+
 def test_a_log_is_shown_as_its_bag_would_be(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

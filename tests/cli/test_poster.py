@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.fleet.store import Store
+from shipdrag_ros.fleet.store import BagResult, Store
 from shipdrag_ros.ship import Ship
+from tests.conftest import fleet_result
 
 NAME = 'Test <b>ship</b>'
 
@@ -47,6 +48,18 @@ def test_times_and_ways_are_those_of_the_curves(store: Path, tmp_path: Path) -> 
     assert 'Stopping without engine' in text
     assert 'A.601(15)' in text
     assert '<b>ship</b>' not in text
+
+
+def test_coastdowns_without_a_table_are_those_of_the_ship(
+    store: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slow = fleet_result(50, 0.0)
+    rows = tuple(row | {'speed_m_s': 0.01 * row['speed_m_s']} for row in slow.coastdowns)
+    Store(store).write(BagResult(slow.bag | {'ship': 'Slow'}, rows))
+    text = Ship(name='Slow', length_m=80.0, displaced_volume_m3=4_000.0).to_yaml()
+    Store(store).keep_ship('Slow', {'ship.yaml': text})
+    assert main(['poster', str(store)]) == 0
+    assert 'None of 1 coastdowns' in capsys.readouterr().out
 
 
 def test_a_ship_without_a_file_is_named(

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from shipdrag_ros.cli import main
-from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.cli import main, watch
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.windowed import WindowedBag, open_parts, open_windowed, windowed_bag
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.replaying import WindowedRun, refuse_overlaps
 
@@ -67,6 +68,18 @@ def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> No
         (str(coastdown_bag), (450.0, 800.0)),
         (str(other), (500.0, 1000.0)),
     ]
+
+
+def test_watch_plays_the_part_that_is_given(coastdown_bag: Path) -> None:
+    parser = argparse.ArgumentParser()
+    watch.add_arguments(parser)
+    options = parser.parse_args([f'{coastdown_bag}@400:460', str(coastdown_bag)])
+    part, whole = open_parts(options.bags, Output(), remap={})
+    with watch._source(options, None, [], Output()) as (source, _):
+        player = source.player()
+    assert player is not None
+    assert (player['start_s'], player['end_s']) == tuple(each // 10**9 for each in part.span_ns)
+    assert whole.span_ns[0] + 400 * 10**9 == part.span_ns[0]
 
 
 def replayed(capsys: pytest.CaptureFixture[str], *words: str) -> Any:

@@ -193,6 +193,7 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
     values = {'lifecycle': 'active', 'monitor': 'waiting'}
     state = Status('n', 'state', ERROR, 'no data: nothing on any of a, b', values)
     values_of = {'rejected nan': '3', 'rejected late': '0', 'rate [Hz]': '2', 'age [s]': '0.5'}
+    values_of |= {'rejected absurd': '9' * 400, 'rejected frozen': '²'}  # of a peer
     heading = Status('n', 'input heading', 1, 'frozen', values_of)
     bridge.hear(Health((state, heading)), 10.0)
     parts = bridge.parts(11.0)
@@ -398,6 +399,14 @@ def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:
         bridge.hear(Health((Status('node', 'state', 0, '', values),)), 0.0)
     said = str(bridge.parts(1.0)['notes'])
     assert said.count('events brings what is not understood (KeyError') == 1
+
+
+def test_a_coastdown_of_a_peer_with_a_heading_that_is_none_is_not_taken() -> None:
+    note = EventNote(EventKind.COASTDOWN, 5, 'a coastdown has ended', {'heading_rad': 'nan'})
+    bridge = Bridge()
+    bridge.hear(NodeMessage('events', event_message(note).payload), 0.0)
+    assert 'ValueError: heading_rad is nan' in str(bridge.parts(1.0)['notes'])
+    assert not bridge.past
 
 
 def test_a_picture_that_cannot_be_made_is_said_on_the_page_until_it_can() -> None:

@@ -144,6 +144,19 @@ def test_what_gives_nothing_is_counted() -> None:
     assert interpreter.sentences == 6
 
 
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        ('HEHDT,1e9999,T', 'heading HDT: not a number'),
+        ('WIMWV,1e9999,R,5.0,N,A', 'wind_apparent MWV: not a number'),
+    ],
+)
+def test_a_number_without_end_is_counted(content: str, reason: str) -> None:
+    interpreter = Interpreter()
+    assert interpreter.messages(sentence(content), LINE, START_NS) == []
+    assert interpreter.no_value == {reason: 1}
+
+
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=120))
 def test_no_text_is_an_error(content: str) -> None:
     interpreter = Interpreter()

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import EndedBy
-from shipdrag_ros.replay import clocks_apart, coast_windows, replay
+from shipdrag_ros.replay import accepted_samples, clocks_apart, coast_windows, replay
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from tests.runs import write_run
 
@@ -74,3 +75,16 @@ def test_a_window_that_was_given_stays(ship, parameters, voyage, tmp_path) -> No
     assert coastdown.ended_by is EndedBy.GIVEN
     assert (window.start_ns, window.end_ns) == (coastdown.start_ns, coastdown.end_ns)
     assert len(window.speed_through_water.value) > 400
+
+
+@pytest.mark.parametrize('channel', [Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2])
+def test_zeros_of_any_log_are_kept_where_asked_for(tmp_path: Path, channel: Channel) -> None:
+    stamps = 10**18 + np.arange(1200) * 10**9
+    speed = np.linspace(8.0, -8.0, len(stamps))
+    speed += 0.01 * np.random.default_rng(1).standard_normal(len(stamps))
+    speed = np.maximum(speed, 0.0)
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', Block.of(channel, stamps, speed))])
+    sound, _ = accepted_samples(run)
+    every, _ = accepted_samples(run, zeros=True)
+    assert len(sound) < 1000
+    assert len(every) == len(stamps)

@@ -12,7 +12,7 @@ import pytest
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import Event, Update
-from shipdrag_ros.messages import OutputMessage
+from shipdrag_ros.messages import OutputMessage, types
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.comparison import Comparison
@@ -49,6 +49,15 @@ def test_comparison(
     else:
         assert found.first_difference is not None
         assert expected[2] in found.first_difference
+
+
+def test_a_recorded_cloud_of_no_whole_figures_is_a_difference() -> None:
+    kind = 'sensor_msgs/msg/PointCloud2'
+    cloud = types.make(kind, header=types.header(5, ''), data=np.zeros(5, np.uint8))
+    curve = OutputMessage('/n/resistance_curve', kind, types.serialize(kind, cloud), 5)
+    found = Comparison(iter([curve])).finish()
+    assert (found.compared, found.identical, found.largest_difference) == (1, 0, np.inf)
+    assert 'at 5 ns: recorded 0 points' in str(found.first_difference)
 
 
 def test_topics_are_compared_each_for_itself() -> None:

@@ -6,8 +6,12 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import shutil
+import sqlite3
+import struct
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +23,7 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import best_of, head_of
+from shipdrag_ros.sources.formats import n2k
 from shipdrag_ros.sources.reading import (
     LogRun,
     Understanding,
@@ -295,6 +300,8 @@ def test_a_library_that_is_not_there_is_named(
             'declares XML entities',
         ),
         ('far.gpx', '<!DOCTYPE gpx SYSTEM "http://example.org/x"><gpx></gpx>', 'declares XML'),
+        ('nope.gpx', '<?xml version="1.0" encoding="nope"?><gpx></gpx>', 'unknown encoding'),
+        ('sjis.gpx', '<?xml version="1.0" encoding="shift_jis"?><gpx></gpx>', 'encodings are not'),
         ('deep.gpx', '<gpx>' + '<a>' * 5000, 'more than 32 deep'),
         ('deep.jsonl', '{"updates":' + '[' * 100_000, 'too long for a delta'),
         ('cut.bag', '#ROSBAG V2.0\n', 'holds no message'),
@@ -308,6 +315,62 @@ def test_hostile_files_are_refused(tmp_path: Path, name: str, content: str, why:
     path.write_text(content)
     with pytest.raises(ImportDataError, match=why):
         read_any([path])
+
+
+def test_attributes_of_a_point_may_have_any_name(files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / 'track.gpx'
+    path.write_text(files['gpx'].read_text().replace('<trkpt', '<trkpt self="1" point="2"'))
+    whole, found = block_of(files['gpx']), block_of(path)
+    np.testing.assert_array_equal(found.value, whole.value)
+
+
+def test_what_a_killed_recorder_left_in_the_log_of_sqlite3_is_read(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / 'grows.db3'
+    shutil.copy(files['sqlite3'], path)
+    with closing(sqlite3.connect(path)) as database:
+        database.execute('pragma journal_mode = wal')
+        database.execute(
+            'insert into messages (topic_id, timestamp, data)'
+            ' select topic_id, timestamp + 3600000000000, data from messages'
+        )
+        database.commit()
+        bag = tmp_path / 'bag'
+        bag.mkdir()
+        left = [shutil.copy(f'{path}{end}', bag) for end in ('', '-wal')]
+    assert len(block_of(Path(left[0]))) == 2 * len(block_of(files['sqlite3']))
+    assert sorted(map(str, bag.iterdir())) == left
+
+
+def test_a_heading_without_end_costs_no_other_value_of_a_log_of_ardupilot(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    needs('ardupilot')
+    path = tmp_path / 'log.bin'
+    about = struct.pack('<BB4s16s64s', 132, 15, b'ATT', b'Qf', b'TimeUS,Yaw')
+    endless = struct.pack('<Qf', 79_000_000, math.inf)
+    start = b'\xa3\x95'
+    raw = files['ardupilot'].read_bytes() + start + b'\x80' + about + start + b'\x84' + endless
+    path.write_bytes(raw)
+    shown: list[Understanding] = []
+    read_any([path], show=shown.append)
+    assert any('no possible value' in line for line in shown[0].lines())
+    found, whole = (
+        values(block_of(each), Channel.POSITION_GEODETIC) for each in (path, files['ardupilot'])
+    )
+    np.testing.assert_array_equal(found, whole)
+
+
+def test_frames_of_senders_that_have_names_are_never_mixed() -> None:
+    packets = n2k._Packets()
+
+    def push(data: bytes) -> list[bytes | None]:
+        frames = (n2k.N2kFrame(0, 0, 129029, f'{k:016X}', data, False) for k in range(60))
+        return [packets.whole(frame) for frame in frames]
+
+    assert push(bytes([0x20, 13, *range(6)])) == [None] * 60
+    assert push(bytes([0x21, *range(6, 13)])) == [bytes(range(13))] * 60
 
 
 def test_a_line_of_deep_brackets_is_counted(tmp_path: Path) -> None:

@@ -506,6 +506,14 @@ def test_a_prefix_that_is_no_time_is_counted_and_its_sentence_taken() -> None:
     }
 
 
+def test_a_long_prefix_costs_no_more_than_its_length() -> None:
+    log = lines(rmc(0), *(f'2024-{" " * 3900}x{vhw(1)}' for _ in range(20)))
+    begin = time.process_time()
+    result, _ = run(log)
+    assert time.process_time() - begin < 0.5
+    assert count(result, 'line') == {'prefix not understood': 20}
+
+
 # broken lines and files
 
 

@@ -81,9 +81,12 @@ def test_two_runs_of_one_wrong_clock_are_no_step():
 
 def test_without_a_baseline_the_first_months_are_the_clean_hull():
     rows = [row(day, added, clean_m_s2=None) for day, added in ((0, 0.1), (10, 0.1), (300, 0.32))]
+    rows.append(rows[0] | {'bag': 'copy'})
     series = series_of('Test', rows)
     assert series.clean == 'first months'
     assert series.points[-1].value == pytest.approx(1.32 / 1.1 - 1.0, abs=1e-3)
+    [left] = [point for point in series.points if not point.used]  # r itself is no value of it
+    assert abs(left.value) < 0.01
     assert 'mean of the first 2 run(s)' in series.notes[0]
 
 

@@ -43,7 +43,7 @@ def _open(job: Job, log: Log) -> StreamResult:
                 _silence(),
                 closing(DFReader_binary(str(job.source))) as stored,
             ):
-                found = list(_readings(stored, tally))
+                found.extend(_readings(stored, tally))
         except Exception as error:  # the parser raises what a damaged byte happens to raise
             tally.note(f'The log could not be read to its end: {error or type(error).__name__}.')
         yield from found
@@ -74,8 +74,7 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
             tally.note(UNDATED)
         fields = message.to_dict()
         for channel, rank, name, a, b in _values(fields):
-            if isfinite(a) and isfinite(b):
-                yield Reading(channel, Origin(rank, name), stamp_ns, a, b)
+            yield Reading(channel, Origin(rank, name), stamp_ns, a, b)
 
 
 def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, float]]:
@@ -88,7 +87,8 @@ def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, 
     elif kind == 'POS':
         yield Channel.POSITION_GEODETIC, 10, name, float(fields['Lat']), float(fields['Lng'])
     elif kind == 'ATT':
-        yaw = remainder(pi / 2.0 - radians(float(fields['Yaw'])), 2.0 * pi)
+        yaw = pi / 2.0 - radians(float(fields['Yaw']))
+        yaw = remainder(yaw, 2.0 * pi) if isfinite(yaw) else yaw
         yield Channel.HEADING, 0, name, yaw, 0.0
     elif kind == 'ESC' and number < len(SHAFTS):
         yield SHAFTS[number], 0, name, float(fields['RPM']) * pi / 30.0, 0.0

@@ -10,7 +10,7 @@ and are counted.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC
 from xml.parsers import expat
 
@@ -51,7 +51,7 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
                 if file is not raw:
                     check_unpacked(job.source, size, raw.tell())
                 points.parser.Parse(chunk, not chunk)
-            except (expat.ExpatError, OSError, EOFError) as error:
+            except (expat.ExpatError, LookupError, ValueError, OSError, EOFError) as error:
                 tally.note(f'The file is damaged, {error}; this is what stands before.')
                 chunk = b''
             yield from points.found
@@ -101,11 +101,12 @@ class _Points:
         self._name = ''
         if name.rpartition(' ')[2] == 'trkpt' and self._point is not None:
             self._tally.records += 1
-            self._take(**self._point)
+            self._take(self._point)
             self._point = None
 
-    def _take(self, time: str, speed: str, lat: str = '', lon: str = '', **_: str) -> None:
-        text = time.strip()
+    def _take(self, point: Mapping[str, str]) -> None:
+        text, speed = point['time'].strip(), point['speed']
+        lat, lon = point.get('lat', ''), point.get('lon', '')
         stamp_ns = iso_ns(text, UTC)
         if stamp_ns is None:
             self._tally.reject('time', 'no time' if text else 'no time of the point', text)

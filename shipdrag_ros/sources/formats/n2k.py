@@ -274,11 +274,12 @@ class _Packets:
     def __init__(self) -> None:
         self._canboat = _backend().canboat
         self._parts = self._canboat.Reassembler()
+        self._senders: dict[str, int] = {}
 
     def whole(self, frame: N2kFrame) -> bytes | None:
         if frame.whole or frame.pgn not in _FAST:
             return frame.data
-        sender = int(frame.sender) if frame.sender.isdecimal() else hash(frame.sender) % 254
+        sender = self._senders.setdefault(frame.sender, len(self._senders))
         try:
             data: bytes | None = self._parts.push(frame.pgn, frame.data, sender % 256)
         except self._canboat.ReassemblyError:

@@ -195,8 +195,11 @@ def _sqlite(path: Path, tally: Tally) -> Iterator[EncodedMessage]:
 
 
 def _one_sqlite(file: Path, tally: Tally) -> Iterator[EncodedMessage]:
-    uri = f'file:{quote(str(file.resolve()))}?mode=ro&immutable=1'
+    log = file.with_name(f'{file.name}-wal')  # of what came last, where a recorder was killed
+    how = 'vfs=unix-none' if log.is_file() and log.stat().st_size else 'immutable=1'
+    uri = f'file:{quote(str(file.resolve()))}?mode=ro&{how}'
     with closing(sqlite3.connect(uri, uri=True)) as database:
+        database.execute('pragma locking_mode = exclusive')  # no index of the log beside the bag
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MESSAGE_BYTES)
         tables = {
             str(name)

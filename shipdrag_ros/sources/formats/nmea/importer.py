@@ -67,7 +67,7 @@ _TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
 _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
 _EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
-_DATED = re.compile(r'(?:\w{1,40}\s+)?\[?(\d{4}-[^\]]+?)\]?[\s,;:]*')
+_DATED = re.compile(r'(?:\w{1,40}\s+)?\[?(\d{4}-[^\]]{1,60}?)\]?[\s,;:]*')
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
 
 
