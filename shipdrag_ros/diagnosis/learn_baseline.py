@@ -243,7 +243,7 @@ def _from_curves(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -
         together = combine(found, [None] * len(found))
         speed, r = together.speed_m_s, together.resistance_m_s2
     else:
-        curve = found[0].valid_calm
+        curve = found[0].valid_curve
         speed, r = curve.speed_m_s, curve.resistance_m_s2
     if len(speed) < 2:
         raise EstimationError(
