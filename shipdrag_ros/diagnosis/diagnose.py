@@ -48,7 +48,7 @@ _APART_M_S = 0.15  # slowly: six times what is usual of water
 _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
-SeenRuns = tuple[tuple[Observation, ...], tuple[str, ...]]
+Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
 """Runs, and what is to be said about them."""
 
 
@@ -221,8 +221,8 @@ Case = TypeVar('Case', bound=ComparedRuns)
 
 
 def settled(
-    look: Callable[[Mapping[str, float]], SeenRuns],
-    first: SeenRuns,
+    look: Callable[[Mapping[str, float]], Observed],
+    first: Observed,
     compared: Callable[[tuple[Observation, ...]], Case],
 ) -> tuple[Case, tuple[str, ...]]:
     """
@@ -326,7 +326,7 @@ def observed(
     parameters: Parameters,
     moved_s: Mapping[str, float],
     progress: Progress,
-) -> SeenRuns:
+) -> Observed:
     """
     Return the runs that can be diagnosed, and what is to be said about them.
 

@@ -183,14 +183,9 @@ def _at(curves: Sequence[ResistanceCurve], shifts: Float64, speed: Float64) -> F
     """Return r, repeatable variance and variance of n_r: (3, runs, m)."""
     found = np.empty((3, len(curves), len(speed)))
     for i, (curve, shift) in enumerate(zip(curves, shifts)):
-        for k, values in enumerate(
-            (
-                curve.resistance_m_s2,
-                curve.sigma_repeatable_m_s2**2,
-                curve.sigma_m_s2**2 - curve.sigma_repeatable_m_s2**2,
-            )
-        ):
-            found[k, i] = np.interp(speed + shift, curve.speed_m_s, values)
+        repeatable = curve.sigma_repeatable_m_s2**2
+        parts = curve.resistance_m_s2, repeatable, curve.sigma_m_s2**2 - repeatable
+        found[:, i] = [np.interp(speed + shift, curve.speed_m_s, part) for part in parts]
     return found
 
 

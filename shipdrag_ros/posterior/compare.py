@@ -190,12 +190,8 @@ class ComparedHypotheses(Generic[Fit]):
     @cached_property
     def best(self) -> dict[Names, Fit]:
         """The likeliest way of each set of names."""
-        found: dict[Names, Fit] = {}
-        for each in self.fitted:
-            old = found.get(each.names)
-            if old is None or each.log_weight > old.log_weight:
-                found[each.names] = each
-        return found
+        ordered = sorted(self.fitted, key=lambda fit: fit.log_weight)
+        return {each.names: each for each in ordered}
 
     def sizes(self, name: str) -> list[SizePosterior]:
         """
@@ -270,13 +266,10 @@ class Comparing:
         scores, amounts, responses = self._score(nothing, ways)
         self._learn(nothing, ways, scores, responses)
         singles = self._likeliest(nothing, ways, scores, amounts, responses)
-        smooth = [
-            Fitted(smooth, self._widened(nothing, smooth))
-            for where in self.smooth
-            for smooth in (replace(self.base, smooth=where),)
-        ]
+        smooth = [replace(self.base, smooth=where) for where in self.smooth]
         nothing.cost = math.inf
-        every = [nothing, *smooth, *singles]
+        every = [nothing, *(Fitted(each, self._widened(nothing, each)) for each in smooth)]
+        every += singles
         self._climb(every)
         every = self._weigh(every)
         for more in (self._pairs, self._differing):
@@ -413,11 +406,9 @@ class Comparing:
         """
         way = self.ways[name][0]
         prior = way.unknowns[0].prior
-        z = list(way.start)
+        z = [prior.inverse(math.copysign(bound, prior.first)), *way.start[1:]]
         run = self.runs.runs[0]
         still, speed = self.runs.still(0, self.nothing.at)
-        sign = -1.0 if prior.first < 0.0 else 1.0
-        z[0] = prior.inverse(sign * bound)
         shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
         rows, model = run.model.rows, run.model
         by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
@@ -558,8 +549,7 @@ class Comparing:
         """
         score, information = self._given_way(base, responses)
         own = np.maximum(np.diag(information), 0.0)
-        amounts = np.array([_amount(each.ways[-1]) for each in hypotheses]).reshape(-1, 2)
-        prior, held = amounts[:, 0], amounts[:, 1]
+        prior, held = np.array([_amount(h.ways[-1]) for h in hypotheses]).reshape(-1, 2).T
         slope = score + held * prior
         found: Float64 = 0.5 * (slope**2 / (own + held) - held * prior**2)
         found -= 0.5 * np.log((own + held) / held)
@@ -838,8 +828,7 @@ def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> Run
 def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
-    log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt, log_prior, learnt.typical)
+    return _RunNoise(learnt, weight - alike if len(alike) else weight, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:

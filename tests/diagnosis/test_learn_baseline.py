@@ -161,6 +161,16 @@ def test_what_is_stated_of_friction_and_wave_together_counts() -> None:
     assert chance[0] < 0.5 * chance[1]
 
 
+def test_one_run_of_a_ship_without_a_baseline_is_its_table() -> None:
+    # N = 3, seeds 90 to 92: as the runs were read, and not without the wind that might have blown
+    bare, speed = replace(SHIP, baseline=None), np.linspace(4.0, 7.5, 30)
+    off = []
+    for seed in range(90, 93):
+        found = learn_baseline([coast(SHIP, seed=seed)], bare, PARAMETERS).ship
+        off.append(found.resistance_n(speed) / SHIP.resistance_n(speed) - 1.0)
+    assert abs(np.mean(off)) < 0.01
+
+
 def test_needs_a_run() -> None:
     with pytest.raises(DiagnosisError, match='no run'):
         learn_baseline([], SHIP, PARAMETERS)
