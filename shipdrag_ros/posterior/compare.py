@@ -65,7 +65,7 @@ _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
 LIKELY = 0.03  # probability of names that may leave something smooth
 _FEWEST = 5  # rows of a curve
-_LITTLE = 1e-6  # of a trace, as good as none of the effect
+_LITTLE = 1e-6  # of a trace: as good as none of the effect
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
