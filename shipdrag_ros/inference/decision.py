@@ -227,7 +227,8 @@ def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:
 
 
 _UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
-_POINTS = np.linspace(-4.0, 4.0, 161)  # in z, of a prior
+_APART = 0.1  # in z, of Gaussians of that sd whose sum is a prior
+_POINTS = np.arange(-40, 41) * _APART
 
 
 class SizePosterior(NamedTuple):
@@ -254,7 +255,7 @@ class SizePosterior(NamedTuple):
     power: float = 1.0
 
 
-def amounts(prior: Prior, power: float, z: Float64) -> Float64:
+def amounts(prior: Prior, power: float, z: Float64) -> tuple[Float64, Float64]:
     """
     Return how much there is of a trace at some z, to which it is in proportion.
 
@@ -265,19 +266,27 @@ def amounts(prior: Prior, power: float, z: Float64) -> Float64:
     power
         Of the size in its trace.
     z : (m,)
+
+    Returns
+    -------
+    amount, slope : (m,)
+        The slope is its derivative by z.
     """
-    value = np.array([prior.at(one) for one in z.tolist()])
-    result: Float64 = np.sign(value) * np.abs(value) ** power
-    return result
+    value, slope = np.array([(prior.at(one), prior.slope(one)) for one in z.tolist()]).T
+    size = np.abs(value)
+    return np.sign(value) * size**power, power * size ** (power - 1.0) * slope
 
 
-def prior_amounts(prior: Prior, power: float) -> tuple[Float64, Float64]:
+def prior_amounts(prior: Prior, power: float) -> Float64:
     """
-    Return amounts that stand for a prior, and the logarithms of their probabilities: (k,) each.
+    Return Gaussians whose sum is a prior of amounts: (3, k), of which 0 is the middle.
+
+    Their means, standard deviations and the logarithms of their weights.
     """
-    z = np.abs(_POINTS) if prior.shape is Shape.HALF_NORMAL else _POINTS
-    log_chance = -0.5 * z**2
-    return amounts(prior, power, z), log_chance - logsumexp(log_chance)
+    z: Float64 = np.abs(_POINTS) if prior.shape is Shape.HALF_NORMAL else _POINTS
+    amount, slope = amounts(prior, power, z)
+    log_chance = -0.5 * z**2 / (1.0 - _APART**2)
+    return np.array([amount, np.abs(_APART * slope), log_chance - logsumexp(log_chance)])
 
 
 def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
@@ -318,10 +327,8 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
         if each.prior.shape is Shape.HALF_NORMAL:
             edge = np.union1d(edge[edge >= 0.0], np.geomspace(1e-6, 10.0, 400))
         z = 0.5 * (edge[1:] + edge[:-1])
-        middle = amounts(each.prior, each.power, np.array([each.z]))
-        slope = each.power * abs(each.prior.at(each.z)) ** (each.power - 1.0)
-        slope *= each.prior.slope(each.z)
-        apart = (amounts(each.prior, each.power, z) - middle) / slope
+        middle, slope = amounts(each.prior, each.power, np.array([each.z]))
+        apart = (amounts(each.prior, each.power, z)[0] - middle) / slope
         information = max(sd**-2.0 - 1.0, 0.0)
         log = -0.5 * z**2 + each.z * apart - 0.5 * information * apart**2
         weight = np.exp(log - log.max()) * np.diff(edge)
@@ -335,9 +342,7 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     return float(np.interp(share, np.cumsum(weight) - 0.5 * weight, value))
 
 
-def named_from(
-    information: Float64, amount: Float64, log_chance: Float64, log_odds: Float64
-) -> Float64:
+def named_from(information: Float64, prior: Float64, log_odds: Float64) -> Float64:
     """
     Return the least amount of each effect that nine of ten such records name.
 
@@ -346,8 +351,8 @@ def named_from(
     information : (2 e, 2 e)
         Products of whitened traces about nothing missing, less what the nuisances take up: first
         of those that effects leave however small they are, then of what a unit amount adds.
-    amount, log_chance : (e, k)
-        Amounts that stand for the prior of each, and the logarithms of their probabilities.
+    prior : (3, e, k)
+        Gaussians whose sum is the prior of each amount, from `prior_amounts`.
     log_odds : (e,)
         Prior log odds over nothing.
 
@@ -361,36 +366,37 @@ def named_from(
     -----
     With the traces c_f + a d_f of each effect f, its log evidence over nothing where the truth is
     t = c_e + A d_e is the logarithm of the mean, over the prior of a, of exp((c_f + a d_f) t -
-    (c_f + a d_f)^2 / 2), and noise adds its product with c_f + a d_f at the mean of a. Over each
-    rival that is taken which one record of ten falls below, to first order in the noise.
+    (c_f + a d_f)^2 / 2), of each Gaussian in closed form, and noise adds its product with c_f +
+    a d_f at the mean of a. Over each rival that is taken which one record of ten falls below, to
+    first order in the noise.
     """
     count = len(log_odds)
     (cc, cd), (_, dd) = information.reshape(2, count, 2, count).swapaxes(1, 2)
 
-    def square(a: Float64) -> Float64:
-        """Of the traces of amounts (e, m)."""
-        return np.diag(cc)[:, None] + a * (2.0 * np.diag(cd)[:, None] + a * np.diag(dd)[:, None])
-
-    prior = log_chance - 0.5 * square(amount)
+    still, both, own = np.diag(cc), np.diag(cd), np.diag(dd)
+    amount, sd, log_chance = prior
+    held = sd**-2.0
+    total = own[:, None] + held
+    constant = log_chance - 0.5 * (held * amount**2 + np.log(total / held) + still[:, None])
     found = np.full(count, np.inf)
     for e in range(count):
-        sizes = np.unique(np.abs(np.append(amount[e, ::2], 0.0)))[:, None]
-        still, more = cc[:, e] + sizes * cd[:, e], cd[e] + sizes * dd[e]
-        logs = still[:, :, None] + more[:, :, None] * amount + prior
+        sizes = np.unique(np.abs(np.append(amount[e], 0.0)))[:, None]
+        right = (cd[e] + sizes * dd[e] - both)[:, :, None] + held * amount
+        logs = (cc[:, e] + sizes * cd[:, e])[:, :, None] + 0.5 * right**2 / total + constant
         top = logs.max(axis=2)
         likely = np.exp(logs - top[:, :, None])
-        total = likely.sum(axis=2)
-        gain = top + np.log(total) + log_odds
-        mean = np.einsum('ijk,jk->ij', likely, amount) / total
-        own, mine = square(mean.T).T, mean[:, [e]]
+        share = likely.sum(axis=2)
+        gain = top + np.log(share) + log_odds
+        mean = (likely * right / total).sum(axis=2) / share
+        square, mine = still + mean * (2.0 * both + mean * own), mean[:, [e]]
         shared = cc[e] + mean * cd[e] + mine * (cd[:, e] + mean * dd[e])
         rivals = np.arange(count) != e  # and nothing in its own place
         ahead = gain[:, [e]] - rivals * gain
-        noise = np.sqrt(np.maximum(own[:, [e]] + rivals * (own - 2.0 * shared), 0.0))
+        noise = np.sqrt(np.maximum(square[:, [e]] + rivals * (square - 2.0 * shared), 0.0))
         least = ahead - _UNLUCKY_SD * noise
         chance = 1.0 / (1.0 + np.exp(-np.clip(least, -700.0, 700.0)).sum(axis=1))
         first = int(np.argmax(chance >= CERTAIN))
         if chance[first] >= CERTAIN:
-            both = slice(max(first - 1, 0), first + 1)
-            found[e] = np.interp(CERTAIN, chance[both], sizes[both, 0])
+            around = slice(max(first - 1, 0), first + 1)
+            found[e] = np.interp(CERTAIN, chance[around], sizes[around, 0])
     return found

@@ -378,9 +378,9 @@ class Comparing:
         for lines in responses:
             lines[len(ways) :] -= lines[: len(ways)]
         _, information = self._given_way(self.nothing, responses)
-        amount, log_chance = zip(*(way.amounts() for way in ways), strict=True)
+        prior = np.stack([way.amounts() for way in ways], axis=1)
         log_odds = np.array([math.log(way.effect.odds) for way in ways])
-        sizes = named_from(information, np.array(amount), np.array(log_chance), log_odds)
+        sizes = named_from(information, prior, log_odds)
         never = {name for group in inseparable for name in group}
         return {
             way.effect.name: abs(way.size_of(size))

@@ -103,11 +103,12 @@ class EffectWay:
         log_normal = self.unknowns[0].prior.shape is Shape.LOG_NORMAL
         return self.effect.size_power if log_normal else 1.0
 
-    def amounts(self) -> tuple[Float64, Float64]:
-        """Return amounts that stand for its prior, over that which is tried, and ln chances."""
+    def amounts(self) -> Float64:
+        """Return its prior as `prior_amounts`, of amounts over that which is tried."""
         prior = self.unknowns[0].prior
-        amount, log_chance = prior_amounts(prior, self.power)
-        return amount / amounts(prior, self.power, np.array(self.tried()[:1])), log_chance
+        found = prior_amounts(prior, self.power)
+        found[:2] /= amounts(prior, self.power, np.array(self.tried()[:1]))[0]
+        return np.abs(found, out=found, where=[[False], [True], [False]])
 
     def size_of(self, amount: float) -> float:
         """Return the size of which there is so much of the trace that is tried."""

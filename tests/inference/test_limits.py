@@ -81,9 +81,9 @@ def test_the_limit_of_a_log_normal_size_is_that_of_its_posterior_on_a_grid(
 def _named(traces: Float64, priors: list[Prior], still: Float64 | None = None) -> list[float]:
     """Return amounts from which traces (e, n), beside those of no size, are named."""
     lines = np.vstack([np.zeros_like(traces) if still is None else still, traces])
-    amount, log_chance = zip(*(prior_amounts(prior, 1.0) for prior in priors), strict=True)
-    known = lines @ lines.T, np.array(amount), np.array(log_chance)
-    return named_from(*known, np.full(len(traces), math.log(0.05))).tolist()
+    gaussians = np.stack([prior_amounts(prior, 1.0) for prior in priors], axis=1)
+    found = named_from(lines @ lines.T, gaussians, np.full(len(traces), math.log(0.05)))
+    return [float(amount) for amount in found]
 
 
 def test_nine_of_ten_records_of_that_size_name_it() -> None:
@@ -125,6 +125,16 @@ def test_a_size_that_is_always_there_has_a_trace_that_is_named_however_small_it_
     first, second = _named(traces, [log_normal(1.0, 0.6)] * 2, still)
     assert first == 0.0
     assert 0.5 < second < 3.0
+
+
+def test_what_a_record_says_sharply_is_named_no_sooner_beside_a_look_alike() -> None:
+    # of sizes known to a hundredth of their priors, and traces alike but for three sd of noise
+    traces = 100.0 * np.array([[1.0, 0.0], [1.0, 0.03]])
+    priors = [normal(1.0), normal(1.0)]
+    alone, beside = _named(traces[:1], priors[:1])[0], _named(traces, priors)
+    assert alone < 0.1
+    # apart by 3 A sd: named from about 5 sd
+    assert all(1.0 < amount < 3.0 for amount in beside)
 
 
 def test_no_size_is_named_where_another_has_the_same_trace() -> None:
