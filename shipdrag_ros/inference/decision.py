@@ -228,7 +228,7 @@ def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:
 
 _UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
 _APART = 0.1  # in z, of Gaussians of that sd whose sum is a prior
-_POINTS = np.arange(-40, 41) * _APART
+_POINTS = np.linspace(-4.0, 4.0, round(8.0 / _APART) + 1)
 
 
 class SizePosterior(NamedTuple):
@@ -277,16 +277,20 @@ def amounts(prior: Prior, power: float, z: Float64) -> tuple[Float64, Float64]:
     return np.sign(value) * size**power, power * size ** (power - 1.0) * slope
 
 
-def prior_amounts(prior: Prior, power: float) -> Float64:
+def prior_amounts(prior: Prior, power: float, unit: float = 1.0) -> Float64:
     """
-    Return Gaussians whose sum is a prior of amounts: (3, k), of which 0 is the middle.
+    Return Gaussians whose sum is a prior of amounts over some unit.
 
-    Their means, standard deviations and the logarithms of their weights.
+    Returns
+    -------
+    (3, k)
+        Their means, standard deviations and the logarithms of their weights.
     """
-    z: Float64 = np.abs(_POINTS) if prior.shape is Shape.HALF_NORMAL else _POINTS
+    z = np.abs(_POINTS) if prior.shape is Shape.HALF_NORMAL else _POINTS
     amount, slope = amounts(prior, power, z)
     log_chance = -0.5 * z**2 / (1.0 - _APART**2)
-    return np.array([amount, np.abs(_APART * slope), log_chance - logsumexp(log_chance)])
+    sd = np.abs(_APART * slope / unit)
+    return np.array([amount / unit, sd, log_chance - logsumexp(log_chance)])
 
 
 def quantile(sizes: Sequence[SizePosterior], share: float) -> float:

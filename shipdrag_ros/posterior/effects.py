@@ -106,9 +106,8 @@ class EffectWay:
     def amounts(self) -> Float64:
         """Return its prior as `prior_amounts`, of amounts over that which is tried."""
         prior = self.unknowns[0].prior
-        found = prior_amounts(prior, self.power)
-        found[:2] /= amounts(prior, self.power, np.array(self.tried()[:1]))[0]
-        return np.abs(found, out=found, where=[[False], [True], [False]])
+        tried, _ = amounts(prior, self.power, np.array(self.tried()[:1]))
+        return prior_amounts(prior, self.power, tried[0])
 
     def size_of(self, amount: float) -> float:
         """Return the size of which there is so much of the trace that is tried."""
