@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
 from shipdrag_ros.diagnosis.carried import Carried, carried
@@ -46,6 +48,9 @@ _LOOKS = 3  # at a run
 _APART_M_S = 0.15  # slowly: six times what is usual of water
 _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
+
+Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
+"""Runs, and what is to be said about them."""
 
 
 def diagnose(
@@ -123,7 +128,8 @@ def diagnose(
     """
     stated = ship.baseline is not None
     baseline = 'stated' if stated else 'fitted_here'
-    seen, notes = observed(runs, ship, parameters, {}, progress)
+    look = partial(observed, runs, ship, parameters, progress=progress)
+    seen, notes = look({})
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
@@ -135,7 +141,15 @@ def diagnose(
             coastdowns_used=len(seen),
             runs=_seen_runs(seen),
         )
-    case = _compared((seen, notes), runs, ship, parameters, facts, earlier, progress)
+
+    def compared(seen: tuple[Observation, ...]) -> _Case:
+        stated = stated_in(runs, seen, ship, facts)
+        before = carried(earlier, ship, _seen_runs(seen), stated)
+        progress('comparing hypotheses', 0, 0)
+        comparing = compare(seen, ship, stated, before)
+        return _Case(seen, comparing, comparing.compare(), stated, before)
+
+    case, notes = settled(look, (seen, notes), compared)
     seen, comparing, found = case.seen, case.comparing, case.found
     never = inseparable(found.effects)
     judged = judge(found, never)
@@ -160,7 +174,7 @@ def diagnose(
         held_out_after=held_out(seen, comparing, best) if judged.missing else None,
         baseline=baseline,
         best=judged.best,
-        notes=(*case.notes, *_besides(case, judged.decision.effects, stated=stated)),
+        notes=(*notes, *_besides(case, judged.decision.effects, stated=stated)),
         traces=traces(seen, comparing, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
@@ -190,43 +204,59 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
 
 
 @dataclass(frozen=True)
-class _Case:
-    """Runs with all hypotheses about them compared."""
+class ComparedRuns:
+    """Runs with hypotheses about them compared."""
 
     seen: tuple[Observation, ...]
     comparing: Comparing
     found: ComparedHypotheses[Fitted]
+
+
+@dataclass(frozen=True)
+class _Case(ComparedRuns):
     facts: Facts
     earlier: Carried | None
-    notes: tuple[str, ...]
 
 
-def _compared(
-    first: tuple[tuple[Observation, ...], tuple[str, ...]],
-    runs: Sequence[CoastRun],
-    ship: Ship,
-    parameters: Parameters,
-    facts: Sequence[Fact],
-    earlier: Sequence[EarlierDiagnosis],
-    progress: Progress,
-) -> _Case:
-    """Compare hypotheses, and look at the runs again where their stops are moved by that."""
+Case = TypeVar('Case', bound=ComparedRuns)
+
+
+def settled(
+    look: Callable[[Mapping[str, float]], Observed],
+    first: Observed,
+    compared: Callable[[tuple[Observation, ...]], Case],
+) -> tuple[Case, tuple[str, ...]]:
+    """
+    Compare hypotheses, and look at the runs again where their stops are moved by that.
+
+    Parameters
+    ----------
+    look
+        Sees the runs, as `observed` does, with their stops later by so much.
+    first
+        What it gives where none is moved.
+    compared
+        Compares.
+
+    Returns
+    -------
+    case
+        With the runs as they were seen last.
+    notes
+        What is to be said about them.
+    """
     moved_s: dict[str, float] = {}
     seen, notes = first
-    for look in range(_LOOKS):
-        if look:
-            # effects are simulated from the stop as the run was seen
-            seen, notes = observed(runs, ship, parameters, moved_s, progress)
-        stated = stated_in(runs, seen, ship, facts)
-        before = carried(earlier, ship, _seen_runs(seen), stated)
-        progress('comparing hypotheses', 0, 0)
-        comparing = compare(seen, ship, stated, before)
-        found = comparing.compare()
-        more_s = moved_stops(seen, comparing, found)
+    case = compared(seen)
+    for _ in range(_LOOKS - 1):
+        more_s = _moved_stops(case)
         if not more_s:
             break
         moved_s |= {name: moved_s.get(name, 0.0) + by_s for name, by_s in more_s.items()}
-    return _Case(seen, comparing, found, stated, before, notes)
+        # effects are simulated from the stop as the run was seen
+        seen, notes = look(moved_s)
+        case = compared(seen)
+    return case, notes
 
 
 def compare(
@@ -285,19 +315,13 @@ def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
     return tuple(SeenRun(run.name, run.stopped_ns) for run in seen)
 
 
-def moved_stops(
-    seen: Sequence[Observation], comparing: Comparing, found: ComparedHypotheses[Fitted]
-) -> dict[str, float]:
-    """
-    Return by how much the likeliest hypothesis has the stop of each run later than it was seen.
-
-    Empty where that hardly matters.
-    """
-    likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
-    more_s = comparing.runs.stop_s(likeliest.at)
+def _moved_stops(case: ComparedRuns) -> dict[str, float]:
+    """Return by how much the likeliest has each stop later; empty where that hardly matters."""
+    likeliest = max(case.found.fitted, key=lambda fit: fit.log_weight)
+    more_s = case.comparing.runs.stop_s(likeliest.at)
     if all(abs(by_s) <= _NEAR_S for by_s in more_s):
         return {}
-    return {run.name: by_s for run, by_s in zip(seen, more_s, strict=True)}
+    return {run.name: by_s for run, by_s in zip(case.seen, more_s, strict=True)}
 
 
 def _has_both(run: Observation) -> bool:
@@ -312,7 +336,7 @@ def observed(
     parameters: Parameters,
     moved_s: Mapping[str, float],
     progress: Progress,
-) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
+) -> Observed:
     """
     Return the runs that can be diagnosed, and what is to be said about them.
 

@@ -81,7 +81,6 @@ def held_out(seen: Sequence[Observation], comparing: Comparing, fit: Fitted) -> 
     told = [j for j in range(len(seen)) if j not in own_effects]
     if len(seen) < 2 or not told:
         return None
-    assert fit.tables is not None
     _, mean, precision = comparing.prior_of(fit)
     parts = comparing.equations(fit)
     everything = np.asarray(sum(parts), np.float64)
@@ -90,7 +89,7 @@ def held_out(seen: Sequence[Observation], comparing: Comparing, fit: Fitted) -> 
     for j in told:
         without, at = _least(everything - parts[j], mean, precision)
         chi2 += least - without
-        table, sight = fit.tables[j], comparing.runs.runs[j]
+        table, sight = fit.linear[j], comparing.runs.runs[j]
         at = at.copy()
         own = comparing.runs.own[j]
         at[own] = _given_shared(parts[j], at, own, mean, precision)
@@ -151,10 +150,9 @@ def where(
         The ends hold 90 % of the excess over noise.
     """
     channel = FORCE if of_force else _channel(found)
-    assert before.tables is not None
     times, speeds = [], []
     residuals = comparing.residuals(before)
-    for run, residual, table in zip(seen, residuals, before.tables, strict=True):
+    for run, residual, table in zip(seen, residuals, before.linear, strict=True):
         after = (run.along.rows.time_s - run.lead_in_s) / run.duration_s
         part = np.clip((after * _PARTS).astype(int), 0, _PARTS - 1)
         rows = np.flatnonzero(after >= 0.0)
@@ -222,8 +220,7 @@ def _compared(
     fit: Fitted,
 ) -> list[Compared]:
     """Return each quantity that was measured in a run."""
-    assert fit.tables is not None
-    table, rows = fit.tables[j], run.along.rows
+    table, rows = fit.linear[j], run.along.rows
     sd = comparing.noise_sd(j, table)
     n = len(rows.time_s)
     found = [

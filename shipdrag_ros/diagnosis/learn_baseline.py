@@ -239,12 +239,8 @@ def _from_curves(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -
     square of the speed.
     """
     found = [estimate_final(run.window, ship, parameters) for run in runs]
-    if len(found) > 1:
-        together = combine(found, [None] * len(found))
-        speed, r = together.speed_m_s, together.resistance_m_s2
-    else:
-        curve = found[0].valid_calm
-        speed, r = curve.speed_m_s, curve.resistance_m_s2
+    whole = combine(found, [None] * len(found)) if len(found) > 1 else found[0].valid_curve
+    speed, r = whole.speed_m_s, whole.resistance_m_s2
     if len(speed) < 2:
         raise EstimationError(
             f'r(v) of {runs[0].name} may be used at {len(speed)} speed(s), 2 are needed: give '

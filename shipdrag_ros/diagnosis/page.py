@@ -141,7 +141,7 @@ def _limits(found: DiagnosisResult) -> Iterator[Section]:
     caption = (
         'Each size is that of 19 in 20, given that the effect is there; from the next size on '
         'nine of ten such runs would have named it. - : no size is named, as another effect '
-        'leaves the same trace'
+        'leaves about the same trace'
     )
     yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
 

@@ -148,7 +148,7 @@ class Limit:
     value
         The bound, of the absolute size, given that the effect is there.
     would_be_named
-        Size from which nine of ten such runs name it; None: from none.
+        Least size that nine of ten such runs name; 0: any, None: none that is thought of.
     percent_of_r
         Of the resistance that the run shows, at the bound.
     """

@@ -68,11 +68,11 @@ def limits(found: DiagnosisResult) -> Table:
             words.names_text([name]),
             quantity.name,
             f'{"at least" if each.bound == "lower_95" else "at most"} {each.value:.2g}',
-            '-' if each.would_be_named is None else f'{each.would_be_named:.2g}',
+            '-' if least is None else f'{least:.2g}' if least else 'any size',
             '-' if math.isnan(each.percent_of_r) else f'{each.percent_of_r:.1f} %',
         )
         for name, each in found.limits.items()
-        for quantity in find(name).parameters[:1]
+        for quantity, least in [(find(name).parameters[0], each.would_be_named)]
     ]
     heads = ('effect', 'parameter', 'if it is there, 95 %', 'would be named from', 'of r')
     return Table(heads, tuple(rows))

@@ -127,35 +127,28 @@ def would_be_named(found: DiagnosisResult) -> str:
     """
     if not found.limits:
         return ''
-    shown = [
-        (each.would_be_named, name, each)
+    shown = sorted(
+        (_effort(least, each), name, _from(least, find(name).parameters[0], each))
         for name, each in found.limits.items()
-        if each.would_be_named is not None
-    ]
-    shown.sort(key=lambda one: _effort(one[2]))
+        if (least := each.would_be_named) is not None
+    )
     if not shown:
         return ' No single effect of any size would have been named by these runs.'
-    sizes = ', '.join(
-        f'{names_text([name])} {_from(each)} {size(_quantity(name), Parameter(rounded, 0.0))}'
-        for least, name, each in shown[:_MOST_LIMITS]
-        for rounded in (float(f'{least:.2g}'),)
-    )
+    sizes = ', '.join(f'{names_text([name])} {edge}' for _, name, edge in shown[:_MOST_LIMITS])
     return f' These runs would have named, nine times in ten: {sizes}.'
 
 
-def _quantity(name: str) -> Parameter:
-    return find(name).parameters[0]
+def _from(least: float, quantity: Parameter, limit: Limit) -> str:
+    if not least:
+        return 'of any size'
+    edge = size(quantity, Parameter(float(f'{least:.2g}'), 0.0))
+    return f'up to {edge}' if limit.bound == 'lower_95' else f'from {edge}'
 
 
-def _from(limit: Limit) -> str:
-    return 'up to' if limit.bound == 'lower_95' else 'from'
-
-
-def _effort(limit: Limit) -> float:
+def _effort(least: float, limit: Limit) -> float:
     """Return how much of an effect is needed, over what is usual."""
-    assert limit.would_be_named is not None
-    needed = limit.would_be_named / limit.value
-    return 1.0 / needed if limit.bound == 'lower_95' else needed
+    needed = least / limit.value
+    return 1.0 / needed if needed and limit.bound == 'lower_95' else needed
 
 
 def differing(found: DiagnosisResult) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.samples import Float64
 
 _POINTS = 101
@@ -89,12 +89,31 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
     along = _along_first(headings_rad)
     over_ground = np.array([not item.by_log and item.current_m_s is None for item in estimates])
     current, current_sigma = _current(estimates, along)
+    curves = comparable(estimates)
     if current is None and over_ground.any():
-        current, current_sigma = _agreement(estimates, over_ground, along)
+        current, current_sigma = _agreement(curves, over_ground, along)
     shifts = np.zeros(len(estimates))
     if current is not None:
         shifts = np.where(over_ground, current * np.nan_to_num(along), 0.0)
-    return _mean(estimates, shifts, current, current_sigma)
+    return _mean(curves, shifts, current, current_sigma)
+
+
+def comparable(estimates: Sequence[Estimate]) -> list[ResistanceCurve]:
+    """
+    Return r(v) of runs inside their valid ranges, of one kind.
+
+    Parameters
+    ----------
+    estimates
+
+    Returns
+    -------
+    list of ResistanceCurve
+        In calm deep water where wind and depth of all are known, else all in the conditions of
+        their runs.
+    """
+    unknown = any(each.reference.unknown for each in estimates)
+    return [each.valid_conditions if unknown else each.valid_calm for each in estimates]
 
 
 def _along_first(headings_rad: Sequence[float | None]) -> Float64:
@@ -125,7 +144,7 @@ def _current(estimates: Sequence[Estimate], along: Float64) -> tuple[float | Non
 
 
 def _agreement(
-    estimates: Sequence[Estimate], over_ground: np.ndarray, along: Float64
+    curves: Sequence[ResistanceCurve], over_ground: np.ndarray, along: Float64
 ) -> tuple[float | None, float | None]:
     """Find the current under which the runs agree, where they were on opposite headings."""
     known = along[over_ground]
@@ -133,10 +152,10 @@ def _agreement(
     reference = bool((~over_ground).any()) and bool((np.abs(known) > _OPPOSITE).any())
     if np.isnan(known).any() or not (spread > 2.0 * _OPPOSITE or reference):
         return None, None
-    bound = _LARGEST_CURRENT * min(float(item.valid_curve.speed_m_s[0]) for item in estimates)
+    bound = _LARGEST_CURRENT * min(float(curve.speed_m_s[0]) for curve in curves)
 
     def misfit(current: float) -> float:
-        chi2, _ = _between(estimates, np.where(over_ground, current * along, 0.0))
+        chi2, _ = _between(curves, np.where(over_ground, current * along, 0.0))
         return chi2
 
     from scipy.optimize import minimize_scalar  # slow to import
@@ -149,56 +168,49 @@ def _agreement(
     return best, sigma
 
 
-def _grid(estimates: Sequence[Estimate], shifts: Float64) -> Float64:
-    low = max(float(item.valid_curve.speed_m_s[0]) - s for item, s in zip(estimates, shifts))
-    high = min(float(item.valid_curve.speed_m_s[-1]) - s for item, s in zip(estimates, shifts))
+def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> Float64:
+    low = max(float(curve.speed_m_s[0]) - s for curve, s in zip(curves, shifts))
+    high = min(float(curve.speed_m_s[-1]) - s for curve, s in zip(curves, shifts))
     if not high > low:
         raise EstimationError(
-            f'the valid ranges of the {len(estimates)} coastdowns do not overlap: from '
+            f'the valid ranges of the {len(curves)} coastdowns do not overlap: from '
             f'{low:.3g} m/s up, but to {high:.3g} m/s only; give runs over the same speeds'
         )
     return np.linspace(low, high, _POINTS)
 
 
-def _at(estimates: Sequence[Estimate], shifts: Float64, speed: Float64) -> Float64:
+def _at(curves: Sequence[ResistanceCurve], shifts: Float64, speed: Float64) -> Float64:
     """Return r, repeatable variance and variance of n_r: (3, runs, m)."""
-    found = np.empty((3, len(estimates), len(speed)))
-    for i, (item, shift) in enumerate(zip(estimates, shifts)):
-        curve = item.valid_curve
-        for k, values in enumerate(
-            (
-                curve.resistance_m_s2,
-                curve.sigma_repeatable_m_s2**2,
-                curve.sigma_m_s2**2 - curve.sigma_repeatable_m_s2**2,
-            )
-        ):
-            found[k, i] = np.interp(speed + shift, curve.speed_m_s, values)
+    found = np.empty((3, len(curves), len(speed)))
+    for i, (curve, shift) in enumerate(zip(curves, shifts)):
+        repeatable = curve.sigma_repeatable_m_s2**2
+        parts = curve.resistance_m_s2, repeatable, curve.sigma_m_s2**2 - repeatable
+        found[:, i] = [np.interp(speed + shift, curve.speed_m_s, part) for part in parts]
     return found
 
 
-def _between(estimates: Sequence[Estimate], shifts: Float64) -> tuple[float, Float64]:
+def _between(curves: Sequence[ResistanceCurve], shifts: Float64) -> tuple[float, Float64]:
     """Return chi^2 between the runs, mean over the speeds, and the speeds."""
-    speed = _grid(estimates, shifts)
-    r, variance, _ = _at(estimates, shifts, speed)
+    speed = _grid(curves, shifts)
+    r, variance, _ = _at(curves, shifts, speed)
     weight = 1.0 / variance
     mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
     return float((weight * (r - mean) ** 2).sum(axis=0).mean()), speed
 
 
 def _mean(
-    estimates: Sequence[Estimate],
+    curves: Sequence[ResistanceCurve],
     shifts: Float64,
     current: float | None,
     current_sigma: float | None,
 ) -> Combined:
-    chi2, speed = _between(estimates, shifts)
-    r, variance, of_n_r = _at(estimates, shifts, speed)
-    runs = len(estimates)
+    chi2, speed = _between(curves, shifts)
+    r, variance, of_n_r = _at(curves, shifts, speed)
+    runs, first = len(curves), curves[0]
     weight = 1.0 / variance
     mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
     excess = max(1.0, chi2 / (runs - 1))
     repeatable = np.sqrt(excess / weight.sum(axis=0))
-    first = estimates[0].curve
     return Combined(
         speed_m_s=speed,
         resistance_m_s2=mean,

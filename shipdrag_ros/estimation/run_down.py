@@ -239,7 +239,7 @@ def say(
         past = np.empty(0) if earlier is None else np.abs(earlier.value)
         if len(past) >= _FEW and np.median(past) < STANDS_RAD_S:
             return f'{name} stood before the stop too: it shows nothing, or its sensor is dead'
-        return f'{name} stands whenever it is heard in the window: no thrust is left then'
+        return f'{name} stands whenever it is received in the window: no thrust is left then'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
     for speed in window.each('speed_through_water', 'speed_over_ground'):
         later = speed.value[speed.time_ns >= since_ns]

@@ -51,7 +51,9 @@ def display_sd(value: Float64, white_sd: float) -> float:
     Rounding to q errs by up to q / 2 and always alike while the signal stands; noise
     averages that to a part exp(-2 pi^2 sd^2 / q^2) (Widrow's theorem, its first term).
     """
-    levels = np.unique(value if value.ndim == 1 else value[:, 0])
+    if value.ndim == 2:  # a course due north has nothing in the east
+        return max(display_sd(column, white_sd) for column in value.T)
+    levels = np.unique(value)
     if len(levels) < 2:
         return 0.0
     quantum = float(np.median(np.diff(levels)))

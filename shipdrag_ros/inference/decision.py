@@ -14,7 +14,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import log_ndtr, ndtri, ndtri_exp
+from scipy.special import logsumexp, ndtri
 
 from shipdrag_ros.parameter import Prior, Shape
 from shipdrag_ros.samples import Float64
@@ -226,30 +226,71 @@ def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:
     return mean, math.sqrt(square / total)
 
 
-_POINTS = 400  # of the distribution of a size under one hypothesis
 _UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
-_AMOUNTS = np.geomspace(1e-3, 1e4, 700)  # steps of 2.3 %
+_APART = 0.1  # in z, of Gaussians of that sd whose sum is a prior
+_POINTS = np.linspace(-4.0, 4.0, round(8.0 / _APART) + 1)
 
 
 class SizePosterior(NamedTuple):
     """
-    The size of an effect under one hypothesis that holds it: Gaussian in z.
+    The size of an effect under one hypothesis that holds it.
 
     Attributes
     ----------
     weight
         Probability of the hypothesis.
     z, sd
-        Mean and standard deviation of z, before what is beyond the end of a one-sided prior is
-        left out.
+        Mean and standard deviation of z, by a trace that is linear there, before what is beyond
+        the end of a one-sided prior is left out.
     prior
         That makes a size of z.
+    power
+        Of the size in its trace.
     """
 
     weight: float
     z: float
     sd: float
     prior: Prior
+    power: float = 1.0
+
+
+def amounts(prior: Prior, power: float, z: Float64) -> tuple[Float64, Float64]:
+    """
+    Return how much there is of a trace at some z, to which it is in proportion.
+
+    Parameters
+    ----------
+    prior
+        Of the size.
+    power
+        Of the size in its trace.
+    z : (m,)
+
+    Returns
+    -------
+    amount, slope : (m,)
+        The slope is its derivative by z.
+    """
+    value, slope = np.array([(prior.at(one), prior.slope(one)) for one in z.tolist()]).T
+    size = np.abs(value)
+    return np.sign(value) * size**power, power * size ** (power - 1.0) * slope
+
+
+def prior_amounts(prior: Prior, power: float, unit: float = 1.0) -> Float64:
+    """
+    Return Gaussians whose sum is a prior of amounts over some unit.
+
+    Returns
+    -------
+    (3, k)
+        Their means, standard deviations and the logarithms of their weights.
+    """
+    z = np.abs(_POINTS) if prior.shape is Shape.HALF_NORMAL else _POINTS
+    amount, slope = amounts(prior, power, z)
+    log_chance = -0.5 * z**2 / (1.0 - _APART**2)
+    sd = np.abs(_APART * slope / unit)
+    return np.array([amount / unit, sd, log_chance - logsumexp(log_chance)])
 
 
 def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
@@ -268,6 +309,12 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     ValueError
         If no hypothesis has a weight.
 
+    Notes
+    -----
+    The trace is in proportion to the amount a, not to z: with the slope da/dz at the mean of z,
+    the information of the readings is I = (sd^-2 - 1) / slope^2 and their score there z / slope.
+    The density over z is exp(-z^2 / 2 + score (a - a_0) - I (a - a_0)^2 / 2).
+
     Examples
     --------
     >>> from shipdrag_ros.parameter import normal
@@ -277,89 +324,83 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     known = [each for each in sizes if each.weight > 0.0 and np.isfinite(each.sd)]
     if not known:
         raise ValueError('no hypothesis with a weight: the size has no distribution')
-    log_beyond = np.log1p(-(np.arange(_POINTS) + 0.5) / _POINTS)
     values, weights = [], []
     for each in known:
         sd = max(each.sd, 1e-12)
-        # in logarithms: of a mean far beyond the end of a one-sided prior next to nothing is left
-        left = log_ndtr(each.z / sd) if each.prior.shape is Shape.HALF_NORMAL else 0.0
-        z = each.z - sd * ndtri_exp(log_beyond + left)
-        values += [abs(each.prior.at(one)) for one in z.tolist()]
-        weights += [each.weight] * _POINTS
-    order = np.argsort(values)
-    weight, value = np.array(weights)[order], np.array(values)[order]
+        edge = np.union1d(each.z + sd * np.linspace(-8.0, 8.0, 400), np.linspace(-5.0, 5.0, 400))
+        if each.prior.shape is Shape.HALF_NORMAL:
+            edge = np.union1d(edge[edge >= 0.0], np.geomspace(1e-6, 10.0, 400))
+        z = 0.5 * (edge[1:] + edge[:-1])
+        middle, slope = amounts(each.prior, each.power, np.array([each.z]))
+        apart = (amounts(each.prior, each.power, z)[0] - middle) / slope
+        information = max(sd**-2.0 - 1.0, 0.0)
+        log = -0.5 * z**2 + each.z * apart - 0.5 * information * apart**2
+        weight = np.exp(log - log.max()) * np.diff(edge)
+        values.append(np.abs([each.prior.at(one) for one in z.tolist()]))
+        weights.append(each.weight / weight.sum() * weight)
+    value, weight = np.concatenate(values), np.concatenate(weights)
+    order = np.argsort(value)
+    value, weight = value[order], weight[order]
     # between points: a step of the distribution at the last digit of a weight is none of the limit
     weight /= weight.sum()  # it may be as small as a number can be
-    middle = np.cumsum(weight) - 0.5 * weight
-    return float(np.interp(share, middle, value))
+    return float(np.interp(share, np.cumsum(weight) - 0.5 * weight, value))
 
 
-class Sensitivity(NamedTuple):
+def named_from(information: Float64, prior: Float64, log_odds: Float64) -> Float64:
     """
-    What a record says of e effects of unit amount, linear about nothing missing.
-
-    Attributes
-    ----------
-    information : (e, e)
-        Products of their whitened responses, less what the nuisances take up.
-    mean, precision : (e,)
-        Gaussian priors of the amounts.
-    log_odds : (e,)
-        Prior log odds over nothing.
-    """
-
-    information: Float64
-    mean: Float64
-    precision: Float64
-    log_odds: Float64
-
-
-def named_from(known: Sensitivity) -> Float64:
-    """
-    Return the amount from which each effect is named in nine of ten such records.
+    Return the least amount of each effect that nine of ten such records name.
 
     Parameters
     ----------
-    known
+    information : (2 e, 2 e)
+        Products of whitened traces about nothing missing, less what the nuisances take up: first
+        of those that effects leave however small they are, then of what a unit amount adds.
+    prior : (3, e, k)
+        Gaussians whose sum is the prior of each amount, from `prior_amounts`.
+    log_odds : (e,)
+        Prior log odds over nothing.
 
     Returns
     -------
     (e,)
-        Infinite where no amount is: another effect has the same trace.
+        0 where it is named however small it is; infinite where no amount within the prior is:
+        another effect has about the same trace, or amounts are seldom as large as that.
 
     Notes
     -----
-    The log evidence of a linear effect with the score b and the information I, under a Gaussian
-    prior of mean m and precision p, over that of nothing is ((b + p m)^2 / (I + p) - p m^2) / 2 -
-    ln((I + p) / p) / 2. The scores of all effects under the truth of one are Gaussian; the
-    evidence over each rival is taken where one record of ten has less, to first order in the
-    scores.
+    With the traces c_f + a d_f of each effect f, its log evidence over nothing where the truth is
+    t = c_e + A d_e is the logarithm of the mean, over the prior of a, of exp((c_f + a d_f) t -
+    (c_f + a d_f)^2 / 2), of each Gaussian in closed form, and noise adds its product with c_f +
+    a d_f at the mean of a. Over each rival that is taken which one record of ten falls below, to
+    first order in the noise.
     """
-    count = len(known.mean)
+    count = len(log_odds)
+    (cc, cd), (_, dd) = information.reshape(2, count, 2, count).swapaxes(1, 2)
+
+    still, both, own = np.diag(cc), np.diag(cd), np.diag(dd)
+    amount, sd, log_chance = prior
+    held = sd**-2.0
+    total = own[:, None] + held
+    constant = log_chance - 0.5 * (held * amount**2 + np.log(total / held) + still[:, None])
     found = np.full(count, np.inf)
-    own = np.diag(known.information)
-    precision, mean = known.precision, known.mean
     for e in range(count):
-        # scores by amount, (a, e)
-        score = np.outer(_AMOUNTS, known.information[e])
-        slope = (score + precision * mean) / (own + precision)
-        gain = 0.5 * (slope * (score + precision * mean) - precision * mean**2)
-        gain += known.log_odds - 0.5 * np.log((own + precision) / precision)
-        # nothing is the first rival
-        ahead = np.column_stack([gain[:, e], gain[:, [e]] - np.delete(gain, e, axis=1)])
-        other = np.delete(slope, e, axis=1)
-        shared = np.delete(known.information[e], e)
-        of_own = slope[:, [e]]
-        variance = (
-            of_own**2 * own[e] + other**2 * np.delete(own, e) - 2.0 * of_own * other * shared
-        )
-        noise = np.sqrt(np.maximum(np.column_stack([of_own[:, 0] ** 2 * own[e], variance]), 0.0))
+        sizes = np.unique(np.abs(np.append(amount[e], 0.0)))[:, None]
+        right = (cd[e] + sizes * dd[e] - both)[:, :, None] + held * amount
+        logs = (cc[:, e] + sizes * cd[:, e])[:, :, None] + 0.5 * right**2 / total + constant
+        top = logs.max(axis=2)
+        likely = np.exp(logs - top[:, :, None])
+        share = likely.sum(axis=2)
+        gain = top + np.log(share) + log_odds
+        mean = (likely * right / total).sum(axis=2) / share
+        square, mine = still + mean * (2.0 * both + mean * own), mean[:, [e]]
+        shared = cc[e] + mean * cd[e] + mine * (cd[:, e] + mean * dd[e])
+        rivals = np.arange(count) != e  # and nothing in its own place
+        ahead = gain[:, [e]] - rivals * gain
+        noise = np.sqrt(np.maximum(square[:, [e]] + rivals * (square - 2.0 * shared), 0.0))
         least = ahead - _UNLUCKY_SD * noise
-        sure = 1.0 / (1.0 + np.exp(-np.clip(least, -700.0, 700.0)).sum(axis=1)) >= CERTAIN
-        # from there on for good
-        missed = np.flatnonzero(~sure)
-        if len(missed) == 0:
-            found[e] = _AMOUNTS[0]
-        elif missed[-1] + 1 < len(_AMOUNTS):
-            found[e] = _AMOUNTS[missed[-1] + 1]
+        chance = 1.0 / (1.0 + np.exp(-np.clip(least, -700.0, 700.0)).sum(axis=1))
+        first = int(np.argmax(chance >= CERTAIN))
+        if chance[first] >= CERTAIN:
+            around = slice(max(first - 1, 0), first + 1)
+            found[e] = np.interp(CERTAIN, chance[around], sizes[around, 0])
     return found

@@ -13,11 +13,18 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.diagnose import effects_about, moved_stops, observed, stated_in
+from shipdrag_ros.diagnosis.diagnose import (
+    ComparedRuns,
+    effects_about,
+    observed,
+    settled,
+    stated_in,
+)
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import inverse_of
@@ -28,7 +35,7 @@ from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
@@ -41,7 +48,6 @@ _FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds fir
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
-_LOOKS = 2  # at runs
 _UPPER = 1.645
 _MANY, _APART_D, _DEEPER = 3, 0.5, 1.1  # runs, days and ratio of depths that can show a form
 
@@ -136,28 +142,20 @@ def learn(
             f'ship {ship.name!r} has no baseline, and what is learnt is what it lacks; add '
             '`baseline` to her ship file, or learn one with `shipdrag baseline`'
         )
-    seen, notes = observed(runs, ship, parameters, {}, progress)
-    case = _LearningCase.of(runs, seen, ship, progress)
-    for _ in range(_LOOKS - 1):
-        moved = moved_stops(seen, case.comparing, case.found)
-        if not moved:
-            break
-        seen, notes = observed(runs, ship, parameters, moved, progress)
-        case = _LearningCase.of(runs, seen, ship, progress)
+    look = partial(observed, runs, ship, parameters, progress=progress)
+    compared = partial(_LearningCase.of, runs, ship=ship, progress=progress)
+    case, notes = settled(look, look({}), compared)
     return _Judged(case, name, notes, progress).answer()
 
 
 @dataclass(frozen=True)
-class _LearningCase:
+class _LearningCase(ComparedRuns):
     """Runs with forms and the library's effects compared."""
 
     runs: tuple[CoastRun, ...]
-    seen: tuple[Observation, ...]
     ship: Ship
     forms: dict[str, LearnableForm]
     ways: dict[str, list[EffectWay]]
-    comparing: Comparing
-    found: ComparedHypotheses[Fitted]
 
     @classmethod
     def of(
@@ -194,7 +192,7 @@ class _LearningCase:
     ) -> _LearningCase:
         progress('comparing forms', 0, 0)
         comparing = _comparing(runs, seen, ship, ways, library=library)
-        return cls(tuple(runs), tuple(seen), ship, kept, ways, comparing, comparing.compare())
+        return cls(tuple(seen), comparing, comparing.compare(), tuple(runs), ship, kept, ways)
 
     def fitted_ways(self) -> dict[str, list[EffectWay]]:
         """Return the ways of each form, begun where they were fitted."""

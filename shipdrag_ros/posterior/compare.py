@@ -17,12 +17,12 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from scipy.special import log_ndtr
 
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference import decision
 from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    Sensitivity,
     SizePosterior,
     WeighedHypothesis,
     named_from,
@@ -65,6 +65,7 @@ _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
 LIKELY = 0.03  # probability of names that may leave something smooth
 _FEWEST = 5  # rows of a curve
+_LITTLE = 1e-6  # of a trace: as good as none of the effect
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
@@ -117,6 +118,23 @@ class Fitted(WeighedFit):
     log_evidence: float = -math.inf
     z: Float64 | None = None
     sd: Float64 | None = None
+
+    @property
+    def linear(self) -> list[RunTable]:
+        """
+        Tables, of which there must be some.
+
+        Raises
+        ------
+        DiagnosisError
+            If the motion cannot be computed.
+        """
+        if self.tables is None:
+            raise DiagnosisError(
+                'the motion of this ship cannot be computed at the speeds of the runs: check '
+                'baseline, effects, added mass and propulsion of the ship file'
+            )
+        return self.tables
 
 
 class _RunNoise(NamedTuple):
@@ -172,12 +190,8 @@ class ComparedHypotheses(Generic[Fit]):
     @cached_property
     def best(self) -> dict[Names, Fit]:
         """The likeliest way of each set of names."""
-        found: dict[Names, Fit] = {}
-        for each in self.fitted:
-            old = found.get(each.names)
-            if old is None or each.log_weight > old.log_weight:
-                found[each.names] = each
-        return found
+        ordered = sorted(self.fitted, key=lambda fit: fit.log_weight)
+        return {each.names: each for each in ordered}
 
     def sizes(self, name: str) -> list[SizePosterior]:
         """
@@ -191,7 +205,7 @@ class ComparedHypotheses(Generic[Fit]):
                 if mine and fit.z is not None and fit.sd is not None:
                     weight, prior = self.probability[names], way.unknowns[0].prior
                     z, sd = float(fit.z[place]), float(fit.sd[place])
-                    found.append(SizePosterior(weight, z, sd, prior))
+                    found.append(SizePosterior(weight, z, sd, prior, way.power))
                 place += len(way.unknowns)
         # given that it is there: how improbable that is does not matter
         total = sum(each.weight for each in found)
@@ -252,23 +266,16 @@ class Comparing:
         scores, amounts, responses = self._score(nothing, ways)
         self._learn(nothing, ways, scores, responses)
         singles = self._likeliest(nothing, ways, scores, amounts, responses)
-        smooth = [
-            Fitted(smooth, self._widened(nothing, smooth))
-            for where in self.smooth
-            for smooth in (replace(self.base, smooth=where),)
-        ]
+        smooth = [replace(self.base, smooth=where) for where in self.smooth]
         nothing.cost = math.inf
-        every = [nothing, *smooth, *singles]
+        every = [nothing, *(Fitted(each, self._widened(nothing, each)) for each in smooth)]
+        every += singles
         self._climb(every)
         every = self._weigh(every)
-        pairs = self._pairs(every)
-        if pairs:
-            self._climb(pairs)
-            every += self._weigh(pairs)
-        differing = self._differing(every)
-        if differing:
-            self._climb(differing)
-            every += self._weigh(differing)
+        for more in (self._pairs, self._differing):
+            fits = more(every)
+            self._climb(fits)
+            every += self._weigh(fits)
         every += self._weigh(self._beside(every))
         return ComparedHypotheses(self.effects, tuple(every))
 
@@ -299,9 +306,8 @@ class Comparing:
 
         Residual first, then the derivatives by all unknowns.
         """
-        assert fit.tables is not None
         found = []
-        for j, table in enumerate(fit.tables):
+        for j, table in enumerate(fit.linear):
             total = np.zeros((1 + len(fit.at), 1 + len(fit.at)))
             _put(total, self._of_run(j, table, self.noise[j].typical)[0][0], table.place)
             found.append(total)
@@ -346,9 +352,8 @@ class Comparing:
         """
         Return what a hypothesis leaves of each run, at its best.
         """
-        assert fit.tables is not None
         found = []
-        for j, table in enumerate(fit.tables):
+        for j, table in enumerate(fit.linear):
             line = self.white(j, table._replace(along=table.along[:1]), self.runs.runs[j])
             whitened = np.concatenate([line[0], table.rest[0]])
             found.append(RunResidual(table.along[0], table.residual, whitened))
@@ -365,20 +370,23 @@ class Comparing:
         """
         ways = []
         for each in self.ways.values():  # one that shows neither best nor least
-            ways.append(each[len(each) // 2])
-        hypotheses = [Explanation((*self.stated, way)) for way in ways]
+            plain = [way for way in each if not (way.kept or way.nameless)]
+            ways.append(plain[len(plain) // 2])
+        little = [replace(way, start=(way.z_of(_LITTLE), *way.start[1:])) for way in ways]
+        hypotheses = [Explanation((*self.stated, way)) for way in (*little, *ways)]
         responses = [self._traces(j, self.nothing, hypotheses) for j in range(len(self.runs.runs))]
+        for lines in responses:
+            lines[len(ways) :] -= lines[: len(ways)]
         _, information = self._given_way(self.nothing, responses)
-        amounts = np.array([_amount(way) for way in ways])
+        prior = np.stack([way.amounts() for way in ways], axis=1)
         log_odds = np.array([math.log(way.effect.odds) for way in ways])
-        known = Sensitivity(information, amounts[:, 0], amounts[:, 1], log_odds)
+        sizes = named_from(information, prior, log_odds)
         never = {name for group in inseparable for name in group}
-        found = {}
-        for way, amount in zip(ways, named_from(known).tolist(), strict=True):
-            if math.isfinite(amount) and way.effect.name not in never:
-                tried = abs(way.unknowns[0].prior.at(way.tried()[0]))
-                found[way.effect.name] = tried * amount ** (1.0 / way.effect.size_power)
-        return found
+        return {
+            way.effect.name: abs(way.size_of(size))
+            for way, size in zip(ways, sizes.tolist(), strict=True)
+            if math.isfinite(size) and way.effect.name not in never
+        }
 
     def percent_of_r(self, name: str, bound: float) -> float:
         """
@@ -398,11 +406,9 @@ class Comparing:
         """
         way = self.ways[name][0]
         prior = way.unknowns[0].prior
-        z = list(way.start)
+        z = [prior.inverse(math.copysign(bound, prior.first)), *way.start[1:]]
         run = self.runs.runs[0]
         still, speed = self.runs.still(0, self.nothing.at)
-        sign = -1.0 if prior.first < 0.0 else 1.0
-        z[0] = prior.inverse(sign * bound)
         shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
         rows, model = run.model.rows, run.model
         by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
@@ -418,9 +424,9 @@ class Comparing:
     def _usual(self, j: int) -> _RunNoise:
         """Return usual noise, before anything is learnt."""
         run = self.runs.runs[j]
-        tables = self.runs.linearise([Explanation()], [self.runs.start])[0]
-        assert tables is not None
-        table = tables[j]
+        nothing = Fitted(Explanation(), self.runs.start)
+        nothing.tables = self.runs.linearise([nothing.hypothesis], [nothing.at])[0]
+        table = nothing.linear[j]
         none = np.zeros((1, len(table.along) - 1))
         seen = Seen(run.model.rows, table.along, none, none, table.white, run.model.steady)
         return _noise(prior_of(seen, run.model.speed_m_s), np.zeros(0))
@@ -509,7 +515,6 @@ class Comparing:
 
         And its trace in each run.
         """
-        assert nothing.tables is not None
         hypotheses = [Explanation((*self.stated, way)) for way in ways]
         responses = [self._traces(j, nothing, hypotheses) for j in range(len(self.runs.runs))]
         return *self._gains(nothing, hypotheses, responses), responses
@@ -544,8 +549,7 @@ class Comparing:
         """
         score, information = self._given_way(base, responses)
         own = np.maximum(np.diag(information), 0.0)
-        amounts = np.array([_amount(each.ways[-1]) for each in hypotheses]).reshape(-1, 2)
-        prior, held = amounts[:, 0], amounts[:, 1]
+        prior, held = np.array([_amount(h.ways[-1]) for h in hypotheses]).reshape(-1, 2).T
         slope = score + held * prior
         found: Float64 = 0.5 * (slope**2 / (own + held) - held * prior**2)
         found -= 0.5 * np.log((own + held) / held)
@@ -554,10 +558,9 @@ class Comparing:
 
     def _given_way(self, base: Fitted, responses: Sequence[Float64]) -> tuple[Float64, Float64]:
         """Return scores (h,) and information (h, h) of traces, less what the base takes up."""
-        assert base.tables is not None
         p, h = len(base.at), len(responses[0])
         total = np.zeros((1 + p + h, 1 + p + h))
-        for j, table in enumerate(base.tables):
+        for j, table in enumerate(base.linear):
             n = table.along.shape[1]
             joined = replace_table(table, responses[j][:, :n], responses[j][:, n:], p)
             products, _ = self._of_run(j, joined, self.noise[j].typical)
@@ -582,13 +585,12 @@ class Comparing:
         responses: Sequence[Float64],
     ) -> None:
         """Learn the noise of each run with the likeliest effects at hand."""
-        assert nothing.tables is not None
         chosen: dict[str, int] = {}
         for i in np.argsort(-scores).tolist():
             chosen.setdefault(ways[i].effect.name, i)
         taught = list(chosen.values())[:_TAUGHT]
         noise = []
-        for j, table in enumerate(nothing.tables):
+        for j, table in enumerate(nothing.linear):
             run = self.runs.runs[j]
             n, p = table.along.shape[1], len(table.along) - 1
             smooth = [
@@ -687,19 +689,18 @@ class Comparing:
         return list(best.values())
 
     def _weigh_one(self, fit: Fitted) -> None:
-        assert fit.tables is not None
         p = len(fit.at)
         families = self.runs.priors(fit.hypothesis, fit.at)
         usual = np.zeros((1 + p, 1 + p))
         typical = []
-        for j, table in enumerate(fit.tables):
+        for j, table in enumerate(fit.linear):
             products, log_det = self._of_run(j, table, self.noise[j].typical)
             typical.append((products[0], float(log_det[0])))
             _put(usual, products[0], table.place)
-        several = len(fit.tables) > 1
+        several = len(fit.linear) > 1
         at_usual = self._evidence(fit, usual[None], families)[0][0] if several else 0.0
         log_evidence, weights, moments = 0.0, [], []
-        for j, table in enumerate(fit.tables):
+        for j, table in enumerate(fit.linear):
             noise = self.noise[j]
             products, log_det = self._of_run(j, table, noise.learnt.settings)
             whole = np.repeat(usual[None], len(products), axis=0)
@@ -827,8 +828,7 @@ def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> Run
 def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
     """Return settings with the logarithms of their weights before any evidence."""
     weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
-    log_prior = weight - alike if len(alike) else weight
-    return _RunNoise(learnt, log_prior, learnt.typical)
+    return _RunNoise(learnt, weight - alike if len(alike) else weight, learnt.typical)
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:
@@ -839,8 +839,8 @@ def _put(total: Float64, products: Float64, place: Int64) -> None:
 
 def _amount(way: EffectWay) -> tuple[float, float]:
     """Return mean and precision of the size, in parts of that which is tried."""
-    shape = way.unknowns[0].prior.shape
-    tried = way.tried()[0]
-    if shape is Shape.HALF_NORMAL or way.start[0] == 0.0:
-        return 0.0, tried**2
-    return 1.0, 1.0 / _AMOUNT_SD**2
+    prior = way.unknowns[0].prior
+    if prior.shape is Shape.LOG_NORMAL:
+        return 1.0, 1.0 / _AMOUNT_SD**2
+    tried = prior.at(way.tried()[0])
+    return prior.at(0.0) / tried, (tried / prior.slope(0.0)) ** 2

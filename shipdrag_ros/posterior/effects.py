@@ -17,6 +17,7 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
+from shipdrag_ros.inference.decision import amounts, prior_amounts
 from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
@@ -96,6 +97,27 @@ class EffectWay:
         """Return z of a likely size, where its trace is looked at before it is fitted."""
         return [self.start[0] or _TRIAL_Z, *self.start[1:]]
 
+    @property
+    def power(self) -> float:
+        """Of the size in its trace; 1 where it may be 0."""
+        log_normal = self.unknowns[0].prior.shape is Shape.LOG_NORMAL
+        return self.effect.size_power if log_normal else 1.0
+
+    def amounts(self) -> Float64:
+        """Return its prior as `prior_amounts`, of amounts over that which is tried."""
+        prior = self.unknowns[0].prior
+        tried, _ = amounts(prior, self.power, np.array(self.tried()[:1]))
+        return prior_amounts(prior, self.power, tried[0])
+
+    def size_of(self, amount: float) -> float:
+        """Return the size of which there is so much of the trace that is tried."""
+        tried = self.unknowns[0].prior.at(self.tried()[0])
+        return tried * amount ** (1.0 / self.power) if amount > 0.0 else 0.0
+
+    def z_of(self, amount: float) -> float:
+        """Return z of the size of which there is so much of the trace that is tried."""
+        return self.unknowns[0].prior.inverse(self.size_of(amount))
+
     def resized(self, amount: float) -> float:
         """Return z of the size of which there is so much more of the trace than is tried."""
         tried, first = self.tried()[0], self.unknowns[0].prior
@@ -107,8 +129,7 @@ class EffectWay:
             return tried * min(max(amount, -_MOST), _MOST)
         if len(self.unknowns) == 1:  # starts stand close
             return tried
-        power = first.second * self.effect.size_power
-        more = math.log(min(max(amount, 0.05), 20.0)) / power
+        more = self.z_of(min(max(amount, 0.05), 20.0)) - tried
         return tried + min(max(more, -_JUMP), _JUMP)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from shipdrag_ros.display import ship_speed, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
-from shipdrag_ros.estimation.reciprocal import Combined, combine
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.reciprocal import Combined, combine, comparable
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.ship import Ship
 
@@ -79,21 +79,22 @@ def together(runs: Sequence[RunResult]) -> Together:
 
 def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     """Say that campaigns differ, by how much; '' where one state of the hull fits all."""
-    campaigns: list[list[Estimate]] = []
+    campaigns: list[list[tuple[Estimate, ResistanceCurve]]] = []
     usable = [each for each in estimates if len(each.valid_curve)]
-    for each in sorted(usable, key=lambda one: one.start_ns):
-        if campaigns and each.start_ns - campaigns[-1][-1].end_ns < _CAMPAIGN_NS:
+    curves = comparable(usable)
+    for each in sorted(zip(usable, curves, strict=True), key=lambda one: one[0].start_ns):
+        if campaigns and each[0].start_ns - campaigns[-1][-1][0].end_ns < _CAMPAIGN_NS:
             campaigns[-1].append(each)
         else:
             campaigns.append([each])
     if len(campaigns) < 2:
         return ''
-    low = max(each.valid_curve.speed_m_s[0] for each in usable)
-    high = min(each.valid_curve.speed_m_s[-1] for each in usable)
+    low = max(curve.speed_m_s[0] for curve in curves)
+    high = min(curve.speed_m_s[-1] for curve in curves)
     if low > high:
         return ''  # no speed in common: `combine` says so
     speed = float(np.clip(usual_speed_m_s(usable, ship), low, high))
-    means = [_mean(campaign, speed) for campaign in campaigns]
+    means = [_mean([curve for _, curve in campaign], speed) for campaign in campaigns]
     far = max(
         abs(one[0] - other[0]) / np.hypot(one[1], other[1])
         for one, other in combinations(means, 2)
@@ -106,12 +107,10 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
         r = [mean[0] for mean in means]
         shown = [campaigns[int(np.argmin(r))], campaigns[int(np.argmax(r))]]
         of_many = f'of {len(campaigns)} dates the least and the most: '
-    for campaign in shown:
-        force = Force.of(campaign[0].valid_curve, ship)
+    for (first, curve), *_ in shown:
+        force = Force.of(curve, ship)
         _, resistance, _, over = force.cells(force.near(speed))
-        parts.append(
-            f'{utc(campaign[0].start_ns)[:10]}: {", ".join(filter(None, (resistance, over)))}'
-        )
+        parts.append(f'{utc(first.start_ns)[:10]}: {", ".join(filter(None, (resistance, over)))}')
     return (
         f'these runs differ at {ship_speed(speed, ship.mass_kg)} ({of_many}{"; ".join(parts)}), '
         f'by {far:.1f} standard deviations: one state of the hull does not fit all. Give the runs '
@@ -119,7 +118,7 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     )
 
 
-def _mean(campaign: Sequence[Estimate], speed_m_s: float) -> tuple[float, float]:
+def _mean(curves: Sequence[ResistanceCurve], speed_m_s: float) -> tuple[float, float]:
     """Return the mean of r at a speed, and its sd without what all runs share."""
     r, sd = np.array(
         [
@@ -127,7 +126,7 @@ def _mean(campaign: Sequence[Estimate], speed_m_s: float) -> tuple[float, float]
                 np.interp(speed_m_s, curve.speed_m_s, curve.resistance_m_s2),
                 np.interp(speed_m_s, curve.speed_m_s, curve.sigma_repeatable_m_s2),
             ]
-            for curve in (each.valid_curve for each in campaign)
+            for curve in curves
         ]
     ).T
     sd = np.hypot(sd, _RUN_TO_RUN * r)

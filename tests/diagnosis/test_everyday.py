@@ -82,6 +82,13 @@ def test_white_noise_stays_as_it_is() -> None:
     assert 0.5 < np.mean((rows.value - 7.0) ** 2 / variance) < 1.5
 
 
+def test_a_coarse_display_of_places_hides_as_much_on_any_course() -> None:
+    way = np.round(7.0 * np.arange(600.0) / 20.0) * 20.0
+    still = np.zeros(len(way))
+    north, east = (display_sd(np.column_stack(xy), 1.0) for xy in ((still, way), (way, still)))
+    assert north == east == pytest.approx(20.0 / np.sqrt(12.0))
+
+
 def test_a_coarse_display_hides_more_while_the_speed_stands() -> None:
     time = np.arange(0.1, LEAD_IN_S + 300.0, 0.2)
     true = 3.02 - 0.01 * np.maximum(time - LEAD_IN_S, 0.0)

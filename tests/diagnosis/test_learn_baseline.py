@@ -162,6 +162,17 @@ def test_what_is_stated_of_friction_and_wave_together_counts() -> None:
     assert chance[0] < 0.5 * chance[1]
 
 
+def test_one_run_of_a_ship_without_a_baseline_is_its_table() -> None:
+    # N = 3, seeds 1 to 3: as they were read; without the wind that might have blown 0.4 % less
+    bare, speed = replace(SHIP, baseline=None), np.linspace(2.5, 6.0, 30)
+    off = []
+    for seed in (1, 2, 3):
+        run = coasted(coast_s=1500.0, inputs=('speed_through_water',), seed=seed)
+        found = learn_baseline([run], bare, PARAMETERS).ship
+        off.append(found.resistance_n(speed) / SHIP.resistance_n(speed) - 1.0)
+    assert abs(np.mean(off)) < 0.002
+
+
 def test_needs_a_run() -> None:
     with pytest.raises(DiagnosisError, match='no run'):
         learn_baseline([], SHIP, PARAMETERS)

@@ -6,8 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipdrag_ros.diagnosis.diagnose import compare
+from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
@@ -28,6 +31,15 @@ def seen() -> Observation:
 @pytest.fixture(scope='module')
 def runs(seen: Observation) -> ShipRuns:
     return ship_runs((seen,), SHIP)
+
+
+def test_a_motion_that_cannot_be_computed_is_refused_in_words(seen: Observation) -> None:
+    comparing = compare((seen,), SHIP, Facts(SHIP))
+    comparing.runs.start[0] = np.nan
+    with pytest.raises(
+        DiagnosisError, match='cannot be computed at the speeds of the runs: check'
+    ):
+        comparing.fit_nothing()
 
 
 def test_an_observation_is_condensed_and_knows_the_stop(seen: Observation) -> None:

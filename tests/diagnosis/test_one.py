@@ -9,12 +9,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose, words
+from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.inference.decision import NONE
+from shipdrag_ros.inference.decision import NONE, Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -65,6 +66,23 @@ def test_without_anything_hidden_nothing_is_most_probable() -> None:
         limit = found.limits[name]
         assert 0.0 < limit.value < np.inf
     assert found.limits['log_scale'].value < 0.08  # half of what is usual where it is there
+    # rough or with a propeller that stands: no size of the first is that of it alone
+    assert found.limits['fouling'].would_be_named is None
+    assert found.limits['locked_propeller'].would_be_named == pytest.approx(0.3, rel=0.3)
+    assert found.limits['turning'].would_be_named == 0.0  # the heading shows that she turns
+    assert 'turning of any size' in words.sentence(replace(found, verdict=Verdict.NONE))
+    assert 'any size' in {row[3] for row in diagnosis_cells.limits(found).rows}
+
+
+@pytest.mark.parametrize(
+    ('text', 'name'), [('fouling=0.5', 'fouling'), ('fouling=2', 'locked_propeller')]
+)
+def test_a_size_that_is_not_named_by_its_limit_is_not_named_in_a_record(
+    text: str, name: str
+) -> None:
+    found = answer(text)
+    assert found.candidates[0].names == (name,)
+    assert 'fouling' not in [effect.name for effect in found.effects]
 
 
 def test_a_limit_grows_where_the_run_shows_less() -> None:

@@ -14,6 +14,7 @@ from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.samples import Channel
 
 
@@ -56,6 +57,21 @@ def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     of_n_r = alike.sigma_m_s2**2 - alike.sigma_repeatable_m_s2**2
     expected = one.valid_curve.sigma_m_s2**2 - one.valid_curve.sigma_repeatable_m_s2**2
     np.testing.assert_allclose(of_n_r.max(), expected.max(), rtol=1e-6)
+
+
+def test_runs_are_of_one_kind(coast, ship) -> None:
+    # wind and depth are known of one alone: what it is in calm deep water is not that of the other
+    one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
+    assert one.reference.unknown
+    less = replace(one.calm, resistance_m_s2=0.9 * one.conditions.resistance_m_s2)
+    known = replace(one, calm=less, reference=Reference(Knowledge.MEASURED, Knowledge.STATED))
+    assert not known.reference.unknown
+    mixed = combine([one, known], [0.0, 0.0])
+    np.testing.assert_array_equal(
+        mixed.resistance_m_s2, combine([one, one], [0.0, 0.0]).resistance_m_s2
+    )
+    calm = combine([known, known], [0.0, 0.0])
+    np.testing.assert_allclose(calm.resistance_m_s2, 0.9 * mixed.resistance_m_s2, rtol=1e-9)
 
 
 def test_no_heading_no_current(coast, ship) -> None:

@@ -60,4 +60,4 @@ def test_the_water_turns_it_on(part: float) -> None:
 def test_a_sensor_that_always_reads_zero_is_called_dead() -> None:
     notes = ' '.join(final(np.zeros(LEAD_S + COAST_S)).notes)
     assert 'stood before the stop too: it shows nothing, or its sensor is dead' in notes
-    assert 'stands whenever it is heard' not in notes
+    assert 'stands whenever it is received' not in notes

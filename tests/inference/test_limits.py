@@ -11,15 +11,16 @@ from scipy.stats import halfnorm, norm
 
 from shipdrag_ros.inference.decision import (
     NONE,
-    Sensitivity,
     SizePosterior,
     WeighedHypothesis,
     decide,
     named_from,
+    prior_amounts,
     probabilities,
     quantile,
 )
-from shipdrag_ros.parameter import half_normal, log_normal, normal
+from shipdrag_ros.parameter import Prior, half_normal, log_normal, normal
+from shipdrag_ros.samples import Float64
 
 
 def test_the_last_digit_of_a_weight_moves_no_limit() -> None:
@@ -56,30 +57,96 @@ def test_the_limit_of_a_size_is_the_quantile_of_its_distribution() -> None:
         quantile([], 0.95)
 
 
+@pytest.mark.parametrize('power', [1.0, -1.8])
+@pytest.mark.parametrize('reading', [0.02, 0.1, 0.4])
+def test_the_limit_of_a_log_normal_size_is_that_of_its_posterior_on_a_grid(
+    power: float, reading: float
+) -> None:
+    # the reading of a trace that is the size to a power, with noise of 0.1
+    prior, noise = log_normal(0.25, 0.6), 0.1
+    z = np.linspace(-8.0, 8.0, 200_001)
+    amount = prior.at(0.0) ** power * np.exp(power * prior.second * z)
+    scaled = reading * prior.at(0.0) ** (power - 1.0)
+    sd = noise * prior.at(0.0) ** (power - 1.0)
+    log = -0.5 * z**2 - 0.5 * ((scaled - amount) / sd) ** 2
+    best = int(np.argmax(log))
+    slope = power * prior.second * amount[best]
+    fitted = SizePosterior(1.0, float(z[best]), (1.0 + (slope / sd) ** 2) ** -0.5, prior, power)
+    below = np.cumsum(np.exp(log - log[best]))
+    for share in (0.05, 0.5, 0.95):
+        exact = prior.at(float(np.interp(share, below / below[-1], z)))
+        assert quantile([fitted], share) == pytest.approx(exact, rel=0.01)
+
+
+def _named(traces: Float64, priors: list[Prior], still: Float64 | None = None) -> list[float]:
+    """Return amounts from which traces (e, n), beside those of no size, are named."""
+    lines = np.vstack([np.zeros_like(traces) if still is None else still, traces])
+    gaussians = np.stack([prior_amounts(prior, 1.0) for prior in priors], axis=1)
+    found = named_from(lines @ lines.T, gaussians, np.full(len(traces), math.log(0.05)))
+    return [float(amount) for amount in found]
+
+
 def test_nine_of_ten_records_of_that_size_name_it() -> None:
     # N = 4000 records of 40 rows, seed 0; binomial sd 0.5 %, to first order within 4 %
     rng = np.random.default_rng(0)
     rows = np.linspace(0.0, 1.0, 40)
-    responses = np.array([np.ones(40), rows, rows**2 * 1.2])
-    information = responses @ responses.T
-    known = Sensitivity(information, np.zeros(3), np.ones(3), np.full(3, math.log(0.05)))
-    amounts = named_from(known)
+    traces = 1.5 * np.array([np.ones(40), rows, rows**2 * 1.2])
+    amounts = _named(traces, [normal(1.0)] * 3)
     assert np.isfinite(amounts).all()
-    own = np.diag(information)
+    own = np.diag(traces @ traces.T)
     for e, amount in enumerate(amounts):
         named = 0
         for _ in range(4000):
-            score = responses @ (amount * responses[e] + rng.standard_normal(40))
+            score = traces @ (amount * traces[e] + rng.standard_normal(40))
             gain = 0.5 * score**2 / (own + 1.0) - 0.5 * np.log(own + 1.0)
-            ways = [WeighedHypothesis((f'e{f}',), gain[f], known.log_odds[f]) for f in range(3)]
+            ways = [WeighedHypothesis((f'e{f}',), gain[f], math.log(0.05)) for f in range(3)]
             found = decide(probabilities([WeighedHypothesis(NONE, 0.0, 0.0), *ways]))
             named += list(found.effects) == [f'e{e}']
         assert named / 4000 == pytest.approx(0.9, abs=0.04)
 
 
+@pytest.mark.parametrize('sd_of_log', [0.3, 0.6, 1.0])
+def test_nine_of_ten_name_a_size_that_is_never_0(sd_of_log: float) -> None:
+    # N = 20 000 scores, seed 1; evidence by the integral over the prior; as above
+    rng = np.random.default_rng(1)
+    prior, information = log_normal(1.0, sd_of_log), 12.0
+    trace = np.full((1, 1), math.sqrt(information))
+    (amount,) = _named(trace, [prior])
+    size = np.exp(sd_of_log * np.linspace(-8.0, 8.0, 4001))
+    log_chance = norm.logpdf(np.linspace(-8.0, 8.0, 4001)) + math.log(16.0 / 4000.0)
+    score = information * amount + math.sqrt(information) * rng.standard_normal((20_000, 1))
+    steps = np.exp(score * size - 0.5 * information * size**2 + log_chance)
+    odds = 0.05 * steps.sum(axis=1)
+    assert np.mean(odds / (1.0 + odds) >= 0.9) == pytest.approx(0.9, abs=0.04)
+
+
+def test_a_size_that_is_always_there_has_a_trace_that_is_named_however_small_it_is() -> None:
+    traces, still = np.array([[0.1, 0.0], [0.0, 3.0]]), np.array([[8.0, 0.0], [0.0, 0.0]])
+    first, second = _named(traces, [log_normal(1.0, 0.6)] * 2, still)
+    assert first == 0.0
+    assert 0.5 < second < 3.0
+
+
+def test_what_a_record_says_sharply_is_named_no_sooner_beside_a_look_alike() -> None:
+    # of sizes known to a hundredth of their priors, and traces alike but for three sd of noise
+    traces = 100.0 * np.array([[1.0, 0.0], [1.0, 0.03]])
+    priors = [normal(1.0), normal(1.0)]
+    alone, beside = _named(traces[:1], priors[:1])[0], _named(traces, priors)
+    assert alone < 0.1
+    # apart by 3 A sd: named from about 5 sd
+    assert all(1.0 < amount < 3.0 for amount in beside)
+
+
 def test_no_size_is_named_where_another_has_the_same_trace() -> None:
-    twins = np.array([[9.0, 9.0, 0.0], [9.0, 9.0, 0.0], [0.0, 0.0, 9.0]])
-    known = Sensitivity(twins, np.zeros(3), np.ones(3), np.full(3, math.log(0.05)))
-    first, second, third = named_from(known)
+    traces = 3.0 * np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    first, second, third = _named(traces, [normal(1.0)] * 3)
     assert first == second == math.inf
     assert math.isfinite(third)
+
+
+def test_a_size_that_is_too_large_for_one_prior_is_the_other() -> None:
+    # as fouling beside a locked propeller: one alone reaches where the odds allow its name
+    traces = np.array([[12.0], [12.0]])
+    seldom, often = _named(traces, [log_normal(0.5, 0.3), log_normal(2.0, 0.3)])
+    assert 0.3 < seldom < 1.0
+    assert 1.0 < often < 2.5

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
 
@@ -50,6 +53,25 @@ def test_months_later_the_same_resistance_is_the_same_state(run: RunResult) -> N
     found = together([run, later(run, days=90.0, factor=1.05)])
     assert found.combined is not None
     assert found.combined.runs == 2
+
+
+def test_campaigns_are_compared_in_the_same_conditions(run: RunResult) -> None:
+    # of one of them wind and depth are known: in calm water it has less resistance, as all have
+    known = later(run, days=90.0, factor=1.0)
+    (coastdown,) = known.coastdowns
+    assert coastdown.estimate is not None
+    calm = coastdown.estimate.conditions
+    measured = replace(
+        coastdown.estimate,
+        calm=replace(calm, resistance_m_s2=0.7 * calm.resistance_m_s2),
+        reference=Reference(Knowledge.MEASURED, Knowledge.MEASURED),
+    )
+    there = replace(known, coastdowns=(replace(coastdown, estimate=measured),))
+    found = together([run, there])
+    assert found.combined is not None
+    alike = together([run, known]).combined
+    assert alike is not None
+    np.testing.assert_array_equal(found.combined.resistance_m_s2, alike.resistance_m_s2)
 
 
 def test_runs_of_one_day_show_wind_and_sea(run: RunResult) -> None:
