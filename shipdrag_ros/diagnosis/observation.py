@@ -20,12 +20,13 @@ from shipdrag_ros.diagnosis.context import Context, Stop, stop_time_s
 from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, measured, whitener_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
-from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.steady import BIN_S, white_sd
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import CODES, LOG, OUTLIER, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.priors import STOP
 from shipdrag_ros.posterior.rows import FIRST_S, GROWTH, LONGEST_PART, LONGEST_S, NEIGHBOURS
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
@@ -34,7 +35,7 @@ _ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as i
 _LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
-_KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
+_KNOWN_S = 10.0  # sd of the time of the stop, above which the speed shows it better
 
 
 @dataclass(frozen=True)
@@ -186,9 +187,9 @@ class Observation:
         parts, across = _condensed_all(series, seconds, edges, noise_of, heading_rad, lead_in_s)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
-        shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
+        shaft_s = run_down.shaft_s if run_down.by_shaft else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
-        margin_s = ONSET_SD_S if run_down.stop_sd_s > _KNOWN_S else 0.0
+        margin_s = STOP.sd if run_down.stop_sd_s > _KNOWN_S else 0.0
         to_port = measured(across, times) if across else None
         return cls(
             name,

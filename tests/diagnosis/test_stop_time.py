@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.context import stop_time_s
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
+from tests.runs import CARGO, coasted
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 RUN_DOWN_S = 8.0
@@ -50,3 +54,16 @@ def test_where_nothing_falls_or_too_little_is_there_nothing_is_moved() -> None:
     assert stop_time_s(time, steady, sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0
     late = time > -10.0
     assert stop_time_s(time[late], speed[late], sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0
+
+
+def test_a_stop_that_a_person_tells_is_not_sought_and_is_no_fall_of_a_shaft() -> None:
+    run = coasted(inputs=('speed_through_water',), seed=3)
+    stop_ns = run.window.start_ns
+    late = replace(run.window, told_ns=stop_ns + 12 * 10**9)
+    found = Observation.of(late, CARGO, Parameters(), name='run')
+    assert found.stopped_ns - stop_ns == pytest.approx(12e9, abs=0.5e9)
+    assert found.stop_sd_s < 6.0
+    assert CARGO.propulsion is not None
+    assert found.context.stop.shaft_s == 0.0
+    assert found.context.run_down_s is None
+    assert len(found.context) == 0
