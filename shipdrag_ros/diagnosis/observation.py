@@ -26,7 +26,6 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import CODES, LOG, OUTLIER, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.priors import STOP
 from shipdrag_ros.posterior.rows import FIRST_S, GROWTH, LONGEST_PART, LONGEST_S, NEIGHBOURS
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
@@ -189,7 +188,6 @@ class Observation:
         speed = _speed(parts, lead_in_s)
         shaft_s = run_down.shaft_s if run_down.by_shaft else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
-        margin_s = STOP.sd if run_down.stop_sd_s > _KNOWN_S else 0.0
         to_port = measured(across, times) if across else None
         return cls(
             name,
@@ -204,7 +202,7 @@ class Observation:
             to_port,
             np.zeros((0, 0))
             if to_port is None
-            else whitener_of(to_port, ship, speed, lead_in_s, margin_s),
+            else whitener_of(to_port, ship, speed, lead_in_s, run_down.stop_sd_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
             stop_moved_s,
