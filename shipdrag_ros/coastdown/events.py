@@ -152,6 +152,7 @@ class EndedCoastdown:
     withdrawn. The thrust began to fall at `stop_ns`, not after `start_ns`; None where the window
     was given, and what comes before it is not known to be steady sailing: `regimes` is None then,
     and where there are cuts, `stretch` shows the whole of it: times [ns] and mean speeds [m/s].
+    A person told a stop at `told_ns`.
     """
 
     __repr__ = short_repr
@@ -167,6 +168,7 @@ class EndedCoastdown:
     cuts: tuple[NotCoastdown, ...] = ()
     stretch: tuple[tuple[int, float], ...] = ()
     stop_ns: int | None = None
+    told_ns: int | None = None
     regimes: Regimes | None = field(default=None, repr=False)
 
     @property

@@ -300,7 +300,8 @@ class Monitor:
         """
         start_ns = ended.start_ns if ended.stop_ns is None else ended.stop_ns
         before_ns = round(self._parameters.steady_s * SECOND_NS)
-        return self._cut(start_ns, ended.end_ns, start_ns - before_ns)
+        window = self._cut(start_ns, ended.end_ns, start_ns - before_ns)
+        return replace(window, told_ns=ended.told_ns)
 
     def _fresh(self, tally: InputTally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
@@ -533,7 +534,8 @@ class Monitor:
         )
         notes = (*window.notes, *self._vouching.notes(start_ns))
         log, doubt = self._vouching.log_doubt
-        return replace(window, notes=notes, doubted_log=log, log_doubt=doubt)
+        told_ns = None if self._regimes is None else self._regimes.told_ns
+        return replace(window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns)
 
     # how a coastdown ends
 

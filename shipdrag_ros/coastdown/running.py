@@ -139,6 +139,7 @@ class RunningCoastdown:
             self._heading_rad,
             cuts=cuts,
             stop_ns=stop_ns,
+            told_ns=window.told_ns,
             regimes=regimes,
         )
         return [ended, *cuts]

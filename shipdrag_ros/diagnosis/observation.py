@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.measured import Measured, damping_of, whitener_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import RunRows
-from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.steady import BIN_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S
@@ -185,7 +185,7 @@ class Observation:
         placed = across.kind == POSITION
         to_port = Rows(*(each[placed] for each in across)), variance[placed]
         times = np.unique(np.concatenate([along[0].time_s, to_port[0].time_s]))
-        shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
+        shaft_s = run_down.shaft_s if run_down.by_shaft else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s)
         # their noise is learnt from the steady record
         learnt = to_port[0].time_s < lead_in_s - run_down.stop_sd_s

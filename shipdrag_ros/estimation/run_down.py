@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,12 +11,11 @@ import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import MAD_TO_SD
-from shipdrag_ros.posterior.priors import RUN_DOWN, STOP
-from shipdrag_ros.samples import SHAFTS, Float64
+from shipdrag_ros.posterior.priors import RUN_DOWN, STOP, TOLD, TOLD_CHANCE
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
 _SUDDEN_S = 30.0  # slower than this, a shaft that follows the ship seems to run down
-ONSET_SD_S = STOP.sd  # of an onset found from the speed alone: a loose bound, the fit finds it
 TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _GONE = 5.0  # run-downs after which the shaft turns on by the water, or is driven
@@ -277,6 +277,8 @@ class RunDown:
         fitted. 0: not known.
     notes
         A sentence each.
+    by_shaft
+        Whether a shaft or pitch dates the stop.
     """
 
     stop_ns: int
@@ -284,6 +286,7 @@ class RunDown:
     shaft_s: float
     shaft_sd_s: float
     notes: tuple[str, ...]
+    by_shaft: bool = False
 
     @classmethod
     def of(cls, window: Window, ship: Ship) -> RunDown:
@@ -314,13 +317,13 @@ class RunDown:
                 f'neither shaft nor ship file says how the thrust ends: fitted, about '
                 f'{RUN_DOWN.mean:g} s beforehand (propulsion: in the ship file would say it)'
             )
-            return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, (note, *others))
+            return cls(*_dated(window), 0.0, 0.0, (note, *others))
         run_down_s = ship.propulsion.run_down_s
         note = (
             f'the thrust is taken to end within about {run_down_s:.3g} s, by the ship file: how '
             'it does is fitted'
         )
-        return cls(window.start_ns, ONSET_SD_S, run_down_s, ship.propulsion.sd, (note, *others))
+        return cls(*_dated(window), run_down_s, ship.propulsion.sd, (note, *others))
 
     @classmethod
     def _of_fall(cls, window: Window, seen: str, fall: Fall, others: tuple[str, ...]) -> RunDown:
@@ -336,7 +339,23 @@ class RunDown:
             fall.run_down_s,
             fall.run_down_sd_s,
             (*notes, *others),
+            by_shaft=True,
         )
+
+
+def _dated(window: Window) -> tuple[int, float]:
+    """Return the stop [ns] and its sd [s], by the onset and by what a person told."""
+    if window.told_ns is None:
+        return window.start_ns, STOP.sd
+    off = (window.told_ns - window.start_ns) / SECOND_NS
+    of_both = STOP.sd**2 + TOLD.sd**2
+    # what is told is the stop, or else it is told at any time within the hour
+    density = math.exp(-0.5 * off**2 / of_both) / math.sqrt(2.0 * math.pi * of_both)
+    right = TOLD_CHANCE * 3600.0 * density
+    p = right / (right + 1.0 - TOLD_CHANCE)
+    mean, variance = off * STOP.sd**2 / of_both, STOP.sd**2 * TOLD.sd**2 / of_both
+    of_mixture = p * (variance + mean**2) + (1.0 - p) * STOP.sd**2 - (p * mean) ** 2
+    return window.start_ns + round(p * mean * SECOND_NS), math.sqrt(of_mixture)
 
 
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:

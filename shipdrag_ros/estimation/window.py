@@ -86,6 +86,8 @@ class Window:
         Series of further instruments, by the name of the input; of those heard.
     doubted_log, log_doubt
         The log most probably in a wrong scale, and that probability.
+    told_ns
+        When the engine was stopped, as a person told it [ns]; None where nobody did.
     before
         The record that ends where this window starts, positions in the same
         plane; None where there is none.
@@ -111,6 +113,7 @@ class Window:
     further: Mapping[str, Series] = field(default_factory=dict)
     doubted_log: str = 'speed_through_water'
     log_doubt: float = 0.0
+    told_ns: int | None = None
     before: Window | None = None
 
     @property

@@ -118,6 +118,11 @@ STOP = Declared(
     's',
     'dates of onsets found from the speed',
 )
+TOLD = Declared(
+    't_0', 'time of a stop that a person tells', normal(5.0), 's', 'said within some seconds'
+)
+TOLD_CHANCE = 0.9
+"""That a stop that a person tells is one; else it is some time within the hour."""
 # the instruments
 LOG_SCALE = Declared('b_1', 'scale of a log, less one', normal(0.02), '', 'Doppler logs: 2 %')
 LOG_OFFSET = Declared('b_0', 'offset of a log', normal(0.02), 'm/s', 'zeroed logs')
@@ -231,6 +236,7 @@ TABLE: tuple[Declared, ...] = (
     RUN_DOWN,
     RUN_DOWN_SHAPE,
     STOP,
+    TOLD,
     LOG_SCALE,
     LOG_OFFSET,
     LOG_UNFILTERED,

@@ -93,7 +93,7 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
         if not coastdown.withdrawn:
             start_ns, steady = begins(coastdown)
             window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
-            found.append((coastdown, window))
+            found.append((coastdown, replace(window, told_ns=coastdown.told_ns)))
     return found
 
 
@@ -135,7 +135,8 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
     first_ns = min(start_ns, *(first for first, _ in parts))
     last_ns = max(coastdown.end_ns, *(last for _, last in parts))
     apart = bool(clocks_apart(result))
-    return window_between(result, first_ns, last_ns, steady=steady, apart=apart)
+    window = window_between(result, first_ns, last_ns, steady=steady, apart=apart)
+    return replace(window, told_ns=coastdown.told_ns)
 
 
 def dismissed_glides(result: ReplayResult) -> list[Window]:

@@ -179,6 +179,8 @@ def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(ship, record, l
     events += [*monitor.update(block[at:]), *monitor.finish()]
     (ended,) = of(EndedCoastdown, events)
     assert abs(ended.start_ns - START_NS - (lead_s + 5.0) * S) < 10 * S
+    assert monitor.ended_window(ended).told_ns == ended.told_ns
+    assert abs(ended.told_ns - block.stamp_ns[at - 1]) < S
 
 
 def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:

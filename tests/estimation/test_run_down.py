@@ -138,3 +138,31 @@ def test_without_any_shaft_the_thrust_is_taken_to_have_ended() -> None:
     window = cut(series(Channel.SPEED_THROUGH_WATER, TIME, SPEED), before=False)
     found = RunDown.of(window, SHIP)
     assert found.notes == ('the thrust is taken to have ended before the window',)
+
+
+def test_what_a_person_tells_dates_a_stop_that_no_shaft_shows() -> None:
+    window = cut(series(Channel.SPEED_THROUGH_WATER, TIME, SPEED), start_s=STOP_S + 20.0)
+    for ship in (SHIP, replace(SHIP, propulsion=None)):
+        found = RunDown.of(replace(window, told_ns=round(STOP_S * 1e9)), ship)
+        assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=6.0)
+        assert found.stop_sd_s < 6.0
+        assert not found.by_shaft
+
+
+@pytest.mark.parametrize('off_s', [-3600.0, -200.0, 200.0, 86400.0])
+def test_what_a_person_tells_is_not_believed_where_nothing_begins(off_s: float) -> None:
+    window = cut(series(Channel.SPEED_THROUGH_WATER, TIME, SPEED))
+    told = replace(window, told_ns=round((STOP_S + off_s) * 1e9))
+    of_both = [RunDown.of(each, SHIP) for each in (window, told)]
+    assert of_both[1].stop_ns * 1e-9 == pytest.approx(STOP_S, abs=1e-3)
+    assert of_both[1].stop_sd_s == pytest.approx(of_both[0].stop_sd_s, rel=1e-3)
+
+
+def test_a_shaft_dates_the_stop_better_than_a_person() -> None:
+    window = cut(
+        series(Channel.SHAFT, TIME, falling(TIME, STOP_S)),
+        series(Channel.SPEED_THROUGH_WATER, TIME, SPEED),
+    )
+    found = RunDown.of(window, SHIP)
+    assert found.by_shaft
+    assert RunDown.of(replace(window, told_ns=round((STOP_S + 9.0) * 1e9)), SHIP) == found

@@ -18,9 +18,11 @@ from shipdrag_ros.bags import BagWriter, StopMark, open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Onset, Update
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.estimation import estimate_final
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, replay
+from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, coast_windows, replay
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import Ship
 from tests.runs import write_run
@@ -242,7 +244,8 @@ def test_what_a_bag_holds_is_not_denied_with_a_stop(
 def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
     tmp_path: Path, ship: Ship, voyage: Callable[..., Block], live: type[Any]
 ) -> None:
-    messages = list(encode(voyage()))
+    block = voyage()
+    messages = list(encode(block[block.channel != Channel.SHAFT]))
     at = next(i for i, each in enumerate(messages) if each.log_ns > START_NS + 405e9)
     session = live(ship, Parameters(update_s=30.0))
     session.start(tmp_path / 'a.mcap')
@@ -262,6 +265,16 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
     (told,) = result.coastdowns
     assert told.onset_detected_ns is not None
     assert told.onset_detected_ns < now_ns + 40e9  # 15 s later without it
+    # and the fit of the whole of it has the time, on board and in replay
+    (ended,) = (each for each in session.events if isinstance(each, EndedCoastdown))
+    windows = [session.monitor.ended_window(ended), *(each for _, each in coast_windows(result))]
+    said = [RunDown.of(each, ship) for each in windows]
+    assert said[0] == said[1]
+    assert said[0].stop_ns == pytest.approx(now_ns, abs=6e9)
+    assert said[0].stop_sd_s < 6.0
+    found = [estimate_final(each, ship, Parameters(update_s=30.0)) for each in windows]
+    assert np.array_equal(found[0].calm.resistance_m_s2, found[1].calm.resistance_m_s2)
+    assert np.array_equal(found[0].calm.sigma_m_s2, found[1].calm.sigma_m_s2)
 
 
 @pytest.mark.parametrize('verb', ['forecast', 'diagnose'])

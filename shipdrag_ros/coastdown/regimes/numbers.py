@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 
 
@@ -119,7 +120,12 @@ SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 
 # switches, each an hour
 STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')
-TOLD = _grid('TOLD', (0.9, 5.0), '1, s', 'a stop that a person tells is one: chance, and error')
+TOLD = _grid(
+    'TOLD',
+    (priors.TOLD_CHANCE, priors.TOLD.sd),
+    '1, s',
+    'a stop that a person tells is one: chance, and error',
+)
 LEVEL = _number('LEVEL', 0.5, '1/h', 'driven to another level')
 TURN = _number('TURN', 1.0, '1/h', 'driven to turning')
 MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` of a switch')

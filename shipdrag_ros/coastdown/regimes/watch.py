@@ -203,6 +203,11 @@ class RegimeFilter:
         return self._setting.told_s + self._zero_s
 
     @property
+    def told_ns(self) -> int | None:
+        """The same [ns]; None where nobody did."""
+        return None if math.isnan(self.told_s) else round(self.told_s * SECOND_NS)
+
+    @property
     def taken_s(self) -> int:
         """Second since the epoch up to which the record has been taken."""
         return self._next * self._width
