@@ -126,8 +126,7 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    stated = ship.baseline is not None
-    baseline = 'stated' if stated else 'fitted_here'
+    baseline = 'fitted_here' if ship.baseline is None else 'stated'
     look = partial(observed, runs, ship, parameters, progress=progress)
     seen, notes = look({})
     questions = [
@@ -150,6 +149,20 @@ def diagnose(
         return _Case(seen, comparing, comparing.compare(), stated, before)
 
     case, notes = settled(look, (seen, notes), compared)
+    return _answer(case, ship, notes, baseline, progress, advise=advise)
+
+
+def _answer(
+    case: _Case,
+    ship: Ship,
+    notes: tuple[str, ...],
+    baseline: str,
+    progress: Progress,
+    *,
+    advise: bool,
+) -> DiagnosisResult:
+    """Judge what was compared."""
+    stated = ship.baseline is not None
     seen, comparing, found = case.seen, case.comparing, case.found
     never = inseparable(found.effects)
     judged = judge(found, never)
