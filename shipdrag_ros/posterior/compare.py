@@ -839,8 +839,8 @@ def _put(total: Float64, products: Float64, place: Int64) -> None:
 
 def _amount(way: EffectWay) -> tuple[float, float]:
     """Return mean and precision of the size, in parts of that which is tried."""
-    prior = way.unknowns[0].prior
-    if prior.shape is Shape.LOG_NORMAL:
-        return 1.0, 1.0 / _AMOUNT_SD**2
-    tried = prior.at(way.tried()[0])
-    return prior.at(0.0) / tried, (tried / prior.slope(0.0)) ** 2
+    shape = way.unknowns[0].prior.shape
+    tried = way.tried()[0]
+    if shape is Shape.HALF_NORMAL or way.start[0] == 0.0:
+        return 0.0, tried**2
+    return 1.0, 1.0 / _AMOUNT_SD**2

@@ -86,8 +86,8 @@ def test_white_noise_stays_as_it_is() -> None:
 def test_a_coarse_display_of_places_hides_as_much_on_any_course() -> None:
     way = np.round(7.0 * np.arange(600.0) / 20.0) * 20.0
     still = np.zeros(len(way))
-    north, east = (display_sd(np.column_stack(xy), 1.0) for xy in ((still, way), (way, still)))
-    assert north == east == pytest.approx(20.0 / np.sqrt(12.0), rel=0.1)
+    north, east = (display_sd(np.column_stack(xy), 0.0) for xy in ((still, way), (way, still)))
+    assert north == east == pytest.approx(20.0 / np.sqrt(12.0))
 
 
 def test_a_coarse_display_hides_more_while_the_speed_stands() -> None:
