@@ -250,6 +250,7 @@ def carried(
     ship: Ship,
     runs: Sequence[SeenRun],
     facts: Facts,
+    sought: Collection[str],
 ) -> Carried | None:
     """
     Hold earlier diagnoses against what is to be diagnosed.
@@ -264,6 +265,8 @@ def carried(
         That are diagnosed.
     facts
         Of the log book: what is dated between ends an effect.
+    sought
+        Names of the effects that the runs can show.
 
     Returns
     -------
@@ -287,6 +290,8 @@ def carried(
         stays, unused = {}, []
         for name, effect in effects_of(ship).items():
             why = _unused(effect, each, stated, of_hull)
+            if not why and name not in sought:
+                why = 'no instrument that it falsifies was read in these runs'
             if not why:
                 stays[name] = _stays(effect, each, now_ns, facts)
             elif each.probability(name) >= _LEAST:

@@ -35,6 +35,7 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
@@ -46,7 +47,6 @@ from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, t
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
 _APART_M_S = 0.15  # slowly: six times what is usual of water
-_DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
 Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
@@ -143,7 +143,9 @@ def diagnose(
 
     def compared(seen: tuple[Observation, ...]) -> _Case:
         stated = stated_in(runs, seen, ship, facts)
-        before = carried(earlier, ship, _seen_runs(seen), stated)
+        before = carried(
+            earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
+        )
         progress('comparing hypotheses', 0, 0)
         comparing = compare(seen, ship, stated, before)
         return _Case(seen, comparing, comparing.compare(), stated, before)
@@ -294,7 +296,9 @@ def compare(
 
     effects = effects_about(seen)
     since_ns = [run.context.stop.since_ns for run in seen]
-    chance = _OTHER_DAYS if max(since_ns) - min(since_ns) > _DAY_NS else _ONE_DAY
+    chance = (
+        _OTHER_DAYS if (max(since_ns) - min(since_ns)) * 1e-9 > priors.SAME_DAY_S else _ONE_DAY
+    )
     return Comparing(
         ship_runs(seen, ship),
         ship,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import KIND_COUNT, POSITION, Input, Rows
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Fact, Ship
 
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
@@ -145,8 +146,7 @@ class Observation:
         name
             For the user.
         stop_moved_s
-            By how much the stop is known to be later than it is taken for; some
-            seconds, as the record is not looked through again for it [s].
+            By how much the stop is known to be later than it is taken for [s].
 
         Returns
         -------
@@ -171,7 +171,7 @@ class Observation:
         since_ns = max(window.before.start_ns, first_ns)
         run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
-        heading_rad, heading_sd = _heading(window, since_ns)
+        heading_rad, heading_sd = _heading(window, since_ns, record.white_sd.get('position', 0.0))
         halved_s = 2.0 / float(damping_of(ship, np.array([speed_m_s]))[0][0])
 
         def rows_of(direction_rad: float, way_m_s: float) -> tuple[Rows, Float64]:
@@ -230,7 +230,7 @@ def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
     return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
 
 
-def _heading(window: Window, since_ns: int) -> tuple[float, float]:
+def _heading(window: Window, since_ns: int, position_sd_m: float) -> tuple[float, float]:
     """Return direction through water in the lead-in, and its sd: compass, or else course."""
     assert window.before is not None
     yaw = window.before.heading.value
@@ -240,13 +240,24 @@ def _heading(window: Window, since_ns: int) -> tuple[float, float]:
     before, after = window.before.position, window.position
     if not len(after):
         return 0.0, 0.0
-    first = int(np.searchsorted(before.time_ns, since_ns))
-    # where few are before the stop, the course after it
-    found = before if len(before) - first > 1 else after
-    first = first if found is before else 0
-    time_s = (found.time_ns[first:] - found.time_ns[-1]) * 1e-9
-    slopes = np.polyfit(time_s, found.value[first:], 1)[0]
-    return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
+    sailed = before.time_ns >= since_ns
+    courses = [
+        _course(before.time_ns[sailed], before.value[sailed], position_sd_m),
+        _course(after.time_ns, after.value, position_sd_m),
+    ]
+    # she turns little where that after the stop is needed
+    course, sd = courses[0] if courses[0][1] < _COURSE_SD_RAD else min(courses, key=itemgetter(1))
+    return course, math.hypot(sd, _COURSE_SD_RAD)
+
+
+def _course(time_ns: Int64, place: Float64, sd_m: float) -> tuple[float, float]:
+    """Return the direction of a line through places, and its sd by their noise."""
+    if len(place) < 2:
+        return 0.0, math.inf
+    time_s = (time_ns - time_ns.mean()) * 1e-9
+    spread = float(time_s @ time_s)
+    east, north = time_s @ place / spread
+    return math.atan2(north, east), sd_m / max(math.sqrt(spread) * math.hypot(east, north), 1e-9)
 
 
 def _speed(steady: Rows) -> float:

@@ -19,7 +19,6 @@ from scipy.special import expit
 
 from shipdrag_ros.diagnosis.observation import CoastRun, Observation
 from shipdrag_ros.diagnosis.sights import ship_runs
-from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.inference.linear import Factored
 from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
@@ -292,12 +291,6 @@ class SharedBaseline:
         ]
         comparing = Comparing(ship_runs(seen, ship), ship, ())
         fitted = next(fit for fit in comparing.compare().fitted if fit.names == NONE)
-        if fitted.tables is None:
-            low, high = ship.baseline_range_m_s
-            raise DiagnosisError(
-                f'{len(runs)} run(s) cannot be fitted with a baseline stated from {low:.3g} to '
-                f'{high:.3g} m/s; state it over all speeds of the runs, or leave it out'
-            )
         names, sds = _stated(ship)
         _, mean, precision = comparing.prior_of(fitted)
         own = comparing.runs.own
@@ -314,7 +307,7 @@ class SharedBaseline:
             in_unit = np.concatenate([unit, np.ones(len(place))])
             matrix = open_[np.ix_(order, order)] * np.outer(in_unit, in_unit)
             normals.append(Normal.without(matrix, negative_gradient[order] * in_unit, len(shared)))
-        speeds = [table.speed_m_s for table in fitted.tables]
+        speeds = [table.speed_m_s for table in fitted.linear]
         return cls(
             ship,
             comparing,

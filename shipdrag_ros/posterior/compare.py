@@ -524,7 +524,7 @@ class Comparing:
         run, size = self.runs.runs[j], self.runs.size
         z = base.at[size : size + len(base.hypothesis.unknowns)]
         still, steady_m_s = self.runs.still(j, base.at)
-        whole = sum(base.hypothesis.actions(run.frame, j, z), still + self.runs.air(base.at))
+        whole = sum(base.hypothesis.actions(run.frame, j, z), still + self.runs.air(j, base.at))
         actions = [whole]
         for each in hypotheses:
             way = each.ways[-1]

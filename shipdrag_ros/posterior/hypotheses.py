@@ -28,7 +28,7 @@ from shipdrag_ros.posterior.motion import EXTRAS
 from shipdrag_ros.posterior.problem import EXACT, RunModel
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 """Where something smooth without a name may be."""
@@ -242,7 +242,7 @@ class ShipRuns:
     @cached_property
     def places(self) -> tuple[Int64, ...]:
         """Of each run's own unknowns among those of all."""
-        k, own = self.coefficients, [*_OWN, _PORT, _HEADING, _SCATTER]
+        k, own = self.coefficients, self._own
         shared = [i for i in range(_LOCAL) if i not in own]
         found = []
         for j in range(len(self.runs)):
@@ -254,11 +254,18 @@ class ShipRuns:
             found.append(place)
         return tuple(found)
 
+    @cached_property
+    def _own(self) -> list[int]:
+        """Unknowns that each run has for itself; of other days, the air too."""
+        days = [run.frame.scenario.day for run in self.runs]
+        apart = (max(days) - min(days)) * DAY_S > priors.SAME_DAY_S
+        return [*_OWN, _PORT, _HEADING, _SCATTER, *(_AIR if apart else ())]
+
     @property
     def own(self) -> list[Int64]:
         """Places of the unknowns that belong to each run alone."""
         k = self.coefficients
-        mine = [k + i for i in (*_OWN, _PORT, _HEADING, _SCATTER)]
+        mine = [k + i for i in self._own]
         return [place[mine] for place in self.places]
 
     @cached_property
@@ -350,6 +357,7 @@ class ShipRuns:
         """Return mean and precision of the unknowns that are no coefficients, in a family."""
         mean, precision = np.zeros(self.size), np.ones(self.size)
         k = self.coefficients
+        calm = priors.sheltered(max(run.model.speed_m_s for run in self.runs))
         for run, place in zip(self.runs, self.places):
             all_ = run.model.families
             alike = [each for each in all_ if each.name == name] or all_
@@ -362,7 +370,6 @@ class ShipRuns:
             precision[place[k + _PORT]] = 1e-6  # of where she was, nothing is known
             precision[place[k + _HEADING]] = max(run.heading_sd_rad, EXACT) ** -2.0
             precision[place[k + _SCATTER]] = max(run.scatter, EXACT) ** -2.0
-            calm = priors.sheltered(run.model.speed_m_s)
             for i in _AIR:
                 precision[place[k + i]] = (calm * priors.LIGHT_AIR.sd) ** -2.0
             at = place[k + motion.CURRENT]
@@ -401,7 +408,7 @@ class ShipRuns:
         run = self.runs[j]
         still, speed = self.still(j, at)
         z = at[self.size : self.size + len(hypothesis.unknowns)]
-        air = self.air(at)
+        air = self.air(j, at)
         actions = [*hypothesis.actions(run.frame, j, z), air]
         whole = sum(actions, still)
         steps = []
@@ -420,9 +427,9 @@ class ShipRuns:
         blown = [batch.add(whole + Action(wind_m_s=wind), speed) for wind in winds]
         return _Places(base, acting, steps, without, turned, blown, sum(actions, _NOTHING))
 
-    def air(self, at: Float64) -> Action:
-        """Return what light air does that blows in every hypothesis."""
-        east, north = (float(at[self.places[0][self.coefficients + i]]) for i in _AIR)
+    def air(self, j: int, at: Float64) -> Action:
+        """Return what light air does that blows in a run in every hypothesis."""
+        east, north = (float(at[self.places[j][self.coefficients + i]]) for i in _AIR)
         return Action(wind_m_s=(east, north))
 
     def still(self, j: int, at: Float64) -> tuple[Action, float]:

@@ -197,6 +197,8 @@ def sheltered(speed_m_s: float) -> float:
     return min(1.0, speed_m_s / _SHELTERED_M_S) ** 2
 
 
+SAME_DAY_S = 12 * 3600.0
+"""Between runs: farther apart the hull may be another, and the air is."""
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15, 0.5, 1.5)

@@ -457,7 +457,7 @@ def format_of(source: Path, options: Mapping[str, Any]) -> Format:
         if each.chosen_by in options:
             return each
     head = head_of(source)
-    if head.raw.startswith(MAGIC) or (source.is_dir() and any(source.glob('*.mcap'))):
+    if head.raw.startswith(MAGIC) or is_bag(source):
         raise ImportDataError(f'{str(source)!r} is a bag already: `shipdrag replay` takes it')
     return best_of(known, head)
 

@@ -258,12 +258,10 @@ def _dated(points: list[Point]) -> list[Point]:
 def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
     """Put values over the mean of the first months, which stand for the clean hull."""
     used = [point for point in points if point.used]
-    if not used:
-        return points, np.nan, 'no run can be used'
     first = [point for point in used if point.time_ns <= used[0].time_ns + FIRST_MONTHS_NS]
     values = np.array([point.value for point in first])
     weight = 1.0 / np.array([point.sd_repeatable for point in first]) ** 2
-    clean = float(weight @ values / weight.sum())
+    clean = float(weight @ values / weight.sum()) if first else np.nan
     scaled = [
         replace(
             point,
@@ -277,7 +275,7 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
         f'the ship file has no baseline: the clean hull is the mean of the first {len(first)} '
         'run(s), in 90 days; give a baseline, or one from clean runs (shipdrag baseline)'
     )
-    return scaled, clean, note
+    return scaled, clean, note if first else 'no run can be used'
 
 
 def _with_covariates(points: Sequence[Point], rows: Sequence[CoastdownRow]) -> list[Point]:

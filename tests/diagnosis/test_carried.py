@@ -24,7 +24,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS
 from shipdrag_ros.simulation.effect import Scope
-from shipdrag_ros.simulation.effects import LIBRARY, find
+from shipdrag_ros.simulation.effects import LIBRARY, effects_of, find
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -52,9 +52,14 @@ def earlier(days: float = 10.0, **candidates: float) -> EarlierDiagnosis:
     )
 
 
-def known(*given: EarlierDiagnosis, ship: Ship = SHIP, facts: tuple[Fact, ...] = ()) -> Carried:
+def known(
+    *given: EarlierDiagnosis,
+    ship: Ship = SHIP,
+    facts: tuple[Fact, ...] = (),
+    unread: tuple[str, ...] = (),
+) -> Carried:
     told = Facts(ship, tuple(StatedFact(fact, None, NOW_NS) for fact in facts))
-    found = carried(given, ship, RUNS, told)
+    found = carried(given, ship, RUNS, told, effects_of(ship).keys() - set(unread))
     assert found is not None
     return found
 
@@ -259,3 +264,9 @@ def test_an_earlier_size_that_the_runs_contradict_is_said(
     assert alone.verdict == told.verdict == 'one_of'
     sizes = [each.effects[0].parameters for each in told.candidates if each.names == ('fouling',)]
     assert all(abs(size['friction_factor'].value - 0.35) < 0.15 for size in sizes)
+
+
+def test_an_error_of_an_instrument_that_is_not_read_now_is_no_contradiction() -> None:
+    (judged,) = known(earlier(log_scale=0.97), unread=('log_scale',)).judged(nothing())
+    assert not judged.effects
+    assert 'was read in these runs' in ' '.join(judged.unused)

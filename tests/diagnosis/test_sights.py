@@ -13,7 +13,7 @@ import pytest
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.diagnose import effects_about
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.sights import sight
+from shipdrag_ros.diagnosis.sights import ship_runs, sight
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters
@@ -59,10 +59,18 @@ def window_of(
         (('position',), {}),
         (('speed_through_water', 'position'), {'every_s': 60}),
         (('speed_through_water', 'position'), {'since_s': LEAD_IN_S}),
+        (('speed_through_water', 'position'), {'since_s': LEAD_IN_S - 2.0}),
         (('speed_through_water', 'position'), {'late_s': 30.0}),
         (('speed_through_water', 'position'), {'late_s': -30.0}),
     ],
-    ids=['positions alone', 'a position a minute', 'positions from the stop on', 'late', 'early'],
+    ids=[
+        'positions alone',
+        'a position a minute',
+        'positions from the stop on',
+        'two positions before it',
+        'late',
+        'early',
+    ],
 )
 def test_nothing_is_missing_whatever_is_measured_and_whoever_dates_the_stop(
     cargo: Ship, inputs: tuple[str, ...], how: dict[str, Any]
@@ -101,3 +109,14 @@ def test_an_instrument_that_was_not_read_is_no_explanation(cargo: Ship, input_: 
     names = {effect.name for effect in effects_about([seen])}
     assert {'fouling', 'current'} <= names
     assert ('log_scale' in names) == ('radar_scale' not in names) == (input_ != 'position')
+
+
+def test_light_air_is_that_of_the_day(cargo: Ship, seen_of: Callable[..., Observation]) -> None:
+    first = seen_of()
+    sizes = []
+    for hours in (2.0, 48.0):
+        stop = first.context.stop
+        later = replace(stop, since_ns=stop.since_ns + round(hours * 3600e9))
+        other = replace(first, name='other', context=replace(first.context, stop=later))
+        sizes.append(ship_runs([first, other], cargo).size)
+    assert sizes[1] == sizes[0] + 2
