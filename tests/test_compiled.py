@@ -365,7 +365,7 @@ def test_an_edit_of_this_package_acts_at_once(
 ) -> None:
     """The live estimate differs, whose last step is in another file than what was edited."""
     rows = elsewhere / 'shipdrag_ros' / 'posterior' / 'rows.py'
-    old, new = 'NEIGHBOURS = 9', 'NEIGHBOURS = 5'
+    old, new = '_NEIGHBOURS = 9', '_NEIGHBOURS = 5'
     edit(rows, old, new)
     cache = str(elsewhere / 'cache')
     after, _ = run(elsewhere, LIVE, timeout=800.0, SHIPDRAG_CACHE_DIR=cache)

@@ -266,7 +266,7 @@ def carried(
     facts
         Of the log book: what is dated between ends an effect.
     sought
-        Names of the effects that the runs can show.
+        Names of the effects that her ship file and the runs can show.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def carried(
         for name, effect in effects_of(ship).items():
             why = _unused(effect, each, stated, of_hull)
             if not why and name not in sought:
-                why = 'no instrument that it falsifies was read in these runs'
+                why = 'neither her ship file nor an instrument of these runs can show it'
             if not why:
                 stays[name] = _stays(effect, each, now_ns, facts)
             elif each.probability(name) >= _LEAST:

@@ -35,7 +35,6 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
@@ -271,7 +270,15 @@ def settled(
         # effects are simulated from the stop as the run was seen
         seen, notes = look(moved_s)
         case = compared(seen)
-    return case, notes
+    return case, (
+        *notes,
+        *(
+            f'{name}: after {_LOOKS} looks the likeliest stop is still {by_s:+.0f} s from the one '
+            'that effects are simulated from; say it (--stop), or record the shaft'
+            for name, by_s in _moved_stops(case).items()
+            if abs(by_s) > _NEAR_S
+        ),
+    )
 
 
 def compare(
@@ -295,17 +302,14 @@ def compare(
         return facts.log_likelihood(hypothesis) + before
 
     effects = effects_about(seen)
-    since_ns = [run.context.stop.since_ns for run in seen]
-    chance = (
-        _OTHER_DAYS if (max(since_ns) - min(since_ns)) * 1e-9 > priors.SAME_DAY_S else _ONE_DAY
-    )
+    together = ship_runs(seen, ship)
     return Comparing(
-        ship_runs(seen, ship),
+        together,
         ship,
         effects,
         log_known,
         () if earlier is None else earlier.ways(effects),
-        math.log(chance),
+        math.log(_OTHER_DAYS if together.apart else _ONE_DAY),
     )
 
 

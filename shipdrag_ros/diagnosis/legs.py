@@ -334,6 +334,7 @@ class _LegCutter:
         start_ns, end_ns = int(block.stamp_ns.min()), int(block.stamp_ns.max())
         try:
             window = Window.from_block(block, start_ns, end_ns).one_of_each()
+            window = window.by_rep103(parameters.heading_convention)
         except ValueError as error:
             raise DiagnosisError(
                 f'{record.name!r}: a clock was set within the record ({error}): cut it there'
@@ -355,7 +356,6 @@ class _LegCutter:
         self.log = Timed.of(window.speed_through_water, start_ns)
         self.ground = Timed.of(ground, start_ns)
         self.heading = Timed.of(window.heading, start_ns)
-        self.compass = parameters.heading_convention == 'compass'
         span_s = (end_ns - start_ns) * 1e-9
         step_s = max(self.log.step_s, self.ground.step_s)
         self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
@@ -386,8 +386,6 @@ class _LegCutter:
         if not self.by_place:
             over, direction = ground.means(middle)[0], math.atan2(yaw.imag, yaw.real)
             known = Direction.HEADING if len(heading) else Direction.UNKNOWN
-            if self.compass and len(heading):
-                direction = 0.5 * math.pi - direction
             return _Leg(middle, through, over, direction, known)
         half_s = 0.5 * self.length_s
         places = [self._place(start_s + k * half_s) for k in range(-1, 4)]

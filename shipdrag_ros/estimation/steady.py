@@ -23,18 +23,6 @@ _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady r
 _TURNED_RAD = 0.15  # a block on another course does too
 
 
-def white_sd(value: Float64) -> float:
-    """
-    Return the standard deviation of white noise on a smooth signal.
-
-    Parameters
-    ----------
-    value : (n,)
-        In ascending time.
-    """
-    return float(weighted_white_sd(value, np.ones(len(value))))
-
-
 def display_sd(value: Float64, white_sd: float) -> float:
     """
     Return what the last digit of a display hides from a mean of a steady signal.

@@ -254,12 +254,16 @@ class ShipRuns:
             found.append(place)
         return tuple(found)
 
+    @property
+    def apart(self) -> bool:
+        """Whether runs are of different days."""
+        days = [run.frame.scenario.day for run in self.runs]
+        return (max(days) - min(days)) * DAY_S > priors.SAME_DAY_S
+
     @cached_property
     def _own(self) -> list[int]:
         """Unknowns that each run has for itself; of other days, the air too."""
-        days = [run.frame.scenario.day for run in self.runs]
-        apart = (max(days) - min(days)) * DAY_S > priors.SAME_DAY_S
-        return [*_OWN, _PORT, _HEADING, _SCATTER, *(_AIR if apart else ())]
+        return [*_OWN, _PORT, _HEADING, _SCATTER, *(_AIR if self.apart else ())]
 
     @property
     def own(self) -> list[Int64]:

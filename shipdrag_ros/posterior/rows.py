@@ -15,11 +15,11 @@ from shipdrag_ros.inference.rows import POSITION, Rows
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 
-_FIRST_PART, FIRST_S, GROWTH = 60.0, 3.0, 1.06  # of all, longest, and from one to the next
-LONGEST_PART, LONGEST_S = 80.0, 12.0
+_FIRST_PART, _FIRST_S, _GROWTH = 60.0, 3.0, 1.06  # of all, longest, and from one to the next
+_LONGEST_PART, _LONGEST_S = 80.0, 12.0
 _QUICK = 0.5  # of the number of parts, where time is short
 _EVEN = 0.05  # of the time in which the speed halves: its mean is 3e-4 off that of a straight line
-NEIGHBOURS = 9  # whose medians show where a reading should be, and how fast it changes
+_NEIGHBOURS = 9  # whose medians show where a reading should be, and how fast it changes
 
 
 @compiled
@@ -34,7 +34,7 @@ def right(time_s: Float64, value: Float64, sd: Float64, wrong: float) -> Float64
     wrong
         Chance that a reading is anything.
     """
-    n, size = len(value), min(NEIGHBOURS, len(value))
+    n, size = len(value), min(_NEIGHBOURS, len(value))
     found, near = np.ones(n), np.empty(n)
     spread = max(value.max() - value.min(), 1e-12)
     half = size // 2
@@ -72,10 +72,10 @@ def edges_of(
         Whether fewer will do.
     """
     fewer = _QUICK if quick else 1.0
-    longest = max(LONGEST_S, (end_s - start_s) / LONGEST_PART) / fewer
-    first = min(FIRST_S, (end_s - start_s) / _FIRST_PART)
+    longest = max(_LONGEST_S, (end_s - start_s) / _LONGEST_PART) / fewer
+    first = min(_FIRST_S, (end_s - start_s) / _FIRST_PART)
     even = _EVEN * halved_s * np.exp(_EVEN * np.arange(400.0))
-    widths = np.minimum(np.minimum(first * GROWTH ** np.arange(400), longest), even)
+    widths = np.minimum(np.minimum(first * _GROWTH ** np.arange(400), longest), even)
     edges = start_s + np.concatenate([[0.0], np.cumsum(widths)])
     result: Float64 = edges[: int(np.searchsorted(edges, end_s, side='right')) + 1]
     return result

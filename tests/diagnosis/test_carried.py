@@ -269,4 +269,4 @@ def test_an_earlier_size_that_the_runs_contradict_is_said(
 def test_an_error_of_an_instrument_that_is_not_read_now_is_no_contradiction() -> None:
     (judged,) = known(earlier(log_scale=0.97), unread=('log_scale',)).judged(nothing())
     assert not judged.effects
-    assert 'was read in these runs' in ' '.join(judged.unused)
+    assert 'an instrument of these runs can show it' in ' '.join(judged.unused)

@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.run_down import RunDown
-from shipdrag_ros.estimation.steady import display_sd, white_sd
+from shipdrag_ros.estimation.steady import display_sd, weighted_white_sd
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import NONE, Names
 from shipdrag_ros.inference.rows import Rows
@@ -71,7 +71,8 @@ def test_noise_behind_a_filter_is_that_of_its_means() -> None:
         rows, variance = rows_of(time, 7.0 + value)
         late = rows.time_s > 0.0  # over longer means it is noise that wanders, which is learnt
         assert 0.3 < np.mean((rows.value - 7.0)[late] ** 2 / variance[late]) < 2.0
-        assert white_sd(value) ** 2 / 30.0 < 0.1 * np.var(rows.value)
+        of_sample = weighted_white_sd(value, np.ones(len(value)))
+        assert of_sample**2 / 30.0 < 0.1 * np.var(rows.value)
 
 
 def test_white_noise_stays_as_it_is() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.steady import white_sd
+from shipdrag_ros.estimation.steady import weighted_white_sd
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -151,7 +151,7 @@ def test_white_noise_is_told_from_a_smooth_signal() -> None:
     rng = np.random.default_rng(1)
     signal = 8.0 / (1.0 + 0.003 * np.arange(500.0)) + 0.05 * rng.standard_normal(500)
     signal[::40] += 3.0
-    assert white_sd(signal) == pytest.approx(0.05, rel=0.15)
+    assert weighted_white_sd(signal, np.ones(len(signal))) == pytest.approx(0.05, rel=0.15)
 
 
 def test_a_short_coast_over_few_speeds_is_fitted() -> None:
