@@ -274,7 +274,7 @@ def settled(
         *notes,
         *(
             f'{name}: after {_LOOKS} looks the likeliest stop is still {by_s:+.0f} s from the one '
-            'that effects are simulated from; say it (--stop), or record the shaft'
+            'that effects are simulated from; tell the stop, or record the shaft'
             for name, by_s in _moved_stops(case).items()
             if abs(by_s) > _NEAR_S
         ),

@@ -58,6 +58,8 @@ RECORDS: dict[str, dict[str, Float64]] = {
     'even': {'speed_through_water': 0.0 * TIME + 3.0},
     'astern': odd(-glide(TIME)),
     'through zero': odd(glide(TIME) - 1.5),
+    'faster': odd(0.5 + 0.005 * TIME),
+    'steps': {'speed_through_water': np.round(glide(TIME), 0)},
     'few': {name: value[:7] for name, value in odd(glide(TIME)).items()},
     'one': {name: value[:1] for name, value in odd(glide(TIME)).items()},
     'far': {'position': np.column_stack([1e7 + TIME * 1e3, 0.0 * TIME])},
