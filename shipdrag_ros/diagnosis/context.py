@@ -29,7 +29,6 @@ from shipdrag_ros.simulation.surge import turning
 _BIN_S = 60.0
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
-_YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
 _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
 _SHORTEST_S = 0.1  # fall of a shaft
@@ -136,7 +135,7 @@ class Context:
             blocks.append(np.eye(len(shaft)) * _SHAFT_SD**2 + _SHAFT_OFF_SD**2)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
-        blocks.append(np.eye(len(yaw)) * _YAW_SD_RAD**2)
+        blocks.append(_yaw_covariance(yaw_s))
         run_down_s = ship.propulsion.run_down_s if ship.propulsion and stop.shaft_s else None
         if run_down_s is not None:
             values.append(np.log([stop.shaft_s]))
@@ -266,6 +265,13 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     turned = priors.WIND_TURNED.sd**2 * np.outer(other, other)
     gain = priors.WIND_GAIN.sd**2 * np.outer(values, values)
     return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
+
+
+def _yaw_covariance(time_s: Float64) -> Float64:
+    """Return what a ship yaws by from bin to bin, and what she and her compass wander by."""
+    apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
+    slow: Float64 = priors.YAW_WANDERS.sd**2 * np.exp(-apart)
+    return slow + np.eye(len(time_s)) * priors.YAW.sd**2
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:

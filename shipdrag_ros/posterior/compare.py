@@ -566,7 +566,7 @@ class Comparing:
             products, _ = self._of_run(j, joined, self.noise[j].typical)
             _put(total, products[0], joined.place)
         mean, precision, _ = self.runs.priors(base.hypothesis, base.at)
-        widest = int(np.argmin(precision[:, : self.runs.coefficients].sum(axis=1)))
+        widest = int(np.argmin(np.log(precision).sum(axis=1)))
         matrix = total[1 : 1 + p, 1 : 1 + p] + np.diag(precision[widest])
         right = total[1 : 1 + p, 0] + precision[widest] * mean[widest]
         scale = 1.0 / np.sqrt(np.diag(matrix))

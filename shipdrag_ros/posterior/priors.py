@@ -163,6 +163,15 @@ WIND_OFFSET = Declared(
 )
 WIND_GAIN = Declared('w', 'gain of an anemometer, less one', normal(0.05), '', _REALITY)
 WIND_TURNED = Declared('w', 'by which a vane is turned', normal(0.05), 'rad', _REALITY)
+YAW = Declared('-', 'heading of a minute about its course', normal(0.03), 'rad', 'yaw in waves')
+YAW_WANDERS = Declared(
+    '-',
+    'slow part of that, of ship and compass',
+    normal(0.04),
+    'rad',
+    'steady stretches of sailing records',
+)
+YAW_WANDERS_S = Declared('-', 'the same, time', 300.0, 's', _REALITY)
 AIR_AREA = Declared(
     'A C',
     'air drag area over V^(2/3), where the ship file states none',
@@ -253,6 +262,9 @@ TABLE: tuple[Declared, ...] = (
     WIND_OFFSET,
     WIND_GAIN,
     WIND_TURNED,
+    YAW,
+    YAW_WANDERS,
+    YAW_WANDERS_S,
     AIR_AREA,
     DEPTH_READ,
     LENGTH_OVER_BREADTH,
