@@ -14,6 +14,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtri
 
 from shipdrag_ros.parameter import Prior, Shape
@@ -346,61 +347,123 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     return float(np.interp(share, np.cumsum(weight) - 0.5 * weight, value))
 
 
-def named_from(information: Float64, prior: Float64, log_odds: Float64) -> Float64:
+class _Rival(NamedTuple):
+    """
+    What an explanation makes of records with each effect (e) at each size (s).
+
+    Attributes
+    ----------
+    gain : (e, s)
+        Log of its probability over that of nothing, without noise.
+    lines : (j,)
+        Of which what it expects is made.
+    expected : (j, e, s)
+        How much of each line.
+    square : (e, s)
+        Of what it expects.
+    """
+
+    gain: Float64
+    lines: NDArray[np.intp]
+    expected: Float64
+    square: Float64
+
+
+def _rival(
+    f: int, information: Float64, prior: Float64, sizes: Float64, mine: NDArray[np.intp]
+) -> _Rival:
+    """Return what explanation f makes of the records; `mine` are the lines of its unknowns."""
+    count = len(sizes)
+    traces = np.array([f, count + f] if f < count else [], np.intp)
+    block = information[np.ix_(mine, mine)] + np.eye(len(mine))
+    taken = np.linalg.solve(block, information[mine])
+    left = information[traces] - information[np.ix_(traces, mine)] @ taken
+
+    def with_records(products: Float64) -> Float64:
+        still, more = products[:, :count, None], products[:, count : 2 * count, None]
+        return np.asarray(still + more * sizes)
+
+    found = with_records(taken)
+    gain = 0.5 * np.sum(found * with_records(information[mine]), axis=0)
+    gain -= 0.5 * np.linalg.slogdet(block)[1]
+    amounts_of = np.ones((len(traces), count, len(sizes[0])))
+    if len(traces):
+        still, both, own = left[0, f], left[1, f], left[1, count + f]
+        amount, sd, log_chance = prior[:, f]
+        held = sd**-2.0
+        total = own + held
+        constant = log_chance - 0.5 * (held * amount**2 + np.log(total / held) + still)
+        as_is, added = with_records(left)[:, :, :, None]
+        right = added - both + held * amount
+        logs = as_is + 0.5 * right**2 / total + constant
+        top = logs.max(axis=2)
+        likely = np.exp(logs - top[:, :, None])
+        share = likely.sum(axis=2)
+        gain += top + np.log(share)
+        amounts_of[1] = (likely * right / total).sum(axis=2) / share
+        found -= np.einsum('kt,tes->kes', taken[:, traces], amounts_of)
+    lines, expected = np.concatenate([traces, mine]), np.concatenate([amounts_of, found])
+    each = np.tensordot(information[np.ix_(lines, lines)], expected, 1)
+    return _Rival(gain, lines, expected, np.sum(expected * each, axis=0))
+
+
+def named_from(
+    information: Float64, prior: Float64, log_odds: Float64, owner: NDArray[np.intp]
+) -> Float64:
     """
     Return the least amount of each effect that nine of ten such records name.
 
     Parameters
     ----------
-    information : (2 e, 2 e)
+    information : (2 e + k, 2 e + k)
         Products of whitened traces about nothing missing, less what the nuisances take up: first
-        of those that effects leave however small they are, then of what a unit amount adds.
-    prior : (3, e, k)
+        of those that effects leave however small they are, then of what a unit amount adds, then
+        of what explanations leave open: unknowns that are standard normal.
+    prior : (3, e, m)
         Gaussians whose sum is the prior of each amount, from `prior_amounts`.
-    log_odds : (e,)
-        Prior log odds over nothing.
+    log_odds : (h,)
+        Prior log odds over nothing, of the effects, then of what has no trace but its unknowns.
+    owner : (k,)
+        Which explanation leaves each unknown open, 0 .. h - 1.
 
     Returns
     -------
     (e,)
         0 where it is named however small it is; infinite where no amount within the prior is:
-        another effect has about the same trace, or amounts are seldom as large as that.
+        something else has about the same trace, or amounts are seldom as large as that.
 
     Notes
     -----
-    With the traces c_f + a d_f of each effect f, its log evidence over nothing where the truth is
-    t = c_e + A d_e is the logarithm of the mean, over the prior of a, of exp((c_f + a d_f) t -
-    (c_f + a d_f)^2 / 2), of each Gaussian in closed form, and noise adds its product with c_f +
-    a d_f at the mean of a. Over each rival that is taken which one record of ten falls below, to
-    first order in the noise.
+    With the traces c_f + a d_f of each effect f and the covariance C_f of what its unknowns add,
+    its log evidence over nothing where the truth is t = c_e + A d_e is the logarithm of the mean,
+    over the prior of a, of N(t; c_f + a d_f, 1 + C_f) / N(t; 0, 1), of each Gaussian in closed
+    form, and noise adds its product with what f then expects. Over each rival that is taken which
+    one record of ten falls below, to first order in the noise.
     """
-    count = len(log_odds)
-    (cc, cd), (_, dd) = information.reshape(2, count, 2, count).swapaxes(1, 2)
-
-    still, both, own = np.diag(cc), np.diag(cd), np.diag(dd)
-    amount, sd, log_chance = prior
-    held = sd**-2.0
-    total = own[:, None] + held
-    constant = log_chance - 0.5 * (held * amount**2 + np.log(total / held) + still[:, None])
+    count = prior.shape[1]
+    sizes = np.sort(np.abs(np.append(prior[0], np.zeros((count, 1)), axis=1)), axis=1)
+    rivals = [
+        _rival(f, information, prior, sizes, 2 * count + np.flatnonzero(owner == f))
+        for f in range(len(log_odds))
+    ]
+    gain = np.array([each.gain for each in rivals]) + log_odds[:, None, None]
     found = np.full(count, np.inf)
-    for e in range(count):
-        sizes = np.unique(np.abs(np.append(amount[e], 0.0)))[:, None]
-        right = (cd[e] + sizes * dd[e] - both)[:, :, None] + held * amount
-        logs = (cc[:, e] + sizes * cd[:, e])[:, :, None] + 0.5 * right**2 / total + constant
-        top = logs.max(axis=2)
-        likely = np.exp(logs - top[:, :, None])
-        share = likely.sum(axis=2)
-        gain = top + np.log(share) + log_odds
-        mean = (likely * right / total).sum(axis=2) / share
-        square, mine = still + mean * (2.0 * both + mean * own), mean[:, [e]]
-        shared = cc[e] + mean * cd[e] + mine * (cd[:, e] + mean * dd[e])
-        rivals = np.arange(count) != e  # and nothing in its own place
-        ahead = gain[:, [e]] - rivals * gain
-        noise = np.sqrt(np.maximum(square[:, [e]] + rivals * (square - 2.0 * shared), 0.0))
-        least = ahead - _UNLUCKY_SD * noise
-        chance = 1.0 / (1.0 + np.exp(-np.clip(least, -700.0, 700.0)).sum(axis=1))
+    for e, right in enumerate(rivals[:count]):
+        with_all = right.expected[:, e].T @ information[right.lines]
+        ahead, square = gain[e, e] - gain[:, e], right.square[e]
+        noise = np.array(
+            [
+                square
+                + each.square[e]
+                - 2.0 * np.sum(with_all.T[each.lines] * each.expected[:, e], 0)
+                for each in rivals
+            ]
+        )
+        ahead[e], noise[e] = gain[e, e], square  # nothing in its own place
+        least = ahead - _UNLUCKY_SD * np.sqrt(np.maximum(noise, 0.0))
+        chance = 1.0 / (1.0 + np.exp(-np.clip(least, -700.0, 700.0)).sum(axis=0))
         first = int(np.argmax(chance >= CERTAIN))
         if chance[first] >= CERTAIN:
             around = slice(max(first - 1, 0), first + 1)
-            found[e] = np.interp(CERTAIN, chance[around], sizes[around, 0])
+            found[e] = np.interp(CERTAIN, chance[around], sizes[e, around])
     return found

@@ -374,19 +374,54 @@ class Comparing:
             ways.append(plain[len(plain) // 2])
         little = [replace(way, start=(way.z_of(_LITTLE), *way.start[1:])) for way in ways]
         hypotheses = [Explanation((*self.stated, way)) for way in (*little, *ways)]
-        responses = [self._traces(j, self.nothing, hypotheses) for j in range(len(self.runs.runs))]
-        for lines in responses:
-            lines[len(ways) :] -= lines[: len(ways)]
+        curves = [replace(self.base, smooth=where) for where in self.smooth if where != IN_SPEED]
+        own, owner = self._left_open([*hypotheses[len(ways) :], *curves])
+        responses = []
+        for j, lines in enumerate(own):
+            traces = self._traces(j, self.nothing, hypotheses)
+            traces[len(ways) :] -= traces[: len(ways)]
+            responses.append(np.concatenate([traces, lines]))
         _, information = self._given_way(self.nothing, responses)
         prior = np.stack([way.amounts() for way in ways], axis=1)
-        log_odds = np.array([math.log(way.effect.odds) for way in ways])
-        sizes = named_from(information, prior, log_odds)
+        odds = [way.effect.odds for way in ways]
+        sizes_of_smooth = len(priors.SMOOTH_SIZES)
+        odds += [priors.UNNAMED_ODDS / sizes_of_smooth] * (len(curves) * sizes_of_smooth)
+        sizes = named_from(information, prior, np.log(odds), owner)
         never = {name for group in inseparable for name in group}
         return {
             way.effect.name: abs(way.size_of(size))
             for way, size in zip(ways, sizes.tolist(), strict=True)
             if math.isfinite(size) and way.effect.name not in never
         }
+
+    def _left_open(self, hypotheses: Sequence[Explanation]) -> tuple[list[Float64], Int64]:
+        """
+        Return what hypotheses leave open, as lines (k, n + q) of each run, and whose each is.
+
+        Of an effect all but its size, about where it is tried. All are standard normal.
+        """
+        first = self.runs.size + len(self.base.unknowns)
+        at = [self._widened(self.nothing, each) for each in hypotheses]
+        firsts = []
+        for start, each in zip(at, hypotheses, strict=True):
+            tried = each.ways[-1].tried() if not each.smooth else []
+            start[first : first + len(tried)] = tried
+            firsts.append(first + bool(tried))
+        lines: list[list[Float64]] = [[] for _ in self.runs.runs]
+        owner: list[int] = []
+        rivals = 0
+        tables = self.runs.linearise(hypotheses, at)
+        for each, found, start, mine in zip(hypotheses, tables, at, firsts, strict=True):
+            for size in priors.SMOOTH_SIZES if each.smooth else (1.0,):
+                for j, table in enumerate(found or ()):
+                    here = table.place >= mine
+                    own = np.zeros((len(start) - mine, len(table.along[0]) + len(table.rest[0])))
+                    shown = np.hstack([table.along, table.rest])[1:]
+                    own[table.place[here] - mine] = size * shown[here]
+                    lines[j].append(own)
+                owner += [rivals] * (len(start) - mine if found else 0)
+                rivals += 1
+        return [np.concatenate(each) for each in lines], np.array(owner, np.intp)
 
     def percent_of_r(self, name: str, bound: float) -> float:
         """

@@ -82,7 +82,9 @@ def _named(traces: Float64, priors: list[Prior], still: Float64 | None = None) -
     """Return amounts from which traces (e, n), beside those of no size, are named."""
     lines = np.vstack([np.zeros_like(traces) if still is None else still, traces])
     gaussians = np.stack([prior_amounts(prior, 1.0) for prior in priors], axis=1)
-    found = named_from(lines @ lines.T, gaussians, np.full(len(traces), math.log(0.05)))
+    found = named_from(
+        lines @ lines.T, gaussians, np.full(len(traces), math.log(0.05)), np.array([], int)
+    )
     return [float(amount) for amount in found]
 
 
