@@ -28,12 +28,13 @@ from shipdrag_ros.inference.decision import (
     Verdict,
     decide,
     mixture,
-    quantile,
 )
+from shipdrag_ros.inference.limits import quantile
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fit, Fitted, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay
+from shipdrag_ros.posterior.limits import percent_of_r, sizes_named
 
 _SHARE = 0.95  # of a size, below its limit
 
@@ -171,7 +172,7 @@ def limits_of(
     Return the limit of each effect that is not named, by name.
     """
     found, named = judged.found, judged.decision.effects
-    amounts = comparing.named_from(never)
+    from_size = sizes_named(comparing, {name for group in never for name in group})
     limits = {}
     for effect in found.effects:
         sizes = found.sizes(effect.name)
@@ -183,8 +184,8 @@ def limits_of(
             effect.parameters[0].name,
             'upper_95' if grows else 'lower_95',
             bound,
-            amounts.get(effect.name),
-            comparing.percent_of_r(effect.name, bound),
+            from_size.get(effect.name),
+            percent_of_r(comparing, effect.name, bound),
         )
     return limits
 

@@ -23,12 +23,11 @@ from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    SizePosterior,
     WeighedHypothesis,
-    named_from,
 )
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
+from shipdrag_ros.inference.limits import SizePosterior
 from shipdrag_ros.inference.linear import Families, products_of, solve, whitened_products
 from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG
@@ -51,7 +50,6 @@ from shipdrag_ros.posterior.problem import EXACT
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.effect import Effect, Scope
 
 _ITERATIONS = 8  # of Gauss and Newton
@@ -64,8 +62,6 @@ _TAUGHT = 6  # likeliest effects with which the noise is learnt
 _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
 LIKELY = 0.03  # probability of names that may leave something smooth
-_FEWEST = 5  # rows of a curve
-_LITTLE = 1e-6  # of a trace: as good as none of the effect
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
@@ -268,7 +264,7 @@ class Comparing:
         singles = self._likeliest(nothing, ways, scores, amounts, responses)
         smooth = [replace(self.base, smooth=where) for where in self.smooth]
         nothing.cost = math.inf
-        every = [nothing, *(Fitted(each, self._widened(nothing, each)) for each in smooth)]
+        every = [nothing, *(Fitted(each, self.widened(nothing, each)) for each in smooth)]
         every += singles
         self._climb(every)
         every = self._weigh(every)
@@ -358,103 +354,6 @@ class Comparing:
             whitened = np.concatenate([line[0], table.rest[0]])
             found.append(RunResidual(table.along[0], table.residual, whitened))
         return found
-
-    def named_from(self, inseparable: Sequence[frozenset[str]]) -> dict[str, float]:
-        """
-        Return the size from which each effect is named; without those that never are.
-
-        Parameters
-        ----------
-        inseparable
-            Effects that no record separates: never named.
-        """
-        ways = []
-        for each in self.ways.values():  # one that shows neither best nor least
-            plain = [way for way in each if not (way.kept or way.nameless)]
-            ways.append(plain[len(plain) // 2])
-        little = [replace(way, start=(way.z_of(_LITTLE), *way.start[1:])) for way in ways]
-        hypotheses = [Explanation((*self.stated, way)) for way in (*little, *ways)]
-        curves = [replace(self.base, smooth=where) for where in self.smooth if where != IN_SPEED]
-        own, owner = self._left_open([*hypotheses[len(ways) :], *curves])
-        responses = []
-        for j, lines in enumerate(own):
-            traces = self._traces(j, self.nothing, hypotheses)
-            traces[len(ways) :] -= traces[: len(ways)]
-            responses.append(np.concatenate([traces, lines]))
-        _, information = self._given_way(self.nothing, responses)
-        prior = np.stack([way.amounts() for way in ways], axis=1)
-        odds = [way.effect.odds for way in ways]
-        sizes_of_smooth = len(priors.SMOOTH_SIZES)
-        odds += [priors.UNNAMED_ODDS / sizes_of_smooth] * (len(curves) * sizes_of_smooth)
-        sizes = named_from(information, prior, np.log(odds), owner)
-        never = {name for group in inseparable for name in group}
-        return {
-            way.effect.name: abs(way.size_of(size))
-            for way, size in zip(ways, sizes.tolist(), strict=True)
-            if math.isfinite(size) and way.effect.name not in never
-        }
-
-    def _left_open(self, hypotheses: Sequence[Explanation]) -> tuple[list[Float64], Int64]:
-        """
-        Return what hypotheses leave open, as lines (k, n + q) of each run, and whose each is.
-
-        Of an effect all but its size, about where it is tried. All are standard normal.
-        """
-        first = self.runs.size + len(self.base.unknowns)
-        at = [self._widened(self.nothing, each) for each in hypotheses]
-        firsts = []
-        for start, each in zip(at, hypotheses, strict=True):
-            tried = each.ways[-1].tried() if not each.smooth else []
-            start[first : first + len(tried)] = tried
-            firsts.append(first + bool(tried))
-        lines: list[list[Float64]] = [[] for _ in self.runs.runs]
-        owner: list[int] = []
-        rivals = 0
-        tables = self.runs.linearise(hypotheses, at)
-        for each, found, start, mine in zip(hypotheses, tables, at, firsts, strict=True):
-            for size in priors.SMOOTH_SIZES if each.smooth else (1.0,):
-                for j, table in enumerate(found or ()):
-                    here = table.place >= mine
-                    own = np.zeros((len(start) - mine, len(table.along[0]) + len(table.rest[0])))
-                    shown = np.hstack([table.along, table.rest])[1:]
-                    own[table.place[here] - mine] = size * shown[here]
-                    lines[j].append(own)
-                owner += [rivals] * (len(start) - mine if found else 0)
-                rivals += 1
-        return [np.concatenate(each) for each in lines], np.array(owner, np.intp)
-
-    def percent_of_r(self, name: str, bound: float) -> float:
-        """
-        Return by how much an effect of some size changes the deceleration that is shown.
-
-        Parameters
-        ----------
-        name
-            Of the effect.
-        bound
-            Its size.
-
-        Returns
-        -------
-        float
-            Rms over the coastdown after the run-down, percent.
-        """
-        way = self.ways[name][0]
-        prior = way.unknowns[0].prior
-        z = [prior.inverse(math.copysign(bound, prior.first)), *way.start[1:]]
-        run = self.runs.runs[0]
-        still, speed = self.runs.still(0, self.nothing.at)
-        shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
-        rows, model = run.model.rows, run.model
-        by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
-        late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))
-        time, lines = rows.time_s[late], shown[:, late]
-        if len(time) < _FEWEST or not np.isfinite(lines).all():
-            return math.nan
-        loss = np.gradient(lines, time, axis=1)
-        apart = np.interp(-lines[0], -lines[1], loss[1]) / np.minimum(loss[0], -1e-9) - 1.0
-        inside = (lines[0] >= lines[1].min()) & (lines[0] <= lines[1].max())
-        return 100.0 * float(np.sqrt(np.mean(apart[inside] ** 2))) if inside.any() else math.nan
 
     def _usual(self, j: int) -> _RunNoise:
         """Return usual noise, before anything is learnt."""
@@ -551,10 +450,10 @@ class Comparing:
         And its trace in each run.
         """
         hypotheses = [Explanation((*self.stated, way)) for way in ways]
-        responses = [self._traces(j, nothing, hypotheses) for j in range(len(self.runs.runs))]
+        responses = [self.traces(j, nothing, hypotheses) for j in range(len(self.runs.runs))]
         return *self._gains(nothing, hypotheses, responses), responses
 
-    def _traces(self, j: int, base: Fitted, hypotheses: Sequence[Explanation]) -> Float64:
+    def traces(self, j: int, base: Fitted, hypotheses: Sequence[Explanation]) -> Float64:
         """Return what the last effect of each hypothesis adds to a run's rows, (h, n + q)."""
         run, size = self.runs.runs[j], self.runs.size
         z = base.at[size : size + len(base.hypothesis.unknowns)]
@@ -582,7 +481,7 @@ class Comparing:
 
         And how much of what is tried there is.
         """
-        score, information = self._given_way(base, responses)
+        score, information = self.given_way(base, responses)
         own = np.maximum(np.diag(information), 0.0)
         prior, held = np.array([_amount(h.ways[-1]) for h in hypotheses]).reshape(-1, 2).T
         slope = score + held * prior
@@ -591,7 +490,7 @@ class Comparing:
         found += np.array([each.ways[-1].log_odds for each in hypotheses])
         return found, slope / (own + held)
 
-    def _given_way(self, base: Fitted, responses: Sequence[Float64]) -> tuple[Float64, Float64]:
+    def given_way(self, base: Fitted, responses: Sequence[Float64]) -> tuple[Float64, Float64]:
         """Return scores (h,) and information (h, h) of traces, less what the base takes up."""
         p, h = len(base.at), len(responses[0])
         total = np.zeros((1 + p + h, 1 + p + h))
@@ -697,13 +596,13 @@ class Comparing:
 
     def _begun(self, base: Fitted, hypothesis: Explanation, amount: float) -> Fitted:
         """Return where the fit of one more way begins, at so much of its trace."""
-        way, at = hypothesis.ways[-1], self._widened(base, hypothesis)
+        way, at = hypothesis.ways[-1], self.widened(base, hypothesis)
         first = self.runs.size + len(base.hypothesis.unknowns)
         at[first : first + len(way.start)] = way.start
         at[first] = way.resized(amount)
         return Fitted(hypothesis, at)
 
-    def _widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
+    def widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
         """Return where a fit of a larger hypothesis begins."""
         at = np.zeros(self.runs.width(hypothesis))
         kept = self.runs.size + len(base.hypothesis.unknowns)
@@ -797,7 +696,7 @@ class Comparing:
             mine = base.hypothesis.ways[-1].effect
             ways = [way for way in starts if way.effect.goes_with(mine)]
             hypotheses = [Explanation((*base.hypothesis.ways, way)) for way in ways]
-            responses = [self._traces(j, base, hypotheses) for j in range(len(self.runs.runs))]
+            responses = [self.traces(j, base, hypotheses) for j in range(len(self.runs.runs))]
             gains, amounts = self._gains(base, hypotheses, responses)
             for gain, amount, hypothesis in zip(gains + base.log_weight, amounts, hypotheses):
                 if gain < top - _PAIR_NATS:
@@ -823,7 +722,7 @@ class Comparing:
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
             own[0] = replace(own[0], log_odds=way.log_odds + self.log_differs)
             hypothesis = Explanation((*stated, *own))
-            at = self._widened(self.nothing, hypothesis)
+            at = self.widened(self.nothing, hypothesis)
             first = self.runs.size + len(self.base.unknowns)
             q = len(way.unknowns)
             for j in range(count):

@@ -17,7 +17,6 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
-from shipdrag_ros.inference.decision import amounts, prior_amounts
 from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
@@ -102,12 +101,6 @@ class EffectWay:
         """Of the size in its trace; 1 where it may be 0."""
         log_normal = self.unknowns[0].prior.shape is Shape.LOG_NORMAL
         return self.effect.size_power if log_normal else 1.0
-
-    def amounts(self) -> Float64:
-        """Return its prior as `prior_amounts`, of amounts over that which is tried."""
-        prior = self.unknowns[0].prior
-        tried, _ = amounts(prior, self.power, np.array(self.tried()[:1]))
-        return prior_amounts(prior, self.power, tried[0])
 
     def size_of(self, amount: float) -> float:
         """Return the size of which there is so much of the trace that is tried."""
