@@ -245,7 +245,7 @@ def say(
         later = speed.value[speed.time_ns >= since_ns]
         if len(later) >= _FEW:
             slowed, of_shaft = _ratio(later), _ratio(rate)
-            if slowed < _SLOWED and abs(of_shaft / slowed - 1.0) < _ALIKE:
+            if slowed < _SLOWED and abs(of_shaft - slowed) < _ALIKE * slowed:
                 return f'{turns}, as the water turns it: the drag of its propeller is part of r'
             break
     return (

@@ -101,6 +101,8 @@ class Fitted(WeighedFit):
         One a run; linear about `at`.
     cost
         -2 ln of the posterior under usual noise.
+    usual
+        Noise of each run that is usual if this is the truth, once it is known.
     log_evidence
         Without the prior odds.
     z, sd : (q,)
@@ -111,6 +113,7 @@ class Fitted(WeighedFit):
     at: Float64
     tables: list[RunTable] | None = None
     cost: float = math.inf
+    usual: list[Settings] | None = None
     log_evidence: float = -math.inf
     z: Float64 | None = None
     sd: Float64 | None = None
@@ -266,12 +269,10 @@ class Comparing:
         nothing.cost = math.inf
         every = [nothing, *(Fitted(each, self.widened(nothing, each)) for each in smooth)]
         every += singles
-        self._climb(every)
-        every = self._weigh(every)
+        every = self._fitted(every)
         for more in (self._pairs, self._differing):
-            fits = more(every)
-            self._climb(fits)
-            every += self._weigh(fits)
+            every += self._fitted(more(every), max(fit.log_weight for fit in every))
+        self._again(every)
         every += self._weigh(self._beside(every))
         return ComparedHypotheses(self.effects, tuple(every))
 
@@ -365,6 +366,17 @@ class Comparing:
         seen = Seen(run.model.rows, table.along, none, none, table.white, run.model.steady)
         return _noise(prior_of(seen, run.model.speed_m_s), np.zeros(0))
 
+    def _fitted(self, fits: Sequence[Fitted], top: float = -math.inf) -> list[Fitted]:
+        """Return the best of each hypothesis, likely ones fitted under the noise of their own."""
+        self._climb(fits)
+        found = self._weigh(fits)
+        top = max([top, *(fit.log_weight for fit in found)])
+        likely = [fit for fit in found if fit.log_weight > top - _PAIR_NATS]
+        self._climb(likely)
+        for fit in likely:
+            self._weigh_one(fit)
+        return found
+
     def _climb(self, fits: Sequence[Fitted]) -> None:
         """Fit hypotheses, all in step, under the usual noise of each run."""
         for fit in fits:
@@ -386,7 +398,7 @@ class Comparing:
                         continue
                     cost, step = math.inf, steps[i]
                 else:
-                    cost, step = self._step(fit.hypothesis, table, trials[i])
+                    cost, step = self._step(fit, table, trials[i])
                 if cost < fit.cost:
                     gained = fit.cost - cost
                     fit.tables, fit.cost, fit.at, steps[i] = table, cost, trials[i], step
@@ -406,15 +418,16 @@ class Comparing:
                 or fits[i].cost - 2.0 * fits[i].hypothesis.log_odds < least + 2.0 * _HOPELESS
             ]
 
-    def _step(
-        self, hypothesis: Explanation, tables: list[RunTable], at: Float64
-    ) -> tuple[float, Float64]:
+    def _usual_of(self, fit: Fitted, j: int) -> Settings:
+        return fit.usual[j] if fit.usual else self.noise[j].typical
+
+    def _step(self, fit: Fitted, tables: list[RunTable], at: Float64) -> tuple[float, Float64]:
         """Return -2 ln of the posterior here, and the step to the mean of the linear model."""
         total = np.zeros((len(at) + 1, len(at) + 1))
         for j, table in enumerate(tables):
-            products, _ = self._of_run(j, table, self.noise[j].typical)
+            products, _ = self._of_run(j, table, self._usual_of(fit, j))
             _put(total, products[0], table.place)
-        mean, precision, log_chance = self.runs.priors(hypothesis, at)
+        mean, precision, log_chance = self.runs.priors(fit.hypothesis, at)
         density = (
             log_chance
             + 0.5 * np.log(precision).sum(axis=1)
@@ -426,11 +439,11 @@ class Comparing:
             return math.inf, np.zeros(len(at))
         weight = np.exp(logs[0] + log_chance - (logs[0] + log_chance).max())
         step = (weight / weight.sum()) @ steps[0]
-        first, q = self.runs.size, len(hypothesis.unknowns)
+        first, q = self.runs.size, len(fit.hypothesis.unknowns)
         own = step[first : first + q]
         longest = float(np.max(np.abs(own), initial=0.0))
         step *= min(1.0, _LONGEST / max(longest, 1e-12))
-        for i in half(hypothesis, first):
+        for i in half(fit.hypothesis, first):
             step[i] = max(step[i], -at[i])
         return cost, step
 
@@ -628,7 +641,7 @@ class Comparing:
         usual = np.zeros((1 + p, 1 + p))
         typical = []
         for j, table in enumerate(fit.linear):
-            products, log_det = self._of_run(j, table, self.noise[j].typical)
+            products, log_det = self._of_run(j, table, self._usual_of(fit, j))
             typical.append((products[0], float(log_det[0])))
             _put(usual, products[0], table.place)
         several = len(fit.linear) > 1
@@ -646,6 +659,10 @@ class Comparing:
             log_evidence += total - (at_usual if several and j else 0.0)
             weights.append(np.exp(logs - total))
             moments.append((z, variance))
+        fit.usual = [
+            replace(each.learnt, settings=each.learnt.settings._replace(weight=weight)).typical
+            for each, weight in zip(self.noise, weights, strict=True)
+        ]
         log_evidence += self.log_known(fit.hypothesis)
         fit.log_evidence = log_evidence if math.isfinite(log_evidence) else -math.inf
         first = self.runs.size
@@ -729,6 +746,35 @@ class Comparing:
                 at[first + j * q : first + (j + 1) * q] = alike.at[first : first + q]
             found.append(Fitted(hypothesis, at))
         return found
+
+    def _again(self, fits: list[Fitted]) -> None:
+        """Fit single effects from where likely larger hypotheses have them; keep the better."""
+        first = self.runs.size + len(self.base.unknowns)
+        top = max(fit.log_weight for fit in fits)
+        alone = {
+            fit.hypothesis.ways[-1].mode: i
+            for i, fit in enumerate(fits)
+            if len(fit.hypothesis.ways) == 1 + len(self.stated) and not fit.hypothesis.smooth
+        }
+        found = []
+        for fit in fits:
+            ways = fit.hypothesis.ways[len(self.stated) :]
+            if len(ways) == 1 or fit.log_weight < top - _PAIR_NATS:
+                continue
+            place = first
+            for way in ways:
+                own = slice(place, place + len(way.unknowns))
+                place = own.stop
+                i = alone.get(way.mode, alone.get(replace(way, run=None).mode))
+                if i is not None:
+                    single = fits[i].hypothesis
+                    at = np.concatenate([fit.at[:first], fit.at[own]])
+                    beyond = np.zeros(self.runs.width(single) - len(at))
+                    found.append((i, Fitted(single, np.concatenate([at, beyond]))))
+        self._fitted([fit for _, fit in found], top)
+        for i, fit in found:
+            if fit.log_evidence > fits[i].log_evidence:
+                fits[i] = fit
 
     def _beside(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return likely names with something smooth besides, linear where the names are best."""

@@ -120,6 +120,17 @@ def test_a_shaft_that_goes_on_at_part_of_its_speed_is_said() -> None:
         assert says in found.notes[-1]
 
 
+def test_a_log_that_reads_nothing_at_the_end_says_nothing_of_the_shaft() -> None:
+    # a dead band: from some speed on it reads 0
+    log = Block.of(
+        Channel.SPEED_THROUGH_WATER,
+        (TIME * 1e9).astype(np.int64),
+        np.where(TIME < 1500.0, SPEED, 0.0),
+    )
+    found = RunDown.of(cut(series(Channel.SHAFT, TIME, np.full(len(TIME), 6.0)), log), SHIP)
+    assert 'off by its thrust' in found.notes[-1]
+
+
 def test_a_shaft_that_runs_down_in_the_window_is_seen_without_a_record_before_it() -> None:
     window = cut(series(Channel.SHAFT, TIME, falling(TIME, STOP_S)), before=False)
     found = RunDown.of(window, SHIP)
