@@ -16,7 +16,7 @@ import numpy as np
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.noise import Noise, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 
 
 class Factored(NamedTuple):
@@ -285,6 +285,59 @@ def of_family(
 
 
 @compiled
+def _eliminated(
+    products: Float64, mean: Float64, precision: Float64, order: Int64, c: int
+) -> tuple[bool, Float64, Float64, Float64, Float64]:
+    """
+    Return a linear model of its later unknowns alone, the first c in an order integrated out.
+
+    Returns
+    -------
+    solved, products, across, lower, scale
+        Products (1 + v, 1 + v) as `of_family` takes them; for the unknowns that are gone, the
+        factor (c, c), and what it makes (c, 1 + v) of their products with residual and the rest.
+    """
+    v = len(order) - c
+    left, matrix = np.empty((1 + v, 1 + v)), np.empty((c, c))
+    across = np.empty((c, 1 + v))
+    for a in range(1 + v):
+        i = 1 + order[c + a - 1] if a else 0
+        for b in range(a + 1):
+            left[a, b] = products[i, 1 + order[c + b - 1] if b else 0]
+    log_evidence = 0.0
+    for a in range(c):
+        i = order[a]
+        for b in range(c):
+            matrix[a, b] = products[1 + i, 1 + order[b]]
+        matrix[a, a] += precision[i]
+        across[a, 0] = products[1 + i, 0] + precision[i] * mean[i]
+        for b in range(v):
+            across[a, 1 + b] = products[1 + i, 1 + order[c + b]]
+        if precision[i] > 0.0:
+            log_evidence += 0.5 * (np.log(precision[i]) - precision[i] * mean[i] ** 2)
+    solved, lower, scale = cholesky(matrix)
+    if not solved:
+        return False, left, across, lower, scale
+    for a in range(c):
+        for b in range(1 + v):
+            total = across[a, b] * scale[a]
+            for k in range(a):
+                total -= lower[a, k] * across[k, b]
+            across[a, b] = total / lower[a, a]
+        log_evidence -= np.log(lower[a, a] / scale[a])
+    for a in range(1 + v):
+        for b in range(a + 1):
+            total = left[a, b]
+            for k in range(c):
+                total -= across[k, a] * across[k, b]
+            if a == b > 0 and total < _FOLLOWS * left[a, a]:
+                total = 0.0  # what is left of a column that follows from others is rounding
+            left[a, b] = left[b, a] = total
+    left[0, 0] -= 2.0 * log_evidence
+    return True, left, across, lower, scale
+
+
+@compiled
 def solve(
     products: Float64, mean: Float64, precision: Float64, first: int, count: int
 ) -> tuple[Float64, Float64, Float64]:
@@ -302,21 +355,50 @@ def solve(
     -------
     log_evidence, step, variance : (s, f), (s, f, p), (s, f, count)
         As `of_family`.
+
+    Notes
+    -----
+    Unknowns of which all priors say the same are eliminated once a setting.
     """
     s, f, p = len(products), len(mean), mean.shape[1]
     logs = np.full((s, f), -np.inf)
     steps, variances = np.zeros((s, f, p)), np.zeros((s, f, count))
-    unit = np.zeros((p, count))
-    for a in range(count):
-        unit[first + a, a] = 1.0
+    apart = np.zeros(p, np.bool_)
+    apart[first : first + count] = True
+    for a in range(p):
+        for q in range(1, f):
+            if mean[q, a] != mean[0, a] or precision[q, a] != precision[0, a]:
+                apart[a] = True
+    alike, late = np.flatnonzero(~apart), np.flatnonzero(apart)
+    order, c = np.concatenate((alike, late)), len(alike)
+    unit = np.zeros((p - c, count))
+    for a in range(p - c):
+        if first <= late[a] < first + count:
+            unit[a, late[a] - first] = 1.0
     for k in range(s):
+        solved, left, across, lower, scale = _eliminated(
+            products[k], mean[0], precision[0], order, c
+        )
+        if not solved:
+            continue
         for q in range(f):
-            logs[k, q], step, lower, scale = of_family(products[k], mean[q], precision[q])
+            logs[k, q], step, mine, unscaled = of_family(left, mean[q][late], precision[q][late])
             if logs[k, q] == -np.inf:
                 continue
-            steps[k, q] = step
+            for a in range(c - 1, -1, -1):
+                total = across[a, 0]
+                for b in range(p - c):
+                    total -= across[a, 1 + b] * step[b]
+                for b in range(a + 1, c):
+                    total -= lower[b, a] * steps[k, q, order[b]]
+                steps[k, q, order[a]] = total / lower[a, a]
+            for a in range(c):
+                steps[k, q, order[a]] *= scale[a]
+            for a in range(p - c):
+                steps[k, q, late[a]] = step[a]
             if count:
-                covariance = substitute(lower, scale, unit)
-                for a in range(count):
-                    variances[k, q, a] = covariance[first + a, a]
+                covariance = substitute(mine, unscaled, unit)
+                for a in range(p - c):
+                    if first <= late[a] < first + count:
+                        variances[k, q, late[a] - first] = covariance[a, late[a] - first]
     return logs, steps, variances
