@@ -18,7 +18,7 @@ from shipdrag_ros.inference.decision import CERTAIN
 from shipdrag_ros.parameter import Prior, Shape
 from shipdrag_ros.samples import Float64
 
-Lines = NDArray[np.intp]
+LineNumbers = NDArray[np.intp]
 
 _UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
 
@@ -142,9 +142,9 @@ class Rival(NamedTuple):
 
     log_odds: float
     log_chance: Float64
-    trace: Lines
-    slope: Lines
-    open: Lines
+    trace: LineNumbers
+    slope: LineNumbers
+    open: LineNumbers
     share: Float64
 
 
@@ -165,12 +165,12 @@ class _Expected(NamedTuple):
     """
 
     gain: Float64
-    lines: Lines
+    lines: LineNumbers
     made: Float64
     square: Float64
 
 
-def _expected(rival: Rival, information: Float64, truths: Lines) -> _Expected:
+def _expected(rival: Rival, information: Float64, truths: LineNumbers) -> _Expected:
     places = np.column_stack([rival.slope, rival.open])
     gains, parts = [], []
     for trace, mine, share, chance in zip(rival.trace, places, rival.share, rival.log_chance):

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from shipdrag_ros.inference.limits import Lines, Rival, chances_of_names, named_from
+from shipdrag_ros.inference.limits import LineNumbers, Rival, chances_of_names, named_from
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.posterior import priors
@@ -35,7 +35,7 @@ class _Lines:
         self.comparing, self.count = comparing, 0
         self.runs: list[list[Float64]] = [[] for _ in comparing.runs.runs]
 
-    def add(self, lines: Sequence[Float64]) -> Lines:
+    def add(self, lines: Sequence[Float64]) -> LineNumbers:
         """Keep lines of each run; return their places."""
         for kept, each in zip(self.runs, lines, strict=True):
             kept.append(each)
@@ -47,7 +47,7 @@ class _Lines:
         lines = [np.concatenate(each) for each in self.runs]
         return self.comparing.given_way(self.comparing.nothing, lines)[1]
 
-    def left_open(self, hypothesis: Explanation) -> Lines:
+    def left_open(self, hypothesis: Explanation) -> LineNumbers:
         """Keep what a hypothesis leaves open, but the size that is tried; standard normal."""
         comparing, runs = self.comparing, self.comparing.runs
         at = comparing.widened(comparing.nothing, hypothesis)
@@ -96,19 +96,21 @@ def sizes_named(comparing: Comparing, never: Collection[str]) -> dict[str, float
     for i, (modes, each) in enumerate(zip(ways, effects, strict=True)):
         shown = norm[each.trace].reshape(len(modes), -1)
         tried = [np.argmin(np.abs(_points(way) - way.tried()[0])) for way in modes]
-        share = shown / np.maximum(shown[np.arange(len(modes)), tried][:, None], 1e-300)
+        likely = shown[np.arange(len(modes)), tried][:, None]
+        share = np.divide(shown, likely, out=np.zeros_like(shown), where=likely > 0.0)
         effects[i] = each._replace(share=share.ravel())
     found = {}
     for modes, chance in zip(ways, chances_of_names(information, effects, unnamed), strict=True):
         which = len(modes) // 2  # that shows neither best nor least
-        prior, z = modes[which].unknowns[0].prior, _points(modes[which])
-        value = np.abs([prior.at(one) for one in z.tolist()])
+        way = modes[which]
+        prior, z = way.unknowns[0].prior, _points(way)
+        size = np.array([prior.at(one) for one in z[1:].tolist()])
+        amount = np.append(0.0, np.abs(size / prior.at(way.tried()[0])) ** way.power)
         either = np.flatnonzero(z > 0.0) if prior.shape is Shape.NORMAL else np.arange(len(z))
-        order = either[np.argsort(math.copysign(1.0, modes[which].power) * value[either])]
-        size = named_from(value[order], chance.reshape(len(modes), -1)[which, order])
-        name = modes[which].effect.name
-        if math.isfinite(size) and name not in never:
-            found[name] = size
+        order = either[np.argsort(amount[either])]
+        least = named_from(amount[order], chance.reshape(len(modes), -1)[which, order])
+        if math.isfinite(least) and way.effect.name not in never:
+            found[way.effect.name] = abs(way.size_of(least))
     return found
 
 
