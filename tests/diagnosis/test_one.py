@@ -68,7 +68,8 @@ def test_without_anything_hidden_nothing_is_most_probable() -> None:
     assert found.limits['log_scale'].value < 0.08  # half of what is usual where it is there
     # rough or with a propeller that stands: no size of the first is that of it alone
     assert found.limits['fouling'].would_be_named is None
-    assert found.limits['locked_propeller'].would_be_named == pytest.approx(0.3, rel=0.3)
+    # of 8 records with it 8 name 0.38, and one with 0.3 does not
+    assert 0.3 < (found.limits['locked_propeller'].would_be_named or np.inf) < 0.7
     assert found.limits['turning'].would_be_named == 0.0  # the heading shows that she turns
     assert 'turning of any size' in words.sentence(replace(found, verdict=Verdict.NONE))
     assert 'any size' in {row[3] for row in diagnosis_cells.limits(found).rows}
@@ -83,6 +84,14 @@ def test_a_size_that_is_not_named_by_its_limit_is_not_named_in_a_record(
     found = answer(text)
     assert found.candidates[0].names == (name,)
     assert 'fouling' not in [effect.name for effect in found.effects]
+
+
+@pytest.mark.parametrize('text', ['log_lag=9', 'time_offset=10', 'wind=10'])
+def test_what_a_rival_may_stand_for_is_not_promised_a_name(text: str) -> None:
+    # the filter of the log, a lag for an offset in time, waves for wind
+    name, _, size = text.partition('=')
+    assert name not in [effect.name for effect in answer(text).effects]
+    assert (answer().limits[name].would_be_named or np.inf) > float(size)
 
 
 def test_a_limit_grows_where_the_run_shows_less() -> None:
