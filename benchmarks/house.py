@@ -6,7 +6,7 @@ Count the house: how much code there is, and through how many rooms a job goes.
     python -m benchmarks.house --tree OLD --tree . # two trees beside each other
 
 Core code is what a coastdown may need: lines of `shipdrag_ros` without
-docstrings, blanks and comments, and without the studies S2 to S5; an `__init__` is no
+docstrings, blanks and comments, and without the studies S1 to S5; an `__init__` is no
 module. The walk is a
 replay of a simulated coastdown, traced: which calls cross from one room into
 another between the bytes of the bag and those of a published estimate. The
