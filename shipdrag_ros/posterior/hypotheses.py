@@ -28,7 +28,7 @@ from shipdrag_ros.posterior.motion import EXTRAS
 from shipdrag_ros.posterior.problem import EXACT, RunModel
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame
+from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 """Where something smooth without a name may be."""
@@ -154,7 +154,7 @@ class Explanation:
     @property
     def log_odds(self) -> float:
         """Prior log odds over nothing."""
-        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
+        unnamed = math.log(priors.UNNAMED_ODDS.mean) if self.smooth else 0.0
         return sum(way.log_odds for way in self.ways) + unnamed
 
     @cached_property
@@ -258,7 +258,7 @@ class ShipRuns:
     def apart(self) -> bool:
         """Whether runs are of different days."""
         days = [run.frame.scenario.day for run in self.runs]
-        return (max(days) - min(days)) * DAY_S > priors.SAME_DAY_S
+        return (max(days) - min(days)) * 24.0 > priors.SAME_DAY.mean
 
     @cached_property
     def _own(self) -> list[int]:
@@ -343,7 +343,7 @@ class ShipRuns:
                     precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
                     for i, each in enumerate(components):
                         if which >> i & 1:
-                            precision[each] = priors.SMALL_COMPONENTS**-2.0
+                            precision[each] = priors.SMALL_COMPONENTS.mean**-2.0
                     means.append(mean)
                     precisions.append(precision)
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
