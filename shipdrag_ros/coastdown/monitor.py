@@ -30,13 +30,14 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
-from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
+from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.choice import averaged

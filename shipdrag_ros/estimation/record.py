@@ -23,6 +23,7 @@ from shipdrag_ros.estimation.steady import (
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.priors import STATED_POWER
 from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.samples import Float64, Int64
 
@@ -299,7 +300,6 @@ def _ahead(position: Float64, heading_rad: float) -> Float64:
 
 _ORDER = 12  # of the polynomial that stands for the motion
 _RANGE = 100.0  # of a variance over the typical one, up and down
-_PRIOR_SD = 0.5  # of the power of the stated variance that holds, about 1
 _OF_LOG_CHI2 = np.pi / np.sqrt(2.0)  # sd of ln(z^2) of a standard normal z
 _LEAST = 1e-12  # of the largest residual: none is 0
 
@@ -338,8 +338,8 @@ def stated_weight(time_s: Float64, value: Float64, variance: Float64) -> Float64
     follows = 2.0 * np.log(size + _LEAST * float(size.max()) + np.finfo(np.float64).tiny)
     away = log - log.mean()
     spread = float((away * away).sum())
-    precision, of_prior = spread / _OF_LOG_CHI2**2, 1.0 / _PRIOR_SD**2
+    precision, of_prior = spread / _OF_LOG_CHI2**2, 1.0 / STATED_POWER.sd**2
     found = float((away * follows).sum()) / spread
-    power = (precision * found + of_prior) / (precision + of_prior)
+    power = (precision * found + of_prior * STATED_POWER.mean) / (precision + of_prior)
     result: Float64 = np.exp(-min(max(power, 0.0), 1.0) * log)
     return result

@@ -24,6 +24,7 @@ ANOTHER_RUN = Declared(
     '',
     'runs of one hull on one day',
 )
+FORM_OFF = Declared('-', 'form of r of a baseline, relative', normal(0.01), '', 'judgement')
 FORMS = ((0.0, 0.7), (0.03, 0.1), (0.1, 0.08), (0.3, 0.05), (0.6, 0.04), (0.9, 0.03))
 """Shares of a constant force in the deceleration at the stop, and their probabilities."""
 WIDTHS = ((1.0, 0.85), (3.0, 0.12), (10.0, 0.03))

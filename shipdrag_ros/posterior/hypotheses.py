@@ -35,11 +35,9 @@ IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 _FORMS, SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
-_PORT, _HEADING = EXTRAS, EXTRAS + 1  # behind the extras: place to port, and first heading
-_FREE = EXTRAS + 2  # shaft speed of a propeller that the water turns
-_SCATTER = EXTRAS + 3  # of the resistance from run to run
-_AIR = EXTRAS + 4, EXTRAS + 5  # that is light, to the east and to the north
-_LOCAL = EXTRAS + 6
+# behind the extras: place to port, first heading, shaft speed of a propeller that the water
+# turns, scatter of the resistance from run to run, light air to the east and to the north
+_PORT, _HEADING, _FREE, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 7)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
 _STEP_M_S = 0.1  # of differences
 _NOTHING = Action()

@@ -238,6 +238,25 @@ DRIVEN_SHAFT = Declared(
     '',
     _TAKEN,
 )
+# stated errors, and sailing without a coastdown
+STATED_POWER = Declared(
+    '-', 'power of a stated variance that holds', normal(0.5, mean=1.0), '', _TAKEN
+)
+SAILING_LOG = Declared(
+    '-', 'white and slow error of a log over a usual residual', log_normal(1.0, 1.0), '', _TAKEN
+)
+SAILING_WATER = Declared('-', 'slow motion of the water', log_normal(0.04, 0.7), 'm/s', _TAKEN)
+SAILING_LOG_TIME = Declared('-', 'slow error of a log, time', log_normal(120.0, 0.8), 's', _TAKEN)
+SAILING_WATER_TIME = Declared(
+    '-', 'slow motion of the water, time', log_normal(1200.0, 0.8), 's', _TAKEN
+)
+SAILING_SCALE = Declared('-', 'scale of a log in order, less one', normal(0.005), '', _TAKEN)
+SAILING_CURRENT = Declared(
+    '-', 'steady current that is not worth a word', normal(0.02), 'm/s', _TAKEN
+)
+UNSTATED_FORM = Declared(
+    '-', 'relative sd of a baseline learnt from runs too few to show it', 0.05, '', _TAKEN
+)
 # several runs, and earlier diagnoses
 DIFFERS = Declared(
     '-', 'chance that an effect of the hull differs between runs of one day', 0.03, '', _TAKEN
