@@ -17,6 +17,7 @@ from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.events import (
+    ENDED_BY,
     Dismissal,
     EndedBy,
     EndedCoastdown,
@@ -564,17 +565,9 @@ class Monitor:
         self._running = self._regimes = None
 
 
-_CUT_SHORT = {
-    EndedBy.DATA_STOP: 'the speed fell silent',
-    EndedBy.SILENCE: 'all sources of speed fell silent',
-    EndedBy.RESET: 'the memory was reset',
-    EndedBy.RECORD_END: 'the record ended',
-}
-
-
 def cut_short(was: NotCoastdown, ended_by: EndedBy, gliding: float) -> NotCoastdown:
     """
     Say that a record ended before it was clear what a stretch is.
     """
-    text = f'{_CUT_SHORT[ended_by]} before it was clear what it is: P(gliding) was {gliding:.2f}'
+    text = f'{ENDED_BY[ended_by]} before it was clear what it is: P(gliding) was {gliding:.2f}'
     return replace(was, reason=Dismissal.GAP, text=text)
