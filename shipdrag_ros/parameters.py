@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 from importlib.metadata import EntryPoint, entry_points
 from os import PathLike
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 from shipdrag_ros import strict_yaml
@@ -42,18 +41,16 @@ FORMER_KEYS = {
 }
 """Keys that a parameter file had before, and what replaces each."""
 ESTIMATOR_GROUP = 'shipdrag.estimators'
-# every module of these folders is one, also without an installation; listed without importing it
-_FOLDERS = ('estimation/estimators', 'studies/*/estimators')
+# each of these is one, also without an installation; listed without being imported
+_MODULES = ('estimation/estimators/[!_]*.py', 'studies/*/estimators/[!_]*.py')
 _PACKAGE = Path(__file__).parent
 
 
 def _estimators() -> dict[str, EntryPoint]:
     own = {}
-    for folder in (found for place in _FOLDERS for found in sorted(_PACKAGE.glob(place))):
-        place = '.'.join((_PACKAGE.name, *folder.relative_to(_PACKAGE).parts))
-        for module in iter_modules([str(folder)]):
-            value = f'{place}.{module.name}:ESTIMATOR'
-            own[module.name] = EntryPoint(module.name, value, ESTIMATOR_GROUP)
+    for file in sorted(found for place in _MODULES for found in _PACKAGE.glob(place)):
+        module = '.'.join(file.relative_to(_PACKAGE.parent).with_suffix('').parts)
+        own[file.stem] = EntryPoint(file.stem, f'{module}:ESTIMATOR', ESTIMATOR_GROUP)
     others = sorted(entry_points(group=ESTIMATOR_GROUP), key=lambda point: point.name)
     return own | {point.name: point for point in others if point.name not in own}
 
