@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from statistics import NormalDist
 from typing import Any
 
@@ -223,12 +224,12 @@ class Declared:
     unit: str
     source: str
 
-    @property
+    @cached_property
     def mean(self) -> float:
         """Mean of a normal prior, median of a log-normal one, or the number."""
         return self.prior.first if isinstance(self.prior, Prior) else self.prior
 
-    @property
+    @cached_property
     def sd(self) -> float:
         """Standard deviation, of the logarithm of a log-normal one; 0 of a number."""
         return self.prior.second if isinstance(self.prior, Prior) else 0.0
