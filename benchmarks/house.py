@@ -6,8 +6,9 @@ Count the house: how much code there is, and through how many rooms a job goes.
     python -m benchmarks.house --tree OLD --tree . # two trees beside each other
 
 Core code is what a coastdown may need: lines of `shipdrag_ros` without
-docstrings, blanks and comments, and without the studies S2 to S5; an `__init__` is no
-module. The walk is a
+docstrings, blanks and comments, and without the studies S1 to S5; an `__init__` is no
+module. Numbers are those that the inner rooms choose: constants of modules, the priors and
+regimes in printed tables, and numbers within functions but 0, 1, 2, -1 and 1/2. The walk is a
 replay of a simulated coastdown, traced: which calls cross from one room into
 another between the bytes of the bag and those of a published estimate. The
 diagnosis of the same bag shows which modules run in it.
@@ -23,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import tokenize
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +40,7 @@ AIMS = {
     'lines of code, core': 24_000,
     'lines of code, outer rooms': 14_500,
     'modules': 210,
+    'numbers in constants, inner rooms': 200,
     'calls from room to room, bytes of a bag to bytes published': 25,
     'modules that run in a diagnosis': 45,
     f'functions over {LINES} lines of code': 0,
@@ -46,6 +49,8 @@ AIMS = {
     'lines of code, benchmarks': 10_000,
     'words, README and docs': 25_000,
 }
+PRINTED = {'Declared', '_number', '_grid'}  # rows of tables of priors, which pages show
+PLAIN = {0, 1, 2, 0.5}
 WALK = """
 import json, sys
 from pathlib import Path
@@ -100,6 +105,7 @@ class Count:
     outer: int
     modules: int
     core_modules: int
+    numbers: Counter[str]
     long: list[Long]
     wide: list[Long]
 
@@ -133,6 +139,26 @@ def code_lines(path: Path) -> set[int]:
     return held
 
 
+def numbers(path: Path) -> Counter[str]:
+    """
+    Count the numbers of a file, by where they stand.
+    """
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    found: Counter[str] = Counter()
+    constants = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            found['code'] += node.value not in PLAIN
+    for each in constants:
+        held = [node for node in ast.walk(each) if isinstance(node, ast.Constant)]
+        values = [node.value for node in held if type(node.value) in (int, float)]
+        call = each.value.func if isinstance(each.value, ast.Call) else None
+        printed = isinstance(call, ast.Name) and call.id in PRINTED
+        found['printed' if printed else 'constants'] += len(values)
+        found['code'] -= sum(value not in PLAIN for value in values)
+    return found
+
+
 def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, bool]]:
     """
     Yield each function of a file, and whether it is compiled.
@@ -157,7 +183,7 @@ def count(tree: Path) -> Count:
     Count the package of a tree.
     """
     package = tree / PACKAGE
-    found = Count(0, 0, 0, 0, 0, 0, [], [])
+    found = Count(0, 0, 0, 0, 0, 0, Counter(), [], [])
     for path in sorted(package.rglob('*.py')):
         held = code_lines(path)
         room = path.relative_to(package).parent.as_posix().partition('/')[0].strip('.')
@@ -166,6 +192,7 @@ def count(tree: Path) -> Count:
         found.lines += len(held)
         found.core += len(held) * core
         found.outer += len(held) * (room in OUTER)
+        found.numbers += numbers(path) if room not in OUTER else Counter()
         found.modules += module
         found.core_modules += module and core
         for node, is_compiled in functions(path):
@@ -222,6 +249,9 @@ def figures(tree: Path, folder: Path) -> dict[str, str]:
         'lines of code, outer rooms': f'{held.outer}',
         'modules': f'{held.modules}',
         'modules, core': f'{held.core_modules}',
+        'numbers in constants, inner rooms': f'{held.numbers["constants"]}',
+        'numbers in printed tables, inner rooms': f'{held.numbers["printed"]}',
+        'numbers within functions, inner rooms': f'{held.numbers["code"]}',
         'calls from room to room, bytes of a bag to bytes published': f'{len(calls)}',
         'modules that run in a diagnosis': f'{len(modules)}',
         f'functions over {LINES} lines of code': f'{len(held.long)}',

@@ -8,16 +8,15 @@ docs/results/effects.txt and docs/model.md; a test fails while the two differ.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from shipdrag_ros.fields import keys_of
 from shipdrag_ros.forecast import priors as forecast_priors
-from shipdrag_ros.inference import learning
+from shipdrag_ros.inference import priors as noise_priors
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
-from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.parameter import Declared, Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.problem import families_declared
@@ -199,7 +198,7 @@ def model_forecast() -> str:
     return _declared(forecast_priors.TABLE)
 
 
-def _declared(rows_of: Iterable[priors.Declared]) -> str:
+def _declared(rows_of: Iterable[Declared]) -> str:
     rows = (
         [f'`{each.letter}`', each.meaning, str(each.prior), each.unit or '-', each.source]
         for each in rows_of
@@ -211,10 +210,7 @@ def model_noise() -> str:
     """
     Return the table of the priors of the noise.
     """
-    rows = (
-        [name, median, f'{math.exp(sd):.2g}', unit] for name, median, sd, unit in learning.DECLARED
-    )
-    return _table(['slow or white noise', 'median', 'within a factor', 'unit'], rows)
+    return _declared(noise_priors.TABLE)
 
 
 def model_families() -> str:

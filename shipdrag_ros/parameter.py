@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from statistics import NormalDist
 from typing import Any
 
@@ -197,6 +198,41 @@ class Prior:
                 return 'either alike'
             case Shape.FLAT:
                 return 'flat'
+
+
+@dataclass(frozen=True)
+class Declared:
+    """
+    A prior with its letter, unit and source.
+
+    Attributes
+    ----------
+    letter
+        As in docs/model.md.
+    meaning
+    prior
+        A number where it is taken as known.
+    unit
+        '' for a pure number.
+    source
+        A publication, or the records that it was learnt from.
+    """
+
+    letter: str
+    meaning: str
+    prior: Prior | float
+    unit: str
+    source: str
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean of a normal prior, median of a log-normal one, or the number."""
+        return self.prior.first if isinstance(self.prior, Prior) else self.prior
+
+    @cached_property
+    def sd(self) -> float:
+        """Standard deviation, of the logarithm of a log-normal one; 0 of a number."""
+        return self.prior.second if isinstance(self.prior, Prior) else 0.0
 
 
 def normal(sd: float, *, mean: float = 0.0) -> Prior:

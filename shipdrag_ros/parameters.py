@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from os import PathLike
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import Any
 
 from shipdrag_ros import strict_yaml
@@ -42,12 +41,22 @@ FORMER_KEYS = {
 }
 """Keys that a parameter file had before, and what replaces each."""
 ESTIMATOR_GROUP = 'shipdrag.estimators'
-# every module of that folder is one, and each entry point; listed without importing it
-_FOLDER = Path(__file__).parent / 'estimation' / 'estimators'
-OWN_ESTIMATORS = tuple(module.name for module in iter_modules([str(_FOLDER)]))
-ESTIMATORS = tuple(
-    dict.fromkeys((*OWN_ESTIMATORS, *sorted(entry_points(group=ESTIMATOR_GROUP).names)))
-)
+# each of these is one, also without an installation; listed without being imported
+_MODULES = ('estimation/estimators/[!_]*.py', 'studies/*/estimators/[!_]*.py')
+_PACKAGE = Path(__file__).parent
+
+
+def _estimators() -> dict[str, EntryPoint]:
+    own = {}
+    for file in sorted(found for place in _MODULES for found in _PACKAGE.glob(place)):
+        module = '.'.join(file.relative_to(_PACKAGE.parent).with_suffix('').parts)
+        own[file.stem] = EntryPoint(file.stem, f'{module}:ESTIMATOR', ESTIMATOR_GROUP)
+    others = sorted(entry_points(group=ESTIMATOR_GROUP), key=lambda point: point.name)
+    return own | {point.name: point for point in others if point.name not in own}
+
+
+ESTIMATOR_POINTS = _estimators()
+ESTIMATORS = tuple(ESTIMATOR_POINTS)
 """Values of the parameter `estimator`."""
 SPEEDS_M_S = (2.0, 1.0)
 

@@ -25,7 +25,7 @@ PICTURE = (
     ('parameter',),
     ('parameters', 'ship', 'report'),
     ('inference',),
-    ('regression', 'simulation'),
+    ('simulation',),
     ('posterior',),
     ('estimation',),
     ('forecast',),

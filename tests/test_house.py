@@ -48,3 +48,15 @@ def test_a_long_function_is_told_unless_it_is_compiled(house: ModuleType, tmp_pa
     text = ['def slow(x):', *lines, '@compiled(SIGNATURE)', 'def fast(x):', *lines]
     (tmp_path / 'shipdrag_ros' / 'a.py').write_text('\n'.join(text))
     assert house.count(tmp_path).long == [('a.py:slow', 62)]
+
+
+def test_numbers_are_counted_by_where_they_stand(house: ModuleType, tmp_path: Path) -> None:
+    path = tmp_path / 'a.py'
+    path.write_text(
+        'LIMIT = 3.0\n'
+        'A, B = range(4)\n'
+        "GUST = Declared('-', 'gusts', normal(0.1, mean=7), '', 'mine')\n"
+        'def half(x):\n'
+        '    return 0.5 * x + 9.81\n'
+    )
+    assert house.numbers(path) == {'constants': 2, 'printed': 2, 'code': 1}

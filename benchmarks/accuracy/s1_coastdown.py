@@ -140,7 +140,7 @@ def main() -> None:
         '',
         '`estimator: s1_speed`, `s1_position` or `s1_joint` in the parameters chooses one of the '
         'three problems of the paper, certified against exact rational arithmetic',
-        '(`tests/estimation/s1/test_s1.py`).',
+        '(`tests/studies/s1/test_s1.py`).',
         'They are kept as the reference; what is used by default, and by how much it is better: '
         '`benchmarks/results/accuracy_beside_peers.md`.',
         '',

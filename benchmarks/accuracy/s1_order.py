@@ -21,10 +21,10 @@ from rich.table import Table
 from benchmarks.accuracy._coasts import coast, errors, read
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression import order
-from shipdrag_ros.regression.order import OrderTable, fit_orders
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies import order
+from shipdrag_ros.studies.order import OrderTable, fit_orders
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 TRUE_ORDER = 5

@@ -24,10 +24,10 @@ from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
 from benchmarks._tables import publish, table, write_csv
-from shipdrag_ros.regression.least_squares import least_squares
-from shipdrag_ros.regression.order import OrderTable
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.least_squares import least_squares
+from shipdrag_ros.studies.order import OrderTable
 from shipdrag_ros.studies.surface.face.verb import contour_picture, degree_picture
 from shipdrag_ros.studies.surface.fit import (
     SIGNIFICANCE,

@@ -56,12 +56,12 @@ def main() -> None:
                 Scenario(speed_m_s=7.9, lead_in_s=lead_in_s, duration_s=DURATION_S, seed=SEED),
             )
             block = sense(truth, standard_sensors(rate_hz=1.0, noise=1.0), seed=SEED)
-            path = Path(folder) / f'{compression.value}_{coastdowns}.mcap'
+            path = Path(folder) / f'{compression.name}_{coastdowns}.mcap'
             written = _write(path, ship, block, coastdowns, compression)
             size = path.stat().st_size / 1e6
             print(
                 f'{coastdowns:3d} coastdowns after {lead_in_s / HOUR_S:2.0f} h, '
-                f'{coastdowns * len(block)} messages, {compression.value:4s}: {size:6.1f} MB, '
+                f'{coastdowns * len(block)} messages, {compression.name:4s}: {size:6.1f} MB, '
                 f'written at {written:7.0f} messages/s; ',
                 end='',
                 flush=True,

@@ -18,12 +18,11 @@ from pathlib import Path
 from time import monotonic
 from uuid import uuid4
 
-from isal.isal_zlib import crc32
 from mcap import records as mcap_records
-from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
 
 from shipdrag_ros.bags import writer
-from shipdrag_ros.bags.records import MAGIC
+from shipdrag_ros.bags.records import HEAD, MAGIC
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError, reason_of
 from shipdrag_ros.messages import EncodedMessage
@@ -200,25 +199,12 @@ class LiveFile:
         return new
 
     def _chunk(self, messages: Sequence[EncodedMessage]) -> mcap_records.Chunk:
-        builder = RecordBuilder()
-        for message in messages:
-            mcap_records.Message(
-                channel_id=self._channels[message.topic, message.type].id,
-                sequence=0,
-                log_time=message.log_ns,
-                # a stamp before 1970 has no place here; the message itself keeps it
-                publish_time=max(message.publish_ns, 0),
-                data=message.payload,
-            ).write(builder)
-        data = builder.end()
-        return mcap_records.Chunk(
-            compression='',
-            data=data,
-            message_start_time=min(message.log_ns for message in messages),
-            message_end_time=max(message.log_ns for message in messages),
-            uncompressed_crc=crc32(data),
-            uncompressed_size=len(data),
+        contents = (
+            writer.content_of(self._channels[each.topic, each.type].id, each) for each in messages
         )
+        records = b''.join(HEAD.pack(Opcode.MESSAGE, len(each)) + each for each in contents)
+        times = [message.log_ns for message in messages]
+        return writer.chunk_of(records, min(times), max(times), writer.Compression.NONE)
 
     def _write(self, data: bytes) -> None:
         left = memoryview(data)

@@ -17,7 +17,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -35,6 +35,7 @@ from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
     HEAD,
     MAGIC,
+    Buffer,
     DamageKind,
     Place,
     Unpacked,
@@ -178,16 +179,38 @@ class McapFile:
             self.contents.warnings.append(text)
 
     @contextmanager
-    def _data(self) -> Iterator[mmap]:
-        try:
-            with self.path.open('rb') as file:
-                if self.path.stat().st_size == 0:
-                    raise BagError(f'{str(self.path)!r} is empty; nothing was recorded')
-                data = mmap((self._source or file).fileno(), 0, access=ACCESS_READ)
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be read: {error.strerror}') from error
-        with data:
+    def _data(self) -> Iterator[Buffer]:
+        with mapped(self.path, self._source) as data:
+            if not data:
+                raise BagError(f'{str(self.path)!r} is empty; nothing was recorded')
             yield data
+
+
+@contextmanager
+def mapped(path: Path, unpacked: IO[bytes] | None) -> Iterator[Buffer]:
+    """
+    Open a file; of an empty one there are no bytes.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    unpacked
+        What is in it, where it is packed; None where not.
+
+    Raises
+    ------
+    BagError
+        If it cannot be read.
+    """
+    try:
+        with path.open('rb') as file:
+            source = unpacked or file
+            data = mmap(source.fileno(), 0, access=ACCESS_READ) if source.seek(0, 2) else None
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be read: {error.strerror}') from error
+    with data or nullcontext(b'') as held:
+        yield held
 
 
 def not_mcap(path: Path, head: bytes) -> str:
@@ -210,7 +233,7 @@ class _Group(NamedTuple):
     size: int
 
 
-def _grouped(data: mmap, segments: Sequence[FileSegment]) -> Iterator[_Group]:
+def _grouped(data: Buffer, segments: Sequence[FileSegment]) -> Iterator[_Group]:
     """Put small segments together: what each costs beside its bytes is then small."""
     group: list[FileSegment] = []
     size = 0
@@ -222,7 +245,7 @@ def _grouped(data: mmap, segments: Sequence[FileSegment]) -> Iterator[_Group]:
             group, size = [], 0
 
 
-def _stated_bytes(data: mmap, segment: FileSegment) -> int:
+def _stated_bytes(data: Buffer, segment: FileSegment) -> int:
     size = segment.end - segment.offset
     if data[segment.offset] != Opcode.CHUNK:
         return size
@@ -230,7 +253,7 @@ def _stated_bytes(data: mmap, segment: FileSegment) -> int:
     return max(size, int.from_bytes(data[at : at + 8], 'little'))
 
 
-def _unpacked_ahead(data: mmap, groups: Sequence[_Group]) -> Iterator[list[Unpacked]]:
+def _unpacked_ahead(data: Buffer, groups: Sequence[_Group]) -> Iterator[list[Unpacked]]:
     """
     Yield the records of each group in order, unpacked on other cores meanwhile.
 
@@ -254,11 +277,11 @@ def _unpacked_ahead(data: mmap, groups: Sequence[_Group]) -> Iterator[list[Unpac
             yield ahead.popleft()[1].result()
 
 
-def _records(data: mmap, group: _Group) -> list[Unpacked]:
+def _records(data: Buffer, group: _Group) -> list[Unpacked]:
     return [_unpacked(data, segment) for segment in group.segments]
 
 
-def _unpacked(data: mmap, segment: FileSegment) -> Unpacked:
+def _unpacked(data: Buffer, segment: FileSegment) -> Unpacked:
     if data[segment.offset] == Opcode.CHUNK:
         start = segment.offset + HEAD.size
         return unpack(data, Place(Opcode.CHUNK, segment.offset, start, segment.end))
@@ -273,8 +296,6 @@ def _unpacked_file(path: Path) -> IO[bytes]:
 
     unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
     unpack_file(path, unpacked, refuse)
-    if unpacked.tell() == 0:
-        raise BagError(f'{str(path)!r} is empty; nothing was recorded')
     return unpacked
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -24,7 +23,7 @@ from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.mcap_file import BagFiles, locate, unpack_file
+from shipdrag_ros.bags.mcap_file import BagFiles, locate, mapped, unpack_file
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
@@ -159,18 +158,13 @@ def opened(path: Path, damages: DamageList) -> Iterator[Buffer]:
         If it cannot be read.
     """
     with ExitStack() as stack:
-        try:
-            file: Any = stack.enter_context(path.open('rb'))
-            if path.suffix == '.zstd':
-                file = stack.enter_context(TemporaryFile(prefix='shipdrag_'))
-                unpack_file(path, file, lambda kind, text: damages.add(0, 'file', kind, text))
-            if file.seek(0, 2) == 0:
-                damages.add(0, 'file', DamageKind.TRUNCATED, 'it is empty')
-                yield b''
-                return
-            data = stack.enter_context(mmap(file.fileno(), 0, access=ACCESS_READ))
-        except OSError as error:
-            raise BagError(f'{str(path)!r} cannot be read: {error.strerror}') from error
+        unpacked = None
+        if path.suffix == '.zstd':
+            unpacked = stack.enter_context(TemporaryFile(prefix='shipdrag_'))
+            unpack_file(path, unpacked, lambda kind, text: damages.add(0, 'file', kind, text))
+        data = stack.enter_context(mapped(path, unpacked))
+        if not data:
+            damages.add(0, 'file', DamageKind.TRUNCATED, 'it is empty')
         yield data
 
 

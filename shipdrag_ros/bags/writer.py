@@ -151,16 +151,49 @@ def sync_directory(path: Path) -> None:
 class Compression(Enum):
     """How the chunks of a file are compressed."""
 
-    NONE = 'none'
+    NONE = ''
     LZ4 = 'lz4'
     ZSTD = 'zstd'
 
 
-_PACKERS: dict[Compression, tuple[str, Callable[[bytes], bytes]]] = {
-    Compression.NONE: ('', bytes),
-    Compression.LZ4: ('lz4', lz4.frame.compress),
-    Compression.ZSTD: ('zstd', zstandard.compress),
+_PACKERS: dict[Compression, Callable[[bytes], bytes]] = {
+    Compression.NONE: bytes,
+    Compression.LZ4: lz4.frame.compress,
+    Compression.ZSTD: zstandard.compress,
 }
+
+
+def chunk_of(
+    records: bytes, first_ns: int, last_ns: int, compression: Compression
+) -> mcap_records.Chunk:
+    """
+    Return the record of a chunk.
+
+    Parameters
+    ----------
+    records
+        Of messages, as they stand in it.
+    first_ns, last_ns
+        Least and largest log time of these [ns since the epoch].
+    compression
+    """
+    return mcap_records.Chunk(
+        compression=compression.value,
+        data=_PACKERS[compression](records),
+        message_end_time=last_ns,
+        message_start_time=first_ns,
+        uncompressed_crc=crc32(records),
+        uncompressed_size=len(records),
+    )
+
+
+def content_of(number: int, message: EncodedMessage) -> bytes:
+    """
+    Return the content of the record of a message, by the number of its channel.
+    """
+    # a stamp before 1970 has no place here; the message itself keeps it
+    publish_ns = max(message.publish_ns, 0)
+    return MESSAGE_HEAD.pack(number, 0, message.log_ns, publish_ns) + message.payload
 
 
 class RecordWriter:
@@ -198,7 +231,7 @@ class RecordWriter:
         self._chunk_bytes = chunk_bytes
         self._room = chunk_bytes or CHUNK_RANGE[0]
         self._chunk = bytearray()
-        self._times = [0, 0]  # first and last of the chunk [ns]
+        self._times = 0, 0  # first and last of the chunk [ns]
         self._entries: dict[int, list[int]] = {}  # of its index: time and offset, by channel
         self._declared: dict[bytes, mcap_records.Schema | mcap_records.Channel] = {}
         self._indexes: list[
@@ -247,44 +280,24 @@ class RecordWriter:
             self._write(as_bytes(self._declared[key]))
         return int(self._declared[key].id)
 
-    def add(
-        self, number: int, payload: bytes, *, log_ns: int, publish_ns: int, sequence: int = 0
-    ) -> None:
+    def add_content(self, number: int, content: bytes, *, log_ns: int) -> None:
         """
         Write a message of a channel that was declared.
 
         Parameters
         ----------
         number
-            Of the channel.
-        payload
-            CDR bytes.
-        log_ns, publish_ns
-            Time of arrival and of measurement [ns since the epoch].
-        sequence
-            Of the publisher.
-        """
-        head = MESSAGE_HEAD.pack(number, sequence, log_ns, publish_ns)
-        self.add_content(number, head + payload, log_ns=log_ns)
-
-    def add_content(self, number: int, content: bytes, *, log_ns: int) -> None:
-        """
-        Write a message as it stands in another file, but for the number of its channel.
-
-        Parameters
-        ----------
-        number
             Of the channel here.
         content
-            Of the record there.
+            Of its record, here or in another file; the number in it is not used.
         log_ns
             Its time of arrival [ns since the epoch].
         """
         chunk = self._chunk
         if not chunk:
-            self._times = [log_ns, log_ns]
+            self._times = log_ns, log_ns
         elif log_ns < self._times[0] or log_ns > self._times[1]:
-            self._times = [min(self._times[0], log_ns), max(self._times[1], log_ns)]
+            self._times = min(self._times[0], log_ns), max(self._times[1], log_ns)
         self._entries.setdefault(number, []).extend((log_ns, len(chunk)))
         chunk += _NUMBERED.pack(Opcode.MESSAGE, len(content), number)
         chunk += content[2:]
@@ -339,17 +352,7 @@ class RecordWriter:
     def _end_chunk(self) -> None:
         if not self._chunk:
             return
-        records = bytes(self._chunk)
-        name, pack = _PACKERS[self._compression]
-        first, last = self._times
-        chunk = mcap_records.Chunk(
-            compression=name,
-            data=pack(records),
-            message_end_time=last,
-            message_start_time=first,
-            uncompressed_crc=crc32(records),
-            uncompressed_size=len(records),
-        )
+        chunk = chunk_of(bytes(self._chunk), *self._times, self._compression)
         entries = {number: np.array(each, '<u8') for number, each in self._entries.items()}
         self._chunk.clear()
         self._entries.clear()
@@ -494,9 +497,7 @@ class BagWriter(RecordWriter):
         BagError
             If the type is not known or the file cannot be written.
         """
-        # a stamp before 1970 has no place here; the message itself keeps it
-        number = self._channel(topic, type_name)
-        self.add(number, payload, log_ns=log_ns, publish_ns=max(publish_ns, 0))
+        self.put(EncodedMessage(topic, type_name, payload, log_ns, publish_ns))
 
     def write_samples(self, block: Block) -> None:
         """
@@ -514,8 +515,8 @@ class BagWriter(RecordWriter):
         """
         Write one message that is ready.
         """
-        topic, kind, payload, log_ns, publish_ns = message
-        self.write(topic, kind, payload, log_ns=log_ns, publish_ns=publish_ns)
+        number = self._channel(message.topic, message.type)
+        self.add_content(number, content_of(number, message), log_ns=message.log_ns)
 
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)

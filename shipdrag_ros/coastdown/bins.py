@@ -17,14 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.past import CHANNELS
-from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import KIND, Channel, Float64, Int64
+from shipdrag_ros.samples import KIND, Float64, Int64
 
-FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are positions
-_GEODETIC = int(Channel.POSITION_GEODETIC)
-KINDS = _GEODETIC + 1  # of these, a speed can be had from
+KINDS = GEODETIC + 1  # of these, a speed can be had from
 SOURCES = np.argsort(KIND, kind='stable')[: int((KIND < KINDS).sum())]
 """Channels that a speed can be had from, best first."""
 RANK = np.argsort(np.argsort(KIND, kind='stable'), kind='stable')
@@ -36,9 +33,7 @@ EARTH_RADIUS_M = 6_371_008.8  # mean; the third digit of a speed does not matter
 PER_SECOND = 1000
 PER_UNIT = 1e6  # m/s, m, rad/s, cosine and sine
 PER_DEGREE = 1e11
-UNIT = np.array([PER_DEGREE if kind == _GEODETIC else PER_UNIT for kind in KIND])
-# A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
-TURNING_RAD_S = 0.5
+UNIT = np.array([PER_DEGREE if kind == GEODETIC else PER_UNIT for kind in KIND])
 PITCH_LEAST = 1e-3  # a pitch below it is none
 
 COUNT, TIME, A, B = range(4)
@@ -182,7 +177,7 @@ def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     if n0 == 0 or n1 == 0:
         return np.nan, np.nan, np.nan
     time = t1 - t0 + width
-    if KIND[channel] == _GEODETIC:
+    if KIND[channel] == GEODETIC:
         north = math.radians((a1 - a0) / PER_DEGREE) * EARTH_RADIUS_M
         latitude = math.radians((a + a1) / PER_DEGREE)
         east = math.radians((b1 - b0) / PER_DEGREE) * math.cos(latitude) * EARTH_RADIUS_M

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 
 from shipdrag_ros.coastdown.bins import (
-    FIRST_TRACK,
     SOURCES,
     Bins,
     displacement,
     mean_place,
     newest_bin,
 )
+from shipdrag_ros.coastdown.past import FIRST_TRACK
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.samples import KIND, Channel
 

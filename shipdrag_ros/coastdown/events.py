@@ -34,16 +34,30 @@ class State(Enum):
 class EndedBy(Enum):
     """Why a coastdown ended."""
 
-    SPEED = 'speed'  # the minimum speed was reached
+    SPEED = 'speed'
     TURN = 'turn'
     ENGINE = 'engine'  # re-engaged, or the speed settled or rose
-    BRAKE = 'brake'  # stopped by something but the water
-    ASTERN = 'astern'  # the propeller was reversed
+    BRAKE = 'brake'
+    ASTERN = 'astern'
     DATA_STOP = 'data_stop'
     SILENCE = 'silence'  # all sources were silent by wall time
     RESET = 'reset'
     RECORD_END = 'record_end'
-    GIVEN = 'given'  # the window was given by hand
+    GIVEN = 'given'
+
+
+ENDED_BY = {
+    EndedBy.SPEED: 'the minimum speed was reached',
+    EndedBy.TURN: 'the ship turned',
+    EndedBy.ENGINE: 'the engine drove the ship again',
+    EndedBy.BRAKE: 'something but the water stopped the ship',
+    EndedBy.ASTERN: 'the propeller was reversed',
+    EndedBy.DATA_STOP: 'the data stopped',
+    EndedBy.SILENCE: 'all sources of speed fell silent',
+    EndedBy.RESET: 'the memory was reset',
+    EndedBy.RECORD_END: 'the record ended',
+    EndedBy.GIVEN: 'the window was given by hand',
+}
 
 
 class Dismissal(Enum):

@@ -11,7 +11,6 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
-    FIRST_TRACK,
     KINDS,
     PER_SECOND,
     PER_UNIT,
@@ -27,7 +26,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_place,
     smoothing,
 )
-from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, KIND, SECOND_NS, Channel, Int64
 

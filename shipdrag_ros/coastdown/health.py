@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shipdrag_ros.coastdown.memory import RECENT, InputTally
-from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.samples import FURTHER, INPUTS, Channel, Reason
 
 

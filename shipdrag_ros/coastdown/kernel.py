@@ -19,7 +19,6 @@ from shipdrag_ros.coastdown.bins import (
     PITCH_LEAST,
     RANK,
     SOURCES,
-    TURNING_RAD_S,
     Bins,
     line,
     mean_turning,
@@ -27,12 +26,12 @@ from shipdrag_ros.coastdown.bins import (
 )
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning, Watch
+from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.ring import append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
     CHANNEL_CODES,
-    NEVER,
     STAMP_JUMPED_BACK,
     STAMPS,
     VALUES,
@@ -43,6 +42,7 @@ from shipdrag_ros.coastdown.validate import (
     remember,
 )
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.estimation.run_down import STANDS_RAD_S
 from shipdrag_ros.samples import KIND, SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
 _SHAFT, _PITCH = int(Channel.SHAFT), int(Channel.PITCH)
@@ -161,7 +161,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     # half a window ago, so that a shaft that runs down slowly is not its own measure
     width = tuning.slopes.width
     steady, count = mean_turning(bins, channel, number - (width + 1) // 2, width)
-    if count < 3 or abs(steady) < (PITCH_LEAST if KIND[channel] == _PITCH else TURNING_RAD_S):
+    if count < 3 or abs(steady) < (PITCH_LEAST if KIND[channel] == _PITCH else STANDS_RAD_S):
         return 0
     if mean_turning(bins, channel, number, 1)[0] / steady < _SLOWED:
         return _SHAFT_SLOWED

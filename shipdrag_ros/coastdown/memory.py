@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins
-from shipdrag_ros.coastdown.past import CHANNELS
+from shipdrag_ros.coastdown.past import CHANNELS, NEVER
 from shipdrag_ros.coastdown.ring import RingBuffer, first_store
 from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
-from shipdrag_ros.coastdown.validate import NEVER, CheckMemory, Limits
+from shipdrag_ros.coastdown.validate import CheckMemory, Limits
 from shipdrag_ros.samples import Float64, Int64, Reason
 
 ALWAYS = 2**62  # a stamp after all stamps

@@ -17,6 +17,7 @@ from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.events import (
+    ENDED_BY,
     Dismissal,
     EndedBy,
     EndedCoastdown,
@@ -30,13 +31,14 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
-from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
+from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.choice import averaged
@@ -563,17 +565,9 @@ class Monitor:
         self._running = self._regimes = None
 
 
-_CUT_SHORT = {
-    EndedBy.DATA_STOP: 'the speed fell silent',
-    EndedBy.SILENCE: 'all sources of speed fell silent',
-    EndedBy.RESET: 'the memory was reset',
-    EndedBy.RECORD_END: 'the record ended',
-}
-
-
 def cut_short(was: NotCoastdown, ended_by: EndedBy, gliding: float) -> NotCoastdown:
     """
     Say that a record ended before it was clear what a stretch is.
     """
-    text = f'{_CUT_SHORT[ended_by]} before it was clear what it is: P(gliding) was {gliding:.2f}'
+    text = f'{ENDED_BY[ended_by]} before it was clear what it is: P(gliding) was {gliding:.2f}'
     return replace(was, reason=Dismissal.GAP, text=text)

@@ -27,6 +27,7 @@ from shipdrag_ros.coastdown.past import (
     KEPT,
     M_PER_DEGREE,
     MIDDLE,
+    NEVER,
     REPEATS,
     SD,
     Past,
@@ -42,7 +43,6 @@ from shipdrag_ros.coastdown.past import (
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND
 
-_NEVER = -(2**62)
 _ACCELERATION_M_S2 = 0.15  # that needs no proof: three times what a merchant ship coasts with
 _FASTER = 1.5  # than by the last readings a ship may get, without proof
 _BRAKE_M_S2 = 4.0  # between two readings that are refused
@@ -57,7 +57,7 @@ def forget_past(past: Past) -> None:
     """
     Return to the state before the first reading.
     """
-    past.heard_ns[:] = _NEVER
+    past.heard_ns[:] = NEVER
     for channel in range(CHANNELS):
         learn_anew(past, channel)
 
@@ -293,7 +293,7 @@ def refuse(
     Remember a reading that was refused for its value.
     """
     past.heard_ns[channel] = stamp
-    past.due_ns[channel] = _NEVER
+    past.due_ns[channel] = NEVER
     learn_gate(past, channel)  # the last time may be long ago
     if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was

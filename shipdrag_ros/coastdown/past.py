@@ -30,7 +30,7 @@ M_PER_DEGREE = 111_195.0
 STUCK = 6  # repeats in a row that a sensor that does not repeat makes when it sticks
 REPEATS = 2  # among the readings kept: a sensor that repeats more often does so by its nature
 
-_NEVER = -(2**62)
+NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
 _LEARN_NS = 128_000_000_000
 _WITNESSES = 16  # readings before a run of repeats that say whether it is natural
 _OF_QUARTILE = 1.1503  # its upper quartile
@@ -112,14 +112,14 @@ class Past(NamedTuple):
             np.full(CHANNELS, np.inf),
             np.zeros(CHANNELS),
             none(),
-            np.full(CHANNELS, _NEVER),
+            np.full(CHANNELS, NEVER),
             none(),
             none(),
             np.zeros((CHANNELS, AGREED, 2)),
             none(),
             none(),
             np.zeros((CHANNELS, 2), np.int64),
-            np.full(CHANNELS, _NEVER),
+            np.full(CHANNELS, NEVER),
             none(),
             none(),
             np.zeros(KEPT),
@@ -134,7 +134,7 @@ def learn_anew(past: Past, channel: int) -> None:
     past.accepted[channel] = 0
     past.gate[channel] = np.inf
     past.rate[channel] = 0.0
-    past.due_ns[channel] = _NEVER
+    past.due_ns[channel] = NEVER
     past.repeats[channel] = 0
     past.stuck[channel] = 0
     past.refused_count[channel] = 0
@@ -173,7 +173,7 @@ def keep_and_learn(past: Past, channel: int, stamp: int, a: float, b: float) -> 
         learn_gate(past, channel)
         past.learn_ns[channel] = (stamp // _LEARN_NS + 1) * _LEARN_NS
     quiet = count >= KEPT and past.repeats[channel] == 0 and past.doubts[channel] == 0
-    past.due_ns[channel] = past.learn_ns[channel] if quiet else _NEVER
+    past.due_ns[channel] = past.learn_ns[channel] if quiet else NEVER
 
 
 @compiled(inline=True, uncounted=True)

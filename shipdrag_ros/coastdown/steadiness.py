@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import FIRST_TRACK, Bins, line, smoothing, speeds_kept
-from shipdrag_ros.coastdown.past import CHANNELS
-from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.coastdown.bins import Bins, line, smoothing, speeds_kept
+from shipdrag_ros.coastdown.past import CHANNELS, FIRST_TRACK, NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import KIND, Float64, Int64

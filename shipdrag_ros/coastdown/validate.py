@@ -39,7 +39,7 @@ from shipdrag_ros.coastdown.outliers import (
     sticks,
     take,
 )
-from shipdrag_ros.coastdown.past import CHANNELS, Past
+from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
@@ -57,7 +57,6 @@ from shipdrag_ros.samples import (
     UInt8,
 )
 
-NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
 AGREED = 3  # stamps in a row that make a clock that was set: two may be a slip
 
 # not reasons of a sample: the clock was set, everything starts afresh
@@ -77,10 +76,9 @@ _OUTLIER = int(Reason.OUTLIER)
 
 _SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this kind and those before it
 _POSITION = int(Channel.POSITION)
-_GEODETIC = int(Channel.POSITION_GEODETIC)
 # The motion of a ship at sea never repeats to the last bit; a stopped shaft, a rudder
 # amidships, a steady depth and a course held by a coarse compass do, and rightly.
-_MOTION = int(Channel.POSITION_GEODETIC)  # this kind and those before it
+_MOTION = GEODETIC  # this kind and those before it
 _TWO_COLUMNS = np.array(
     [
         channel.kind in (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
@@ -201,7 +199,7 @@ def examine(
         return _ABSURD
     if KIND[channel] > _MOTION:
         return _ACCEPTED
-    if KIND[channel] == _GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
+    if KIND[channel] == GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
         return _ABSURD
     if KIND[channel] == _POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
         return _ABSURD

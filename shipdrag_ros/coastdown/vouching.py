@@ -21,7 +21,6 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
-    FIRST_TRACK,
     PER_UNIT,
     RANK,
     SOURCES,
@@ -30,8 +29,8 @@ from shipdrag_ros.coastdown.bins import (
     smoothing,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
+from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
 from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, log_sum, means, scaled
-from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.samples import KIND, SECOND_NS, Block, Channel, Float64, Int64

@@ -22,6 +22,7 @@ from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier
 from shipdrag_ros.inference.decision import UNKNOWN, marginals
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import EffectWay, kept_way
 from shipdrag_ros.posterior.hypotheses import Explanation
@@ -29,10 +30,7 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import effects_of, find
 
-ERRS = 0.02  # of earlier diagnoses, how many are wrong of an effect whatever they say
-_HALF = 0.5  # power of an earlier likelihood
-_UNSEEN = 0.5  # of effects that are there, how many a diagnosis does not list
-_SIZE_SD = 0.1  # relative, by which a size that stays differs from what was found
+_HALF = priors.EARLIER_COUNTS.mean
 _WIDEST = 1.0  # sd of the logarithm of a size ...
 _WIDE = 2.0  # ... and a relative sd that is wider
 _LEAST = 0.01  # probability that is worth a word
@@ -102,7 +100,7 @@ def _ratio(effect: Effect, stays: float, *, was: bool, there: bool, kept: bool) 
     """
     prior = effect.odds / (1.0 + effect.odds)
     if not was:
-        stays *= 1.0 - _UNSEEN
+        stays *= 1.0 - priors.EARLIER_UNSEEN.mean
     if kept:
         return stays / prior if was else 0.0
     if there or was:
@@ -208,7 +206,7 @@ class Carried:
         lasted = (self.now_ns - source.diagnosis.last_ns) * 1e-9 / effect.lasts_s
         holding = [each for each in source.diagnosis.candidates if effect.name in each.effects]
         total = math.fsum(each.probability for each in holding)
-        priors = []
+        sizes_now = []
         for quantity in effect.parameters_of(self.ship):
             sizes = [each.effects[effect.name][quantity.name] for each in holding]
             shares = [each.probability / total for each in holding]
@@ -216,9 +214,9 @@ class Carried:
             variance = math.fsum(
                 p * (_sd(size) ** 2 + (size.value - mean) ** 2) for p, size in zip(shares, sizes)
             )
-            sd = math.hypot(math.sqrt(variance / _HALF), mean * (_SIZE_SD + lasted))
-            priors.append(_about(quantity.prior, mean, sd))
-        return tuple(priors) if all(prior.second > 0.0 for prior in priors) else ()
+            sd = math.hypot(math.sqrt(variance / _HALF), mean * (priors.EARLIER_SIZE.sd + lasted))
+            sizes_now.append(_about(quantity.prior, mean, sd))
+        return tuple(sizes_now) if all(each.second > 0.0 for each in sizes_now) else ()
 
 
 def _resized(name: str, found: ComparedHypotheses[Fitted]) -> bool:
@@ -321,7 +319,7 @@ def _unused(
 def _stays(effect: Effect, earlier: EarlierDiagnosis, now_ns: int, facts: Facts) -> float:
     """Return how probable it is that an effect that was found is still there as it was."""
     passed_s = (now_ns - earlier.last_ns) * 1e-9
-    stays = (1.0 - ERRS) * math.exp(-passed_s / effect.lasts_s)
+    stays = (1.0 - priors.EARLIER_ERRS.mean) * math.exp(-passed_s / effect.lasts_s)
     for stated in facts.stated:
         since_ns = stated.fact.time_ns
         ended = since_ns is not None and earlier.last_ns <= since_ns <= now_ns

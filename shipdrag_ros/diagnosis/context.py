@@ -29,11 +29,8 @@ from shipdrag_ros.simulation.surge import turning
 _BIN_S = 60.0
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
-_SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
 _SHORTEST_S = 0.1  # fall of a shaft
-# of the logarithm: thrust is gone before or after its shaft stands, by the propeller and engine
-_RUN_DOWN_SD = 0.6
 
 
 @dataclass(frozen=True)
@@ -132,14 +129,14 @@ class Context:
             blocks.append(np.array([[priors.DEPTH_READ.sd**2]]))
         if len(shaft):
             values += [shaft, np.array([0.0])]
-            blocks.append(np.eye(len(shaft)) * _SHAFT_SD**2 + _SHAFT_OFF_SD**2)
+            blocks.append(np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
         blocks.append(_yaw_covariance(yaw_s))
         run_down_s = ship.propulsion.run_down_s if ship.propulsion and stop.shaft_s else None
         if run_down_s is not None:
             values.append(np.log([stop.shaft_s]))
-            blocks.append(np.array([[_RUN_DOWN_SD**2]]))
+            blocks.append(np.array([[priors.SHAFT_FALL.sd**2]]))
         last = len(times) - 1
         return cls(
             stop,

@@ -35,6 +35,7 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
@@ -46,7 +47,6 @@ from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, t
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
 _APART_M_S = 0.15  # slowly: six times what is usual of water
-_ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
 Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
 """Runs, and what is to be said about them."""
@@ -309,7 +309,7 @@ def compare(
         effects,
         log_known,
         () if earlier is None else earlier.ways(effects),
-        math.log(_OTHER_DAYS if together.apart else _ONE_DAY),
+        math.log((priors.DIFFERS_LATER if together.apart else priors.DIFFERS).mean),
     )
 
 

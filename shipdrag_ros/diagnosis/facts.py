@@ -16,12 +16,13 @@ from typing import Protocol
 
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.inference.decision import UNKNOWN, Names
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect
 
-_DRIVEN = 0.13  # of ships whose propeller is not locked: a shaft that turns on, at no pitch
+_DRIVEN = priors.DRIVEN_SHAFT.mean
 # what the shaft does where no effect says otherwise, by what the baseline contains
 _SHAFT: Mapping[str, Mapping[str, float]] = {
     'free': {'free': 1.0 - _DRIVEN, 'driven': _DRIVEN},

@@ -21,12 +21,12 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.priors import UNSTATED_FORM
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Baseline, CoefficientBaseline, CoefficientSd, Ship, TableBaseline
 
 ENOUGH = 3  # runs that show their scatter
 _ASKED = 5  # from which it is well known
-_FORM_SD = 0.05  # of a baseline of which nothing is stated
 _FORM_POINTS = 12
 _MARGIN = 1.1  # above the highest speed
 _STANDS_OUT = 0.01  # probability by chance, for any of the runs
@@ -254,7 +254,7 @@ def _from_curves(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -
     base = TableBaseline(
         (0.0, *(_rounded(value) for value in points)),
         (0.0, *(_rounded(value) for value in force)),
-        relative_sd=_FORM_SD,
+        relative_sd=UNSTATED_FORM.mean,
         source=f'from {inner[0]:.3g} to {inner[-1]:.3g} m/s, beyond by the square of the speed',
     )
     return replace(ship, baseline=base)
@@ -279,7 +279,7 @@ def _warnings(runs: Sequence[CleanRun], ship: Ship, problem: SharedBaseline) -> 
     if len(runs) < ENOUGH:
         holds = 'the relative_sd that was stated still holds'
         if ship.baseline is None:
-            holds = f'a relative_sd of {_FORM_SD:g} is stated'
+            holds = f'a relative_sd of {UNSTATED_FORM.mean:g} is stated'
         found.append(
             f'{len(runs)} run(s) do not show how runs differ: {holds}; with {_ASKED} runs their '
             'scatter replaces it'

@@ -24,10 +24,10 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import KIND_COUNT, POSITION, Input, Rows
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Fact, Ship
 
-_COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8  # of the steady record, for its speed
 
 
@@ -236,7 +236,7 @@ def _heading(window: Window, since_ns: int, position_sd_m: float) -> tuple[float
     yaw = window.before.heading.value
     if len(yaw):
         mean = math.atan2(float(np.sin(yaw).mean()), float(np.cos(yaw).mean()))
-        return mean, _COMPASS_SD_RAD
+        return mean, priors.COMPASS.sd
     before, after = window.before.position, window.position
     if not len(after):
         return 0.0, 0.0
@@ -246,8 +246,10 @@ def _heading(window: Window, since_ns: int, position_sd_m: float) -> tuple[float
         _course(after.time_ns, after.value, position_sd_m),
     ]
     # she turns little where that after the stop is needed
-    course, sd = courses[0] if courses[0][1] < _COURSE_SD_RAD else min(courses, key=itemgetter(1))
-    return course, math.hypot(sd, _COURSE_SD_RAD)
+    course, sd = (
+        courses[0] if courses[0][1] < priors.COURSE.sd else min(courses, key=itemgetter(1))
+    )
+    return course, math.hypot(sd, priors.COURSE.sd)
 
 
 def _course(time_ns: Int64, place: Float64, sd_m: float) -> tuple[float, float]:

@@ -31,12 +31,15 @@ from shipdrag_ros.simulation.effect import Effect, Measure, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
-_SCALE_TOLERANCE = 0.005  # that a log in order has
-_CURRENT_TOLERANCE_M_S = 0.02  # steady current that is not worth a word
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
-_TYPICAL_S = (120.0, 1200.0)  # correlation of the log's error and of slow water
-_WATER_M_S = 0.04
-_SD_OF_LOG = np.array([1.0, 1.0, 0.7, 0.8, 0.8])
+_NOISE = (
+    priors.SAILING_LOG,
+    priors.SAILING_LOG,
+    priors.SAILING_WATER,
+    priors.SAILING_LOG_TIME,
+    priors.SAILING_WATER_TIME,
+)
+_SD_OF_LOG = np.array([each.sd for each in _NOISE])
 _EVALUATIONS = 400
 _LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
@@ -113,7 +116,8 @@ class SailingModel:
         rough = white.all_together
         residual = rough.residual_m_s
         typical = max(float(np.median(np.abs(residual))), 1e-3)
-        units = np.array([typical, typical, _WATER_M_S, *_TYPICAL_S])
+        units = np.array([each.mean for each in _NOISE])
+        units[:2] *= typical
         slopes = white.factor @ rough.slopes * _WIDE
         open_ = slopes @ slopes.T
 
@@ -277,7 +281,7 @@ def _covariance(legs: Legs, sizes: Float64) -> Float64:
     course = np.cos(legs.direction_rad[:, None] - legs.direction_rad)
     slow = log**2 * np.exp(-apart / log_s) + water**2 * np.exp(-apart / water_s) * course
     speed = legs.ground_m_s
-    found = np.where(together, slow + _CURRENT_TOLERANCE_M_S**2 * course, 0.0)
-    found += _SCALE_TOLERANCE**2 * np.outer(speed, speed)
+    found = np.where(together, slow + priors.SAILING_CURRENT.sd**2 * course, 0.0)
+    found += priors.SAILING_SCALE.sd**2 * np.outer(speed, speed)
     found[np.diag_indices_from(found)] += white**2
     return np.asarray(found, np.float64)

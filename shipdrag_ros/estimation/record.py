@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.distance import along_track
+from shipdrag_ros.estimation.distance import along_track, evaluate, refit
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.steady import (
     BIN_S,
@@ -23,8 +23,8 @@ from shipdrag_ros.estimation.steady import (
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.priors import STATED_POWER
 from shipdrag_ros.posterior.rows import condense
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64, Int64
 
 LEAST_STAMPS = 12  # of an input: fewer do not show its noise
@@ -300,7 +300,6 @@ def _ahead(position: Float64, heading_rad: float) -> Float64:
 
 _ORDER = 12  # of the polynomial that stands for the motion
 _RANGE = 100.0  # of a variance over the typical one, up and down
-_PRIOR_SD = 0.5  # of the power of the stated variance that holds, about 1
 _OF_LOG_CHI2 = np.pi / np.sqrt(2.0)  # sd of ln(z^2) of a standard normal z
 _LEAST = 1e-12  # of the largest residual: none is 0
 
@@ -334,14 +333,13 @@ def stated_weight(time_s: Float64, value: Float64, variance: Float64) -> Float64
         return ones
     log = np.log(np.clip(variance / np.median(variance), 1.0 / _RANGE, _RANGE))
     middle = 0.5 * (time_s[0] + time_s[-1])
-    basis = OrthogonalBasis.on((time_s - middle) / (time_s[-1] - middle), _ORDER)
-    coefficients, _ = basis.fit(value)
-    size = np.abs(value - np.einsum('k,kn->n', coefficients, basis.columns))
+    time = (time_s - middle) / (time_s[-1] - middle)
+    size = np.abs(value - evaluate(refit(time, value, _ORDER), time, _ORDER)[0])
     follows = 2.0 * np.log(size + _LEAST * float(size.max()) + np.finfo(np.float64).tiny)
     away = log - log.mean()
     spread = float((away * away).sum())
-    precision, of_prior = spread / _OF_LOG_CHI2**2, 1.0 / _PRIOR_SD**2
+    precision, of_prior = spread / _OF_LOG_CHI2**2, 1.0 / STATED_POWER.sd**2
     found = float((away * follows).sum()) / spread
-    power = (precision * found + of_prior) / (precision + of_prior)
+    power = (precision * found + of_prior * STATED_POWER.mean) / (precision + of_prior)
     result: Float64 = np.exp(-min(max(power, 0.0), 1.0) * log)
     return result

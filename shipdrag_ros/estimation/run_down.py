@@ -351,8 +351,8 @@ def _dated(window: Window) -> tuple[int, float]:
     of_both = STOP.sd**2 + TOLD.sd**2
     # what is told is the stop, or else it is told at any time within the hour
     density = math.exp(-0.5 * off**2 / of_both) / math.sqrt(2.0 * math.pi * of_both)
-    right = TOLD_CHANCE * 3600.0 * density
-    p = right / (right + 1.0 - TOLD_CHANCE)
+    right = TOLD_CHANCE.mean * 3600.0 * density
+    p = right / (right + 1.0 - TOLD_CHANCE.mean)
     mean, variance = off * STOP.sd**2 / of_both, STOP.sd**2 * TOLD.sd**2 / of_both
     of_mixture = p * (variance + mean**2) + (1.0 - p) * STOP.sd**2 - (p * mean) ** 2
     return window.start_ns + round(p * mean * SECOND_NS), math.sqrt(of_mixture)

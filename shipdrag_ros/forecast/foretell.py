@@ -20,6 +20,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import priors
 from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Forecast, Z
+from shipdrag_ros.inference import priors as noise
 from shipdrag_ros.parameters import SPEEDS_M_S
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -218,20 +219,20 @@ def _gusts(u: Float64, a: Float64, time: Float64) -> Float64:
     """Return the covariance of a Gauss-Markov force, in parts of the deceleration."""
     size = priors.GUST.sd * a[-1] / a[:-1]
     damping = 2.0 * a[0] / u[0]
-    length = priors.GUST_TIME.mean / math.sqrt(damping)
+    length = noise.GUST_TIME.mean / math.sqrt(damping)
     return np.asarray(np.outer(size, size) * np.exp(-np.abs(time[:, None] - time) / length))
 
 
 def _drift(now: Beginning, time: Float64) -> Float64:
     """Return the variance of the way that the water makes."""
-    size = priors.DRIFT.sd * min(1.0, now.stop_m_s / priors.DRIFT_SPEED.mean)
-    ratio = time / priors.DRIFT_TIME.mean
-    slow = 2.0 * (size * priors.DRIFT_TIME.mean) ** 2 * (ratio + np.expm1(-ratio))
+    size = noise.WATER.mean * min(1.0, now.stop_m_s / noise.WATER_SPEED.mean)
+    ratio = time / noise.WATER_TIME.mean
+    slow = 2.0 * (size * noise.WATER_TIME.mean) ** 2 * (ratio + np.expm1(-ratio))
     return np.asarray(slow + (now.current_sd_m_s * time) ** 2)
 
 
 def _reading_sd(now: Beginning) -> float:
-    return max(priors.READING.sd * now.stop_m_s, priors.READING_OF_WHITE.sd * now.white_m_s)
+    return max(noise.LOG_LEAST.mean * now.stop_m_s, noise.LOG.mean * now.white_m_s)
 
 
 def _bands(median: Float64, size: Float64, scaled: Float64, added: Float64) -> Float64:

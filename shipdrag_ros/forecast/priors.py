@@ -8,23 +8,15 @@ Chosen on world A, cases 0 to 59, and on the measured records, as docs/forecast.
 
 from __future__ import annotations
 
-from shipdrag_ros.parameter import normal
-from shipdrag_ros.posterior.priors import Declared
+from shipdrag_ros.parameter import Declared, normal
 
 _WORLD = 'world A, records'
-_NOISE = 'as the priors of the noise'
 
 LEVEL = Declared('d', 'level of d: the size of r is what was measured', normal(1.0), '', _WORLD)
 EXPONENT = Declared('d', 'exponent of r over u, beside that of the form', normal(0.15), '', _WORLD)
 SMOOTH = Declared('d', 'a smooth rest of d', normal(0.06), '', _WORLD)
 ALIKE = Declared('d', 'over how much of ln u that rest is alike', 0.4, '', _WORLD)
 GUST = Declared('-', 'gust, of the deceleration at the stop', normal(0.04), '', _WORLD)
-GUST_TIME = Declared('-', 'gust, time: over the root of the damping', 18.0, '', _NOISE)
-DRIFT = Declared('-', 'slow motion of the water', normal(0.02), 'm/s', _NOISE)
-DRIFT_SPEED = Declared('-', 'less of it for craft that are slower', 5.0, 'm/s', _NOISE)
-DRIFT_TIME = Declared('-', 'slow motion of the water, time', 600.0, 's', _NOISE)
-READING = Declared('-', 'slow error of a log, of the speed at the stop', normal(1e-3), '', _NOISE)
-READING_OF_WHITE = Declared('-', 'at least so much of its white noise', normal(0.3), '', _NOISE)
 ANOTHER_RUN = Declared(
     '-',
     'r of the next run over that last known, less one: `--if-stopped-now`',
@@ -32,6 +24,7 @@ ANOTHER_RUN = Declared(
     '',
     'runs of one hull on one day',
 )
+FORM_OFF = Declared('-', 'form of r of a baseline, relative', normal(0.01), '', 'judgement')
 FORMS = ((0.0, 0.7), (0.03, 0.1), (0.1, 0.08), (0.3, 0.05), (0.6, 0.04), (0.9, 0.03))
 """Shares of a constant force in the deceleration at the stop, and their probabilities."""
 WIDTHS = ((1.0, 0.85), (3.0, 0.12), (10.0, 0.03))
@@ -47,21 +40,10 @@ def _families(letter: str, meaning: str, of: tuple[tuple[float, float], ...]) ->
     return Declared(letter, text, round(expected, 3), '', _WORLD)
 
 
-TABLE: tuple[Declared, ...] = (
+TABLE = (
     _families('f', 'share of a constant force in the deceleration at the stop', FORMS),
-    LEVEL,
-    EXPONENT,
-    SMOOTH,
-    ALIKE,
     _families('-', 'exponent and rest are wider by', WIDTHS),
     _families('-', 'errors of the estimate and gusts are larger by', ROUGHER),
-    GUST,
-    GUST_TIME,
-    DRIFT,
-    DRIFT_SPEED,
-    DRIFT_TIME,
-    READING,
-    READING_OF_WHITE,
-    ANOTHER_RUN,
+    *(each for each in vars().copy().values() if isinstance(each, Declared)),
 )
-"""What docs/model.md prints, in its order."""
+"""What docs/model.md prints, in its order; times of gusts, slow water and log: those of noise."""

@@ -25,7 +25,6 @@ from shipdrag_ros.simulation.scenario import Scenario
 
 _POINTS = 60
 _LOWEST = 0.05  # of the highest speed of a baseline
-_FORM_SD = 0.01  # by how much its form may be off, of r
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,9 @@ class HullNow:
         r = (newtons + added) / mass
         # a file errs alike at all speeds
         level_sd = float(np.hypot(priors.ANOTHER_RUN.sd, np.mean(sd / (newtons + added))))
-        return cls(KnownCurve(speed, r, _FORM_SD * r, np.ones(_POINTS), level_sd), source)
+        return cls(
+            KnownCurve(speed, r, priors.FORM_OFF.sd * r, np.ones(_POINTS), level_sd), source
+        )
 
 
 def _relative_sd(effect: StatedEffect) -> float:

@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shipdrag_ros.inference import priors
 from shipdrag_ros.inference.noise import (
     HOLD,
     SIZE,
@@ -35,40 +36,6 @@ _QUICK, _QUICK_KEPT = 13, 8  # of the points about the most probable setting, an
 _NEGLIGIBLE = 2e-3  # weight of a setting
 _FINE, _ROUGH = 0.02, 0.3  # of the logarithm of the evidence: how near the most probable one is
 LEAST_S = 300.0  # of record from which noise can be learnt; of less most is the prior's
-# At steady speed an engine that holds torque, power or revs gives more thrust to a ship that is
-# slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
-_TYPICAL_HOLD = 1.4
-# standard deviation of the logarithms, and medians of those that have a unit of their own
-_SD_OF_SIZE = (1.0, 0.8, 1.0, 1.6)
-_SD_OF_TIME = (0.9, 0.8, 1.1, 1.2)
-_SD_OF_WHITE, _SD_OF_HOLD = (0.6, 0.6, 0.4), 0.25
-_WHITE = (1.3, 1.3, 1.0)  # samples behind a filter err alike: their means scatter more
-_GUST_OF_R = 0.011  # of the resistance
-_GUST_S = 18.0  # over the root of the damping [1/s]: 60 to 300 s for ships, seconds for boats
-_WATER_M_S, _WATER_SPEED_M_S, _WATER_S = 0.02, 5.0, 600.0  # less where a craft is slower
-_LOG_OF_WHITE, _LOG_OF_SPEED, _LOG_S = 0.3, 1e-3, 40.0
-_PLACE_OF_SPEED_S, _PLACE_S = 0.1, 80.0
-
-DECLARED = (
-    ('gust', f'{_GUST_OF_R:g} r(u_0)', _SD_OF_SIZE[0], 'm/s^2'),
-    ('gust, time', f'{_GUST_S:g} / sqrt(damping)', _SD_OF_TIME[0], 's'),
-    ('water', f'{_WATER_M_S:g}, less below {_WATER_SPEED_M_S:g} m/s', _SD_OF_SIZE[1], 'm/s'),
-    ('water, time', f'{_WATER_S:g}', _SD_OF_TIME[1], 's'),
-    (
-        'log',
-        f'{_LOG_OF_WHITE:g} of white, at least {_LOG_OF_SPEED:g} u_0',
-        _SD_OF_SIZE[2],
-        'm/s',
-    ),
-    ('log, time', f'{_LOG_S:g}', _SD_OF_TIME[2], 's'),
-    ('place', f'white of a mean, at least {_PLACE_OF_SPEED_S:g} s u_0', _SD_OF_SIZE[3], 'm'),
-    ('place, time', f'{_PLACE_S:g}', _SD_OF_TIME[3], 's'),
-    ('white of log', f'{_WHITE[0]:g} of its scatter', _SD_OF_WHITE[0], '-'),
-    ('white over ground', f'{_WHITE[1]:g} of its scatter', _SD_OF_WHITE[1], '-'),
-    ('white of places', f'{_WHITE[2]:g} of its scatter', _SD_OF_WHITE[2], '-'),
-    ('hold of the engine', f"{_TYPICAL_HOLD:g} of the hull's damping", _SD_OF_HOLD, '-'),
-)
-"""Each prior: what of, median, standard deviation of the logarithm, unit."""
 
 
 def of_steady(rows: Rows, variance: Float64, damping_1_s: float, inertia: float) -> Seen:
@@ -202,21 +169,21 @@ def _prior(seen: Seen, speed_m_s: float) -> SizePrior:
     log_sd = white(LOG, white(OVER_GROUND, 0.0))
     medians = np.array(
         [
-            _GUST_OF_R * r_m_s2,
-            _GUST_S / np.sqrt(damping),
-            _WATER_M_S * min(1.0, speed_m_s / _WATER_SPEED_M_S),
-            _WATER_S,
-            max(_LOG_OF_WHITE * log_sd, _LOG_OF_SPEED * speed_m_s),
-            _LOG_S,
-            max(white(POSITION, 0.0), _PLACE_OF_SPEED_S * speed_m_s),
-            _PLACE_S,
-            *_WHITE,
-            _TYPICAL_HOLD,
+            priors.GUST.mean * r_m_s2,
+            priors.GUST_TIME.mean / np.sqrt(damping),
+            priors.WATER.mean * min(1.0, speed_m_s / priors.WATER_SPEED.mean),
+            priors.WATER_TIME.mean,
+            max(priors.LOG.mean * log_sd, priors.LOG_LEAST.mean * speed_m_s),
+            priors.LOG_TIME.mean,
+            max(white(POSITION, 0.0), priors.PLACE.mean * speed_m_s),
+            priors.PLACE_TIME.mean,
+            priors.WHITE_LOG.mean,
+            priors.WHITE_GROUND.mean,
+            priors.WHITE_PLACE.mean,
+            priors.HOLD.mean,
         ]
     )
-    sd = np.array(
-        [*np.column_stack([_SD_OF_SIZE, _SD_OF_TIME]).ravel(), *_SD_OF_WHITE, _SD_OF_HOLD]
-    )
+    sd = np.array([each.sd for each in priors.LEARNT])
     # water that moves is a matter of what is measured over ground
     active = np.array([True, bool(has[1:].any()), bool(has[:2].any()), bool(has[POSITION])])
     which = np.concatenate([np.repeat(active, 2), has, [seen.steady > 0]])

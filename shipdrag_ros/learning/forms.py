@@ -98,7 +98,7 @@ class LearnableForm:
             replace(q, prior=prior, low=-math.inf, high=math.inf)
             for q, prior in zip(plain.parameters, self.priors, strict=True)
         )
-        odds = self.odds * priors.UNNAMED_ODDS / SMOOTH_OVER_FORM
+        odds = self.odds * priors.UNNAMED_ODDS.mean / SMOOTH_OVER_FORM
         return replace(plain, parameters=parameters, odds=odds)
 
     def ways(self, ship: Ship, longest_s: float, runs: int) -> list[EffectWay]:

@@ -15,6 +15,7 @@ import numpy as np
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.coastdown import events
+from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.display import Table, duration, speed_unit, utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.estimation.force import Force, ForceCurve
@@ -132,7 +133,7 @@ class Coastdown(ShownResistance):
         return lambda axis: draw_resistance(axis, estimate, self.ship, truth=shown)
 
     def _title(self) -> str:
-        ended = words.ENDED_BY[self.event.ended_by]
+        ended = ENDED_BY[self.event.ended_by]
         return f'{utc(self.start_ns)}, {self.duration_s:.0f} s, until {ended}'
 
     def _columns(self) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
@@ -22,7 +22,6 @@ from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.forecast.result import places
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure, PastRun
-from shipdrag_ros.node.announcer import ENDED_BY
 from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
 from shipdrag_ros.ship import Ship
 
@@ -30,7 +29,6 @@ _PLACES = 7200  # kept, one a second at most
 _STEP_S = 10  # of the ship's time, between two answers to "if she were stopped now"
 _POSITIONS = [*GEODETIC, *GEODETIC.values()]
 _NOTHING_LEFT = 'she may no longer glide, or nothing is left to foretell'
-_ENDED_BY = {**ENDED_BY, EndedBy.RECORD_END: 'the record ends'}  # also of a bag that is played
 
 
 class Ahead:
@@ -128,7 +126,7 @@ class Ahead:
         Say why a forecast was withdrawn, once the coastdown has ended.
         """
         if self.forecast is not None and 'withdrawn' in self.forecast:
-            known = {each.value: text for each, text in _ENDED_BY.items()}
+            known = {each.value: text for each, text in ENDED_BY.items()}
             self.forecast['withdrawn'] = known.get(ended_by, ended_by)
 
     def if_stopped(

@@ -29,18 +29,7 @@ _LOOK = (
     '; if the engine was stopped there, `shipdrag diagnose BAG` of the recording holds all of it '
     'against the model'
 )
-ENDED_BY = {
-    events.EndedBy.SPEED: 'the minimum speed is reached',
-    events.EndedBy.TURN: 'the ship turned',
-    events.EndedBy.ENGINE: 'the engine drives again, or the speed settled',
-    events.EndedBy.BRAKE: 'something but the water stopped the ship',
-    events.EndedBy.ASTERN: 'the propeller was reversed',
-    events.EndedBy.DATA_STOP: 'the speed fell silent',
-    events.EndedBy.SILENCE: 'all sources of speed fell silent',
-    events.EndedBy.RESET: 'the memory was reset',
-    events.EndedBy.RECORD_END: 'the node stops',
-    events.EndedBy.GIVEN: 'given',
-}
+_ENDED_BY = {**events.ENDED_BY, events.EndedBy.RECORD_END: 'the node stops'}
 
 
 class LogLine(NamedTuple):
@@ -73,7 +62,7 @@ def line_of(event: events.Event) -> LogLine | None:
 
 def _ended(event: events.EndedCoastdown) -> LogLine:
     seconds = (event.end_ns - event.start_ns) * _NS
-    why = f'{event.ended_by.value}: {ENDED_BY[event.ended_by]}'
+    why = f'{event.ended_by.value}: {_ENDED_BY[event.ended_by]}'
     if event.withdrawn:
         return LogLine(f'a coastdown is refused after {duration(seconds)}: {event.failure}', True)
     text = f'a coastdown has ended after {duration(seconds)} ({why})'

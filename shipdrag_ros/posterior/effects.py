@@ -174,7 +174,7 @@ def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator
     if effect.nameless_at:
         fixed = tuple(effect.nameless_at.items())
         left = [q for q in effect.parameters_of(ship) if q.name not in effect.nameless_at]
-        less = math.log(priors.UNNAMED_ODDS / effect.odds)
+        less = math.log(priors.UNNAMED_ODDS.mean / effect.odds)
         for way in _alike(effect, left, longest_s, runs):
             log_odds = way.log_odds + less
             yield replace(way, fixed=way.fixed + fixed, log_odds=log_odds, nameless=True)

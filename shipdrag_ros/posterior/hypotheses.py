@@ -28,18 +28,16 @@ from shipdrag_ros.posterior.motion import EXTRAS
 from shipdrag_ros.posterior.problem import EXACT, RunModel
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame
+from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
 """Where something smooth without a name may be."""
 _FORMS, SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
-_PORT, _HEADING = EXTRAS, EXTRAS + 1  # behind the extras: place to port, and first heading
-_FREE = EXTRAS + 2  # shaft speed of a propeller that the water turns
-_SCATTER = EXTRAS + 3  # of the resistance from run to run
-_AIR = EXTRAS + 4, EXTRAS + 5  # that is light, to the east and to the north
-_LOCAL = EXTRAS + 6
+# behind the extras: place to port, first heading, shaft speed of a propeller that the water
+# turns, scatter of the resistance from run to run, light air to the east and to the north
+_PORT, _HEADING, _FREE, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 7)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
 _STEP_M_S = 0.1  # of differences
 _NOTHING = Action()
@@ -154,7 +152,7 @@ class Explanation:
     @property
     def log_odds(self) -> float:
         """Prior log odds over nothing."""
-        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
+        unnamed = math.log(priors.UNNAMED_ODDS.mean) if self.smooth else 0.0
         return sum(way.log_odds for way in self.ways) + unnamed
 
     @cached_property
@@ -258,7 +256,7 @@ class ShipRuns:
     def apart(self) -> bool:
         """Whether runs are of different days."""
         days = [run.frame.scenario.day for run in self.runs]
-        return (max(days) - min(days)) * DAY_S > priors.SAME_DAY_S
+        return (max(days) - min(days)) * 24.0 > priors.SAME_DAY.mean
 
     @cached_property
     def _own(self) -> list[int]:
@@ -343,7 +341,7 @@ class ShipRuns:
                     precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
                     for i, each in enumerate(components):
                         if which >> i & 1:
-                            precision[each] = priors.SMALL_COMPONENTS**-2.0
+                            precision[each] = priors.SMALL_COMPONENTS.mean**-2.0
                     means.append(mean)
                     precisions.append(precision)
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))

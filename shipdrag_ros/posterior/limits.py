@@ -89,7 +89,9 @@ def sizes_named(comparing: Comparing, never: Collection[str]) -> dict[str, float
         if where != IN_SPEED:  # which is a prior of the hull
             own = lines.left_open(replace(comparing.base, smooth=where))
             opened = np.tile(own, (len(sizes), 1))
-            unnamed.append(Rival(math.log(priors.UNNAMED_ODDS), alike, none, none, opened, sizes))
+            unnamed.append(
+                Rival(math.log(priors.UNNAMED_ODDS.mean), alike, none, none, opened, sizes)
+            )
     information = lines.information()
     # what is open about an effect grows with it
     norm = np.sqrt(np.maximum(np.diag(information), 0.0))

@@ -23,7 +23,7 @@ from shipdrag_ros.samples import Float64
 
 # unknowns behind the coefficients theta; the first four change the motion
 SPEED, THRUST, TAU, INERTIA, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GROUND_LAG = range(11)
-EXTRAS = 11
+EXTRAS = GROUND_LAG + 1
 OWN = EXTRAS - PLACE  # of each further instrument behind them, from its `PLACE` on
 _MOVING = 4
 

@@ -3,53 +3,16 @@
 Every prior of the model, as data.
 
 docs/model.md prints this table (`python docs/tables.py`). Those of the noise stand in
-`inference.learning`, those of an effect in `data/effects.yaml` or its module in
+`inference.priors`, those of an effect in `data/effects.yaml` or its module in
 `simulation.effects`, with the usual odds in `simulation.effect.Effect`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from shipdrag_ros.parameter import Prior, half_normal, log_normal, normal
-
-
-@dataclass(frozen=True)
-class Declared:
-    """
-    A prior with its letter, unit and source.
-
-    Attributes
-    ----------
-    letter
-        As in docs/model.md.
-    meaning
-    prior
-        A number where it is taken as known.
-    unit
-        '' for a pure number.
-    source
-        A publication, or the records that it was learnt from.
-    """
-
-    letter: str
-    meaning: str
-    prior: Prior | float
-    unit: str
-    source: str
-
-    @property
-    def mean(self) -> float:
-        """Mean of a normal prior, median of a log-normal one, or the number."""
-        return self.prior.first if isinstance(self.prior, Prior) else self.prior
-
-    @property
-    def sd(self) -> float:
-        """Standard deviation, of the logarithm of a log-normal one; 0 of a number."""
-        return self.prior.second if isinstance(self.prior, Prior) else 0.0
-
+from shipdrag_ros.parameter import Declared, half_normal, log_normal, normal
 
 _REALITY = 'records of many craft, as a range'
+_TAKEN = 'judgement'
 
 # the law of the hull
 GENERIC_FRICTION = Declared(
@@ -121,14 +84,14 @@ STOP = Declared(
 TOLD = Declared(
     't_0', 'time of a stop that a person tells', normal(5.0), 's', 'said within some seconds'
 )
-TOLD_CHANCE = 0.9
-"""That a stop that a person tells is one; else it is some time within the hour."""
+TOLD_CHANCE = Declared(
+    't_0', 'chance that such a stop is one, else it is within the hour', 0.9, '', _TAKEN
+)
 # the instruments
 LOG_SCALE = Declared('b_1', 'scale of a log, less one', normal(0.02), '', 'Doppler logs: 2 %')
 LOG_OFFSET = Declared('b_0', 'offset of a log', normal(0.02), 'm/s', 'zeroed logs')
-LOG_UNFILTERED = Declared(
-    'lambda', 'delay of a log without a filter: half of the logs', normal(0.3), 's', _REALITY
-)
+LOG_UNFILTERED = Declared('lambda', 'delay of a log without a filter', normal(0.3), 's', _REALITY)
+UNFILTERED_CHANCE = Declared('lambda', 'share of logs without a filter', 0.5, '', _REALITY)
 LOG_LAG = Declared(
     'lambda', 'filter of a log that has one', normal(4.0, mean=5.0), 's', '3 to 10 s'
 )
@@ -163,15 +126,6 @@ WIND_OFFSET = Declared(
 )
 WIND_GAIN = Declared('w', 'gain of an anemometer, less one', normal(0.05), '', _REALITY)
 WIND_TURNED = Declared('w', 'by which a vane is turned', normal(0.05), 'rad', _REALITY)
-YAW = Declared('-', 'heading of a minute about its course', normal(0.03), 'rad', 'yaw in waves')
-YAW_WANDERS = Declared(
-    '-',
-    'slow part of that, of ship and compass',
-    normal(0.04),
-    'rad',
-    'steady stretches of sailing records',
-)
-YAW_WANDERS_S = Declared('-', 'the same, time', 300.0, 's', _REALITY)
 AIR_AREA = Declared(
     'A C',
     'air drag area over V^(2/3), where the ship file states none',
@@ -191,7 +145,13 @@ FREE_SHAFT = Declared(
     '',
     'four-quadrant open-water data of B4-70',
 )
-_SHELTERED_M_S = 5.0
+SHELTERED = Declared(
+    '-',
+    'speed at the stop below which current and wind are weaker, by its square',
+    5.0,
+    'm/s',
+    'slow craft are tried in basins',
+)
 
 
 def sheltered(speed_m_s: float) -> float:
@@ -203,17 +163,28 @@ def sheltered(speed_m_s: float) -> float:
     speed_m_s
         At the stop.
     """
-    return min(1.0, speed_m_s / _SHELTERED_M_S) ** 2
+    return min(1.0, speed_m_s / SHELTERED.mean) ** 2
 
 
-SAME_DAY_S = 12 * 3600.0
-"""Between runs: farther apart the hull may be another, and the air is."""
-UNNAMED_ODDS = 0.015
-"""Prior odds of something smooth without a name, in each place where it may be."""
+SAME_DAY = Declared(
+    '-', 'time between runs from which hull and air may be others', 12.0, 'h', _TAKEN
+)
+UNNAMED_ODDS = Declared(
+    '-',
+    'odds of something smooth without a name, in each place where it may be',
+    0.015,
+    '',
+    _TAKEN,
+)
 SMOOTH_SIZES = (0.015, 0.05, 0.15, 0.5, 1.5)
 """Points of its size in time, relative to r or to the speed, all alike."""
-SMALL_COMPONENTS = 0.25
-"""Size of the components of a weak current or wind, which is as probable as a usual one."""
+SMALL_COMPONENTS = Declared(
+    '-',
+    'components of a weak current or wind over those of a usual one, which is as probable',
+    0.25,
+    '',
+    _TAKEN,
+)
 # what a hull may differ by: probabilities, and points of what a size is averaged over
 NOTHING, FRICTION_ALONE, SMOOTH = 'nothing', 'friction', 'smooth in u'
 CHANCES = {NOTHING: 0.4, FRICTION_ALONE: 0.3, SMOOTH: 0.3}
@@ -226,48 +197,91 @@ friction, waves and s where something smooth in u is missing."""
 WIDE = (0.01, 0.03, 0.1)
 """The same without a baseline."""
 ANOTHER_CRAFT = 'another craft'
-ANOTHER_CHANCE = 0.2
-"""Of a craft without a baseline that is no displacement ship, or far from clean."""
+ANOTHER_CHANCE = Declared(
+    '-',
+    'chance that a craft without a baseline is no displacement ship, or far from clean',
+    0.2,
+    '',
+    _TAKEN,
+)
 ANOTHER_LEVELS = (1.0, 4.0, 16.0, 64.0)
 """Of its resistance over that of the generic hull, all alike."""
 ANOTHER_SHAPES = (0.03, 0.1)
 """Sizes of its s, all alike."""
-SHIP_DRY = 1e-3
-"""Size of forces of a ship that water does not make, of r at the stop."""
-UNFILTERED_CHANCE = 0.5
-"""Of a log."""
-
-TABLE: tuple[Declared, ...] = (
-    GENERIC_FRICTION,
-    GENERIC_WAVE,
-    GENERIC_HUMPS,
-    LAW_ERROR,
-    SHAPE_OF_MORE,
-    THRUST,
-    RUN_DOWN,
-    RUN_DOWN_SHAPE,
-    STOP,
-    TOLD,
-    LOG_SCALE,
-    LOG_OFFSET,
-    LOG_UNFILTERED,
-    LOG_LAG,
-    GROUND_LAG,
-    CURRENT,
-    CALM_CURRENT,
-    FREE_SHAFT,
-    WRONG,
-    LIGHT_AIR,
-    WINDY,
-    WIND_OFFSET,
-    WIND_GAIN,
-    WIND_TURNED,
-    YAW,
-    YAW_WANDERS,
-    YAW_WANDERS_S,
-    AIR_AREA,
-    DEPTH_READ,
-    LENGTH_OVER_BREADTH,
-    BLOCK,
+SHIP_DRY = Declared(
+    '-', 'forces of a ship that water does not make, of r at the stop', 1e-3, '', _TAKEN
 )
+
+# the diagnosis' other instruments
+COMPASS = Declared('-', 'error of a compass, leeway included', normal(0.03), 'rad', _TAKEN)
+COURSE = Declared(
+    '-',
+    'direction through water by the way over ground alone',
+    normal(0.1),
+    'rad',
+    _TAKEN,
+)
+YAW = Declared('-', 'yaw of a mean over a minute', normal(0.03), 'rad', 'a ship yaws in the waves')
+YAW_WANDERS = Declared(
+    '-',
+    'slow part of that, of ship and compass',
+    normal(0.04),
+    'rad',
+    'steady stretches of sailing records',
+)
+YAW_WANDERS_S = Declared('-', 'the same, time', 300.0, 's', _REALITY)
+SHAFT = Declared('-', 'shaft speed in a minute, of the steady one', normal(0.03), '', _TAKEN)
+SHAFT_OFF = Declared('-', 'the same of all minutes of a glide', normal(0.05), '', _TAKEN)
+SHAFT_FALL = Declared(
+    'tau',
+    'logarithm of the run-down of the thrust over that of a shaft that is seen to stop',
+    normal(0.6),
+    '',
+    'thrust is gone before or after its shaft stands, by the propeller and engine',
+)
+DRIVEN_SHAFT = Declared(
+    '-',
+    'share of propellers not locked whose shaft turns on, at no pitch',
+    0.13,
+    '',
+    _TAKEN,
+)
+# stated errors, and sailing without a coastdown
+STATED_POWER = Declared(
+    '-', 'power of a stated variance that holds', normal(0.5, mean=1.0), '', _TAKEN
+)
+SAILING_LOG = Declared(
+    '-', 'white and slow error of a log over a usual residual', log_normal(1.0, 1.0), '', _TAKEN
+)
+SAILING_WATER = Declared('-', 'slow motion of the water', log_normal(0.04, 0.7), 'm/s', _TAKEN)
+SAILING_LOG_TIME = Declared('-', 'slow error of a log, time', log_normal(120.0, 0.8), 's', _TAKEN)
+SAILING_WATER_TIME = Declared(
+    '-', 'slow motion of the water, time', log_normal(1200.0, 0.8), 's', _TAKEN
+)
+SAILING_SCALE = Declared('-', 'scale of a log in order, less one', normal(0.005), '', _TAKEN)
+SAILING_CURRENT = Declared(
+    '-', 'steady current that is not worth a word', normal(0.02), 'm/s', _TAKEN
+)
+UNSTATED_FORM = Declared(
+    '-', 'relative sd of a baseline learnt from runs too few to show it', 0.05, '', _TAKEN
+)
+# several runs, and earlier diagnoses
+DIFFERS = Declared(
+    '-', 'chance that an effect of the hull differs between runs of one day', 0.03, '', _TAKEN
+)
+DIFFERS_LATER = Declared('-', 'the same of runs of other days', 0.3, '', _TAKEN)
+EARLIER_ERRS = Declared(
+    '-', 'share of earlier diagnoses that are wrong of an effect', 0.02, '', _TAKEN
+)
+EARLIER_COUNTS = Declared(
+    '-', 'power of the likelihood of an earlier diagnosis', 0.5, '', 'Ibrahim and Chen (2000)'
+)
+EARLIER_UNSEEN = Declared(
+    '-', 'share of the effects there that a diagnosis does not list', 0.5, '', _TAKEN
+)
+EARLIER_SIZE = Declared(
+    '-', 'by which a size that stays differs from the one found', normal(0.1), '', _TAKEN
+)
+
+TABLE = tuple(each for each in vars().copy().values() if isinstance(each, Declared))
 """What docs/model.md prints, in its order."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -261,7 +261,7 @@ def _extras(
 
 def _any_lag() -> tuple[float, float]:
     """Return mean and sd of the filter of a log that may have none."""
-    none, some, chance = priors.LOG_UNFILTERED, priors.LOG_LAG, priors.UNFILTERED_CHANCE
+    none, some, chance = priors.LOG_UNFILTERED, priors.LOG_LAG, priors.UNFILTERED_CHANCE.mean
     mean = chance * none.mean + (1.0 - chance) * some.mean
     within = chance * none.sd**2 + (1.0 - chance) * some.sd**2
     return mean, math.sqrt(within + chance * (1.0 - chance) * (some.mean - none.mean) ** 2)
@@ -285,7 +285,7 @@ def _all_families(
         mean = np.concatenate([[each[0] for each in scales], zeros, *of_weather, extra_mean])
         sizes = np.full(len(law.shapes), size)
         humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
-        dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY))
+        dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY.mean))
         of_weather = [each.sd for each in state]
         sd = np.concatenate(
             [[each[1] for each in scales], sizes, humps, dry, *of_weather, extra_sd]
@@ -297,13 +297,13 @@ def _all_families(
         yield Family(name, chance, mean, 1.0 / sd**2, level)
 
 
-def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, priors.Declared | None]]:
+def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, Declared | None]]:
     """Yield probability and prior of the filter of a log: none, or one."""
     if LOG not in kinds:
         yield 1.0, None
         return
-    yield priors.UNFILTERED_CHANCE, priors.LOG_UNFILTERED
-    yield 1.0 - priors.UNFILTERED_CHANCE, priors.LOG_LAG
+    yield priors.UNFILTERED_CHANCE.mean, priors.LOG_UNFILTERED
+    yield 1.0 - priors.UNFILTERED_CHANCE.mean, priors.LOG_LAG
 
 
 class _Hull(NamedTuple):
@@ -330,10 +330,10 @@ def _generic_hulls() -> Iterator[_Hull]:
             (level * (1.0 + wave.mean) - 1.0, level * wave.sd),
         )
 
-    ships = (1.0 - priors.ANOTHER_CHANCE) / len(priors.WIDE)
+    ships = (1.0 - priors.ANOTHER_CHANCE.mean) / len(priors.WIDE)
     for size in priors.WIDE:
         yield _Hull(priors.SMOOTH, ships, scales(1.0), size)
-    others = priors.ANOTHER_CHANCE / len(priors.ANOTHER_LEVELS) / len(priors.ANOTHER_SHAPES)
+    others = priors.ANOTHER_CHANCE.mean / len(priors.ANOTHER_LEVELS) / len(priors.ANOTHER_SHAPES)
     for level, size in product(priors.ANOTHER_LEVELS, priors.ANOTHER_SHAPES):
         yield _Hull(priors.ANOTHER_CRAFT, others, scales(level), level * size, level, level)
 

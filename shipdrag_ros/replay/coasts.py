@@ -25,7 +25,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.given_window import parts_of_one_clock
+from shipdrag_ros.replay.given_window import margin_around_ns, parts_of_one_clock
 from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed, recorded_parameters
 from shipdrag_ros.samples import (
     ALL_MOTION,
@@ -42,7 +42,6 @@ DISMISSED = (
     'she lost speed without thrust, but not as water alone slows a ship; no coastdown is taken '
     'from it'
 )
-_SET_CLOCK_S = 10.0
 _CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
 _MOST = 0.5  # of the messages of an input
 
@@ -202,9 +201,7 @@ def window_between(
     """
     parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
     before_ns = round(parameters.steady_s * SECOND_NS)
-    # the validation looks back; stamps may differ from times of arrival
-    margin_s = parameters.frozen_s + parameters.late_s + _SET_CLOCK_S
-    margin_ns = round(margin_s * SECOND_NS)
+    margin_ns = margin_around_ns(parameters)
     first_ns = max(start_ns - before_ns - margin_ns, 0)
     inputs = result.run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])

@@ -21,7 +21,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8, concatenate
 from shipdrag_ros.ship import Ship
 
-_SET_CLOCK_NS = 10 * SECOND_NS
+_SET_CLOCK_S = 10.0
 
 
 class WindowSamples(NamedTuple):
@@ -87,7 +87,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     start_ns = span[0] + round(start_s * SECOND_NS)
     # of what is not there, nothing
     end_ns = span[1] if end_s >= length_s else span[0] + round(end_s * SECOND_NS)
-    margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
+    margin_ns = margin_around_ns(parameters)
     around = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
     block = concatenate([item for item in around if isinstance(item, Block)])
     inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
@@ -101,6 +101,13 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
         clock_ns = int(block.stamp_ns[first] - block.receive_ns[first])
         start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
     return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
+
+
+def margin_around_ns(parameters: Parameters) -> int:
+    """
+    Return how far around a window to read: the validation looks back, and clocks may differ.
+    """
+    return round((parameters.frozen_s + parameters.late_s + _SET_CLOCK_S) * SECOND_NS)
 
 
 def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> EndedCoastdown:

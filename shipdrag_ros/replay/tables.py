@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, EndedCoastdown, NotCoastdown
 from shipdrag_ros.display import Table, spreadsheet_text
 from shipdrag_ros.estimation import tables
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
@@ -37,7 +37,7 @@ def facts(coastdown: EndedCoastdown) -> Table:
     rows: list[tuple[str, ...]] = [
         ('start', display.utc(coastdown.start_ns)),
         ('duration', display.duration(seconds)),
-        ('ended because', words.ENDED_BY[coastdown.ended_by]),
+        ('ended because', ENDED_BY[coastdown.ended_by]),
     ]
     if coastdown.onset_detected_ns is not None:
         # from where it seemed to begin, which may have been cut since
@@ -68,7 +68,7 @@ def coastdowns_table(runs: Sequence[RunResult]) -> Table:
                     display.utc(coastdown.start_ns),
                     run.bag,
                     *(cell or '-' for cell in cells),
-                    coastdown.failure or words.ENDED_BY[coastdown.ended_by],
+                    coastdown.failure or ENDED_BY[coastdown.ended_by],
                 )
             )
     heads = ('start', 'bag', 'at', 'resistance', 'effective power', 'clean hull', 'ended because')

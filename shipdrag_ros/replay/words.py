@@ -4,26 +4,13 @@
 from __future__ import annotations
 
 from shipdrag_ros import __version__
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Regimes
+from shipdrag_ros.coastdown.events import EndedCoastdown, Regimes
 from shipdrag_ros.display import duration, plus_minus
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.replay import Recorded
 from shipdrag_ros.ship import Ship
 
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
-
-ENDED_BY = {
-    EndedBy.SPEED: 'the minimum speed was reached',
-    EndedBy.TURN: 'the ship turned',
-    EndedBy.ENGINE: 'the engine drove the ship again',
-    EndedBy.BRAKE: 'something but the water stopped the ship',
-    EndedBy.ASTERN: 'the propeller was reversed',
-    EndedBy.DATA_STOP: 'the data stopped',
-    EndedBy.SILENCE: 'all sources of speed fell silent',
-    EndedBy.RESET: 'the memory was reset',
-    EndedBy.RECORD_END: 'the record ended',
-    EndedBy.GIVEN: 'the window was given by hand',
-}
 
 
 def explained(regimes: Regimes) -> str:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The systems of S2 to S5, which no coastdown needs: every package here is one.
+The systems of S1 to S5, which no coastdown needs: every package here is one.
 
-A study that has a verb says so in a `STUDY`; its page and its verb stand in its
-`face/`, where the command line finds them. A package installed beside this one adds a
-study of its own by an entry point of the group `shipdrag.papers`, `NAME = PACKAGE:STUDY`.
+Estimators of a study stand in its folder `estimators`. A study that has a verb says so in a
+`STUDY`; its page and its verb stand in its `face/`, where the command line finds them. A package
+installed beside this one adds a study of its own by an entry point of the group
+`shipdrag.papers`, `NAME = PACKAGE:STUDY`.
 """
 
 from __future__ import annotations

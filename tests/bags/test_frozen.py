@@ -17,9 +17,10 @@ from mcap.reader import make_reader
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import info, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.writer import RecordWriter, attachment
+from shipdrag_ros.bags.writer import RecordWriter, attachment, content_of
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.parameters import Parameters
 
 FOLDER = Path(__file__).parent / 'frozen'
@@ -58,12 +59,12 @@ def test_a_parameter_that_is_gone_is_left_out_of_a_bag_and_an_error_in_a_file(
             bag.add_attachment(attachment(name, '\n'.join([*kept, gone])))
         with (FOLDER / 'recorded_by_0.1.0.mcap').open('rb') as file:
             for schema, channel, message in make_reader(file).iter_messages():
-                bag.add(
+                number, times = (
                     bag.declare(channel, schema),
-                    message.data,
-                    log_ns=message.log_time,
-                    publish_ns=message.publish_time,
+                    (message.log_time, message.publish_time),
                 )
+                content = content_of(number, EncodedMessage('', '', message.data, *times))
+                bag.add_content(number, content, log_ns=message.log_time)
     assert main(['replay', str(path)]) == 0
     said = ' '.join(capsys.readouterr().out.split())
     assert 'parameters.yaml: wake_s: unknown key' in said

@@ -15,7 +15,7 @@ from shipdrag_ros.estimation.distance import (
     evaluate,
     refit,
 )
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis
 
 
 @pytest.mark.parametrize('n', [13, 100, 500, 2000])

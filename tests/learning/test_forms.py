@@ -73,5 +73,7 @@ def test_something_smooth_is_more_probable_than_any_form() -> None:
     for form in FORMS:
         # of nine days: what changes a hull once in a hundred days is rarer
         rare = 0.09 if form.kind[1] == 'date' else 1.0
-        assert form.effect().odds == pytest.approx(rare * priors.UNNAMED_ODDS / SMOOTH_OVER_FORM)
+        assert form.effect().odds == pytest.approx(
+            rare * priors.UNNAMED_ODDS.mean / SMOOTH_OVER_FORM
+        )
     assert 10.0 <= SMOOTH_OVER_FORM <= 100.0

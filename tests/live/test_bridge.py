@@ -242,7 +242,7 @@ def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> N
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.end_ns, bridge)
     checked = bridge.parts(0.0)['forecast']
-    assert checked['withdrawn'] == 'the record ends'
+    assert checked['withdrawn'] == 'the record ended'
     assert bridge.parts(0.0)['track']['over']
     foretold_s, low_s, high_s = checked['foretold_s']
     assert low_s < checked['was_s'] < high_s

@@ -48,7 +48,7 @@ def test_every_effect_of_the_library_has_ways_that_act() -> None:
         odds = {way.mode: (way.nameless, np.exp(way.log_odds)) for way in ways}
         named, nameless = (sum(p for n, p in odds.values() if n is each) for each in (False, True))
         assert np.isclose(named, effect.odds), effect.name
-        assert np.isclose(nameless, UNNAMED_ODDS if effect.nameless_at else 0.0), effect.name
+        assert np.isclose(nameless, UNNAMED_ODDS.mean if effect.nameless_at else 0.0), effect.name
         for way in ways:
             assert way.action(frame, way.tried()) != Action(), effect.name
             assert len(way.start) == len(way.unknowns)

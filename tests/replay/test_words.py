@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, EndedBy, EndedCoastdown
 from shipdrag_ros.replay import Recorded, words
 from shipdrag_ros.ship import Ship
 
 
 def test_every_end_has_words() -> None:
-    assert set(words.ENDED_BY) == set(EndedBy)
+    assert set(ENDED_BY) == set(EndedBy)
 
 
 def test_the_comparison_with_the_bag_is_said() -> None:

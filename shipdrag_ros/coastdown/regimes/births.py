@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import balance, hull_law
+from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, balance, hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
     A_VAR,
@@ -69,7 +69,6 @@ _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are o
 _THIN_EVERY = 6  # bins
 _NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
-_ROOT = math.sqrt(2.0 * math.pi)
 
 
 @compiled(uncounted=True)
@@ -429,7 +428,7 @@ def _children(
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
         if not np.isnan(setting.told_s):
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
-            told = 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
+            told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
             stop, level = stop + n.TOLD[0] * told, level + (1.0 - n.TOLD[0]) * told
         glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
         brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)

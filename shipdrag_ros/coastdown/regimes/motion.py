@@ -84,7 +84,7 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
-_ROOT = math.sqrt(2.0 * math.pi)
+ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 _WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
 _LONGEST = math.log(float(n.LOG_LAG_MOST) / _LAG_S)
 _REVERSED = -0.05  # of the steady revs
@@ -299,8 +299,8 @@ def _take(
     wider = total + (_WIDER * _WIDER - 1.0) * variance
     usual = (1.0 - n.BAD - _WIDE) * math.exp(-0.5 * off * off / total) / math.sqrt(total)
     wide = _WIDE * math.exp(-0.5 * off * off / wider) / math.sqrt(wider)
-    density = (usual + wide) / _ROOT + n.BAD * bad
-    usual, wide = usual / (_ROOT * density), wide / (_ROOT * density)
+    density = (usual + wide) / ROOT_TWO_PI + n.BAD * bad
+    usual, wide = usual / (ROOT_TWO_PI * density), wide / (ROOT_TWO_PI * density)
     if usual + wide > 1e-6:
         gain = usual / total + wide / wider
         around = (usual / total**2 + wide / wider**2 - gain * gain) * off * off
@@ -311,12 +311,12 @@ def _take(
                 p[j, k] += more * work[0, k]
                 p[k, j] = p[j, k]
         x[LN_U] = _bounded(hull, x[LN_U])
-    return math.log(density), 0.5 + math.log(density * _ROOT * math.sqrt(total))
+    return math.log(density), 0.5 + math.log(density * ROOT_TWO_PI * math.sqrt(total))
 
 
 @compiled(inline=True, uncounted=True)
 def _normal(off: float, sd: float) -> float:
-    return math.exp(-0.5 * (off / sd) ** 2) / (_ROOT * sd)
+    return math.exp(-0.5 * (off / sd) ** 2) / (ROOT_TWO_PI * sd)
 
 
 @compiled(inline=True, uncounted=True)
@@ -325,7 +325,7 @@ def _untrue(f: Float64, column: int, value: float, wide: float, bad: float) -> f
     off = value - f[column]
     stays = 0.0 if np.isnan(off) else n.STUCK * _normal(off, wide)
     density = stays + (1.0 - n.STUCK) * bad
-    f[EXCESS] += 0.5 + math.log(density * _ROOT * wide)
+    f[EXCESS] += 0.5 + math.log(density * ROOT_TWO_PI * wide)
     share = stays / density
     f[column] = value if share < 0.1 else f[column] + 0.1 * share * off
     return math.log(density)

@@ -122,7 +122,7 @@ SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')
 TOLD = _grid(
     'TOLD',
-    (priors.TOLD_CHANCE, priors.TOLD.sd),
+    (priors.TOLD_CHANCE.mean, priors.TOLD.sd),
     '1, s',
     'a stop that a person tells is one: chance, and error',
 )

@@ -9,7 +9,6 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
-    FIRST_TRACK,
     PER_UNIT,
     SOURCES,
     SPEED,
@@ -18,8 +17,8 @@ from shipdrag_ros.coastdown.bins import (
     mean_place,
     mean_turning,
 )
+from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
 from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
-from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND, Channel, Float64
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The estimators: every module in this folder is one.
+The estimators: every module in this folder is one, and in that of a study.
 
 A new estimator is a new module with an `ESTIMATOR` of its own name. The parameter `estimator`,
-the report and the documentation find it here; a module is imported when it is asked for. One of
+the report and the documentation find it; a module is imported when it is asked for. One of
 another package is an entry point of the group `shipdrag.estimators`, `NAME = PACKAGE:ESTIMATOR`.
 """
 
@@ -14,19 +14,12 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, wraps
-from importlib import import_module
-from importlib.metadata import entry_points
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import EstimationError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.parameters import (
-    ESTIMATOR_GROUP,
-    FORMER_ESTIMATORS,
-    OWN_ESTIMATORS,
-    Parameters,
-)
+from shipdrag_ros.parameters import ESTIMATOR_POINTS, FORMER_ESTIMATORS, Parameters
 from shipdrag_ros.ship import Ship
 
 _P = ParamSpec('_P')
@@ -127,7 +120,7 @@ def named(name: str) -> Estimator:
     Raises
     ------
     EstimationError
-        If one of another package cannot be loaded.
+        If it cannot be loaded.
     """
     found = _load(FORMER_ESTIMATORS.get(name, name))
     live = None if found.live is None else shielded(found.live)
@@ -135,12 +128,8 @@ def named(name: str) -> Estimator:
 
 
 def _load(name: str) -> Estimator:
-    if name in OWN_ESTIMATORS:
-        found = import_module(f'{__name__}.{name}').ESTIMATOR
-        assert isinstance(found, Estimator)
-        return found
     try:
-        found = next(iter(entry_points(group=ESTIMATOR_GROUP, name=name))).load()
+        found = ESTIMATOR_POINTS[name].load()
         if not isinstance(found, Estimator) or found.name != name:
             raise TypeError(f'{found!r}, expected an Estimator of this name')
     except Exception as error:  # whatever the code of a stranger does

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.regression.least_squares import LinearFit, least_squares
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.least_squares import LinearFit, least_squares
 from shipdrag_ros.studies.surface.fit import Domain, Prediction
 
 REQUIRED = ('L_B', 'B_T', 'Fr')

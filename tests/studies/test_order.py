@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipdrag_ros.regression.order import SIGNIFICANCE, OrderTable, fit_orders
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
+from shipdrag_ros.studies.order import SIGNIFICANCE, OrderTable, fit_orders
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis
 
 
 def plateau_order(table: OrderTable) -> int:

@@ -208,7 +208,7 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
     Examples
     --------
     >>> import numpy as np
-    >>> from shipdrag_ros.regression.least_squares import least_squares
+    >>> from shipdrag_ros.studies.least_squares import least_squares
     >>> x = np.arange(4.0)
     >>> fit = least_squares(np.column_stack([np.ones(4), x]), 1.0 + 2.0 * x)
     >>> [f'{value:.3f}' for value in fit.coefficients]

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.regression.least_squares import inverse, least_squares, triangle
+from shipdrag_ros.studies.least_squares import inverse, least_squares, triangle
 
 
 def polynomial(n: int = 40, p: int = 4) -> np.ndarray:
@@ -126,7 +126,7 @@ def test_inverse() -> None:
 def test_threads_of_blas_change_no_bit() -> None:
     code = (
         'import numpy as np, zlib\n'
-        'from shipdrag_ros.regression.least_squares import triangle\n'
+        'from shipdrag_ros.studies.least_squares import triangle\n'
         'rows = np.random.default_rng(0).normal(size=(30000, 41))\n'
         'print(zlib.crc32(triangle(rows).tobytes()))\n'
     )

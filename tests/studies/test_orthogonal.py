@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
 
 START_NS = 1_700_000_000_123_456_789
 EVEN = START_NS + np.round(np.linspace(0.0, 1500e9, 40)).astype(np.int64)
@@ -114,7 +114,7 @@ def test_a_gap_before_a_few_late_samples_is_caught_and_counted(
         assert cosines(basis) < 1e-12
         with monkeypatch.context() as patch:
             # what the recurrence alone does with these times
-            patch.setattr('shipdrag_ros.regression.orthogonal.ORTHOGONALITY_LOST', 1e9)
+            patch.setattr('shipdrag_ros.studies.orthogonal.ORTHOGONALITY_LOST', 1e9)
             assert cosines(OrthogonalBasis.on(time, 20)) > 1e-6
 
 

@@ -16,8 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis
 
 SIGNIFICANCE = 0.05  # a step less probable than this by chance counts as a fall of s^2
 IMPLAUSIBLE = 1e-3  # an s^2 less probable than this contradicts a known variance

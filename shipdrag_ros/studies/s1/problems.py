@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.estimation.curve import PolynomialMotion
 from shipdrag_ros.estimation.result import OrderTrial
-from shipdrag_ros.regression.least_squares import inverse, triangle
-from shipdrag_ros.regression.order import OrderTable, fit_orders, rounding
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.studies.least_squares import inverse, triangle
+from shipdrag_ros.studies.order import OrderTable, fit_orders, rounding
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.s1.motion import PolynomialMotion
 
 
 @dataclass(frozen=True)

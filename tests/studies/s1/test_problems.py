@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipdrag_ros.estimation.curve import sigma
-from shipdrag_ros.estimation.s1.problems import ScalarInput, Solution, solve_joint, solve_one
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.s1.motion import sigma
+from shipdrag_ros.studies.s1.problems import ScalarInput, Solution, solve_joint, solve_one
 
 START_NS = 1_700_000_000_123_456_789
 

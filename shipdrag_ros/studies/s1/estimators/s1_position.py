@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """S1 as published: position alone."""
 
-from shipdrag_ros.estimation.s1.estimate import published
+from shipdrag_ros.studies.s1.estimate import published
 
 ESTIMATOR = published('s1_position', 'orthogonal polynomial, position alone')

@@ -135,7 +135,7 @@ class OrthogonalBasis:
         Examples
         --------
         >>> import numpy as np
-        >>> from shipdrag_ros.regression.orthogonal import OrthogonalBasis
+        >>> from shipdrag_ros.studies.orthogonal import OrthogonalBasis
         >>> time = np.linspace(-1.0, 1.0, 50)
         >>> basis = OrthogonalBasis.on(time, 3)
         >>> coefficients, _ = basis.fit(time**2)

@@ -13,20 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import AtEnd, ValidRange, resistance_curve
+from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.estimators import Estimator
 from shipdrag_ros.estimation.result import Estimate, Track
-from shipdrag_ros.estimation.s1.problems import (
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.s1.motion import at_end, resistance_curve
+from shipdrag_ros.studies.s1.problems import (
     ScalarInput,
     Solution,
     solve_joint,
     solve_one,
 )
-from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.ship import Ship
 
 _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is evaluated
 
@@ -83,7 +84,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return Estimate(
         parameters.estimator,
         **ValidRange.of_polynomial(curve)._asdict(),
-        **AtEnd.of(motion, ship)._asdict(),
+        **at_end(motion, ship)._asdict(),
         calm=curve,
         conditions=curve,
         start_ns=fit.scale.first_ns,

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Series, Window
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
-from shipdrag_ros.estimation.s1.estimate import estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
+from shipdrag_ros.studies.s1.estimate import estimate
 
 START_NS = 1_700_000_000_123_456_789
 END_NS = START_NS + 1500 * 10**9
