@@ -113,6 +113,7 @@ class Monitor:
         self._regimes: RegimeFilter | None = None  # while awake
         # until when glides, whole ones, and what was none were told
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
+        self._goes_on = True  # what was told of a glide may not be all of it
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -399,12 +400,16 @@ class Monitor:
         return [self._begin(dated, number), *self._end(dated, regimes, otherwise, last_ns)]
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
-        """Return the glides that were not told; of one that was said to have ended, the rest."""
+        """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         for each in regimes.glides():
             if each.begin_s >= since_s:
                 found.append(each)
-            elif each.ended_by is None and each.end_s >= since_s + numbers.SHORTEST_S:
+            elif (
+                self._goes_on
+                and each.ended_by is None
+                and each.end_s >= since_s + numbers.SHORTEST_S
+            ):
                 found.append(each.since(since_s))
         return found
 
@@ -456,6 +461,8 @@ class Monitor:
         assert self._running is not None
         events = self._running.end(dated, ended_by, regimes.regimes(), self._final_estimator)
         self._running, self._reported_s = None, dated.end_s
+        # noise of the speed begins no other glide of a ship that was too slow
+        self._goes_on = dated.ended_by is not None or ended_by is not EndedBy.SPEED
         self._memory.watch.update_ns[0] = ALWAYS
         return events
 

@@ -444,11 +444,14 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
             density = 0.9 * _off(nu, last) + (0.1 / n.CREEPS if nu < n.CREEPS else 0.0)
         _holds(f, nu, density, scaled)
         return density
-    moves = 0.1 if kind == HELD and scaled else 0.01
+    moves = 0.01
     if not scaled and (kind != HELD or min(nu, revs) < n.CREEPS):
         moves = 0.0  # an engine starts and stops such a screw, and what is stuck stays
-    density = (1.0 - moves) * _off(nu, revs) + moves
-    if kind == HELD:  # a sensor that is stuck stays where it was
+    stays = (1.0 - moves) * _off(nu, revs)
+    density = stays + moves
+    if kind == HELD and scaled:  # revs that creep are not held
+        f[REVS] += (moves + 0.1 * stays) / density * (nu - revs)
+    elif kind == HELD:  # a sensor that is stuck stays where it was
         _holds(f, nu, density, scaled)
     return density
 
