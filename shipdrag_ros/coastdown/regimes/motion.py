@@ -437,6 +437,8 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         # or anything below its last: it runs down
         below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+        if scaled and not np.isnan(revs):  # mostly a little
+            below = 0.5 * below + 0.5 * _off(nu, 0.9 * last)
         if not scaled:  # and does not stay
             below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
         density = 0.5 * stands + 0.5 * below
