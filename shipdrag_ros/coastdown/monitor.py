@@ -436,9 +436,12 @@ class Monitor:
         start_ns = self._running.onset.start_ns
         dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
         if dated:
-            events = self._end(dated[0], regimes, ended_by, last_ns)
-            for one in dated[1:]:
-                events += self._all_of(one, regimes, number, ended_by or EndedBy.ENGINE, last_ns)
+            otherwise, *more = ended_by or EndedBy.ENGINE, *dated[1:]
+            # only the last of them goes on at the last sample
+            events = self._end(dated[0], regimes, ended_by, None if more else last_ns)
+            for one in more:
+                last = last_ns if one is more[-1] else None
+                events += self._all_of(one, regimes, number, otherwise, last)
             return events
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
