@@ -115,6 +115,7 @@ class Monitor:
         self._regimes: RegimeFilter | None = None  # while awake
         # until when glides, whole ones, and what was none were told
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
+        self._goes_on = True  # what was told of a glide may not be all of it
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -401,12 +402,16 @@ class Monitor:
         return [self._begin(dated, number), *self._end(dated, regimes, otherwise, last_ns)]
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
-        """Return the glides that were not told; of one that was said to have ended, the rest."""
+        """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         for each in regimes.glides():
             if each.begin_s >= since_s:
                 found.append(each)
-            elif each.ended_by is None and each.end_s >= since_s + numbers.SHORTEST_S:
+            elif (
+                self._goes_on
+                and each.ended_by is None
+                and each.end_s >= since_s + numbers.SHORTEST_S
+            ):
                 found.append(each.since(since_s))
         return found
 
@@ -433,9 +438,12 @@ class Monitor:
         start_ns = self._running.onset.start_ns
         dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
         if dated:
-            events = self._end(dated[0], regimes, ended_by, last_ns)
-            for one in dated[1:]:
-                events += self._all_of(one, regimes, number, ended_by or EndedBy.ENGINE, last_ns)
+            otherwise, *more = ended_by or EndedBy.ENGINE, *dated[1:]
+            # only the last of them goes on at the last sample
+            events = self._end(dated[0], regimes, ended_by, None if more else last_ns)
+            for one in more:
+                last = last_ns if one is more[-1] else None
+                events += self._all_of(one, regimes, number, otherwise, last)
             return events
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
@@ -458,6 +466,8 @@ class Monitor:
         assert self._running is not None
         events = self._running.end(dated, ended_by, regimes.regimes(), self._final_estimator)
         self._running, self._reported_s = None, dated.end_s
+        # noise of the speed begins no other glide of a ship that was too slow
+        self._goes_on = dated.ended_by is not None or ended_by is not EndedBy.SPEED
         self._memory.watch.update_ns[0] = ALWAYS
         return events
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.propulsion_found import stops
+from benchmarks.worlds.propulsion.score import SUITES, score
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Onset
 from shipdrag_ros.parameters import Parameters
@@ -43,6 +45,18 @@ def test_the_minimum_speed_ends_it(ship, watch, record, seed: int) -> None:
     at = np.argmin(np.abs(block.stamp_ns - coastdown.end_ns))
     mean = np.mean(block.value[at - 60 : at + 1, 0])
     np.testing.assert_allclose(mean, ship.speed(0.05), atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ('kind', 'hull', 'seed'), [('declutched', 'tanker', 45), ('slow run-down', 'ferry', 95)]
+)
+def test_noise_of_positions_begins_no_other_of_a_ship_that_is_too_slow(
+    monkeypatch, kind: str, hull: str, seed: int
+) -> None:
+    monkeypatch.setenv('SPANS', '1')  # no r(v) is estimated
+    (case,) = [each for each in stops([seed], True) if (each.kind, each.hull) == (kind, hull)]
+    (row,) = score(case, {'track': SUITES['track + shaft']})
+    assert (row.found, row.why) == (True, '')
 
 
 def test_froude_min_says_which_speed_that_is(watch, record) -> None:

@@ -88,8 +88,19 @@ def test_onset_with_the_shaft_is_sooner_and_sharper(watch, record, sensors) -> N
     assert after_s(onset.detected_ns, 900.0) <= 45.0
 
 
-@pytest.mark.parametrize('shaft', [0.0, 0.4])
-@pytest.mark.parametrize('slow_s', [3, 50])
+TWO_GLIDES = pytest.mark.xfail(
+    strict=True, reason='by a clock that far off she glides, is driven again, and glides'
+)
+
+
+@pytest.mark.parametrize(
+    ('slow_s', 'shaft'),
+    [
+        *((3, shaft) for shaft in (0.0, 0.2, 0.4)),
+        *((50, shaft) for shaft in (0.0, 0.3)),
+        pytest.param(50, 0.4, marks=TWO_GLIDES),
+    ],
+)
 def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
     watch, record, sensors, slow_s: int, shaft: float
 ) -> None:

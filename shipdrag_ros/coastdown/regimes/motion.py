@@ -414,7 +414,9 @@ def _holds(f: Float64, nu: float, density: float, scaled: bool) -> None:
 
 
 @compiled(uncounted=True)
-def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> float:
+def _dragged(
+    f: Float64, kind: int, nu: float, u_part: float, handled: bool, scaled: bool
+) -> float:
     """
     Return the density of the revs of a screw that does not drive.
 
@@ -437,6 +439,8 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
         # or anything below its last: it runs down
         below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+        if scaled and not np.isnan(revs):  # mostly a little
+            below = 0.5 * below + 0.5 * _off(nu, 0.9 * last)
         if not scaled:  # and does not stay
             below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
         density = 0.5 * stands + 0.5 * below
@@ -444,11 +448,14 @@ def _dragged(f: Float64, kind: int, nu: float, u_part: float, scaled: bool) -> f
             density = 0.9 * _off(nu, last) + (0.1 / n.CREEPS if nu < n.CREEPS else 0.0)
         _holds(f, nu, density, scaled)
         return density
-    moves = 0.1 if kind == HELD and scaled else 0.01
+    moves = 0.1 if kind == HELD and scaled and handled else 0.01
     if not scaled and (kind != HELD or min(nu, revs) < n.CREEPS):
         moves = 0.0  # an engine starts and stops such a screw, and what is stuck stays
-    density = (1.0 - moves) * _off(nu, revs) + moves
-    if kind == HELD:  # a sensor that is stuck stays where it was
+    stays = (1.0 - moves) * _off(nu, revs)
+    density = stays + moves
+    if kind == HELD and scaled:  # revs that creep are not held
+        f[REVS] += (1.0 if handled else (moves + 0.1 * stays) / density) * (nu - revs)
+    elif kind == HELD:  # a sensor that is stuck stays where it was
         _holds(f, nu, density, scaled)
     return density
 
@@ -517,7 +524,9 @@ def _shaft(
         elif left > 0.0 and kind < HELD:
             density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
         else:
-            density = _dragged(f, kind, nu, u_part, scaled)
+            # as long as it may take to set other revs
+            handled = age_s < n.LEVEL_RAMP_S[1] * setting.pace
+            density = _dragged(f, kind, nu, u_part, handled, scaled)
         if regime == BRAKE:  # astern, where no sign is read; a tug is rarer
             density = 0.3 * density + (0.7 if nu < 1.1 else 0.0)
     return math.log(density + n.SHAFT_LIES)
