@@ -438,7 +438,7 @@ class Monitor:
         start_ns = self._running.onset.start_ns
         dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
         if dated:
-            otherwise, *more = ended_by or EndedBy.ENGINE, *dated[1:]
+            otherwise, more = ended_by or EndedBy.ENGINE, dated[1:]
             # only the last of them goes on at the last sample
             events = self._end(dated[0], regimes, ended_by, None if more else last_ns)
             for one in more:

@@ -759,7 +759,7 @@ class Comparing:
         found = []
         for fit in fits:
             ways = fit.hypothesis.ways[len(self.stated) :]
-            if len(ways) == 1 or fit.log_weight < top - _PAIR_NATS:
+            if len(ways) < 2 or fit.log_weight < top - _PAIR_NATS:
                 continue
             place = first
             for way in ways:
