@@ -27,6 +27,7 @@ from shipdrag_ros.inference.decision import (
     Names,
     Verdict,
     decide,
+    marginals,
     mixture,
 )
 from shipdrag_ros.inference.limits import quantile
@@ -37,6 +38,7 @@ from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.posterior.limits import percent_of_r, sizes_named
 
 _SHARE = 0.95  # of a size, below its limit
+_RIVALS = 40  # likeliest effects of which it is found from what size on they are named
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,9 @@ def limits_of(
     Return the limit of each effect that is not named, by name.
     """
     found, named = judged.found, judged.decision.effects
-    from_size = sizes_named(comparing, {name for group in never for name in group})
+    probable = marginals(found.probability)
+    names = sorted(comparing.ways, key=lambda name: -probable.get(name, 0.0))[:_RIVALS]
+    from_size = sizes_named(comparing, names, {name for group in never for name in group})
     limits = {}
     for effect in found.effects:
         sizes = found.sizes(effect.name)

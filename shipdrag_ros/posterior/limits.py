@@ -65,7 +65,9 @@ class _Lines:
         return self.add(found) if found else np.arange(0)
 
 
-def sizes_named(comparing: Comparing, never: Collection[str]) -> dict[str, float]:
+def sizes_named(
+    comparing: Comparing, names: Sequence[str], never: Collection[str]
+) -> dict[str, float]:
     """
     Return the size from which each effect is named; without those that never are.
 
@@ -73,6 +75,8 @@ def sizes_named(comparing: Comparing, never: Collection[str]) -> dict[str, float
     ----------
     comparing
         After the comparison.
+    names
+        Of the effects, which are each other's rivals: time and memory go with their square.
     never
         Effects that no record separates.
     """
@@ -80,7 +84,7 @@ def sizes_named(comparing: Comparing, never: Collection[str]) -> dict[str, float
     (nothing,) = lines.add(
         [np.zeros((1, t.along.shape[1] + t.rest.shape[1])) for t in comparing.nothing.linear]
     )
-    ways = [_modes(each) for each in comparing.ways.values()]
+    ways = [_modes(comparing.ways[name]) for name in names]
     effects = [_rival(each, lines, nothing) for each in ways]
     sizes = np.array(priors.SMOOTH_SIZES)
     alike, none = np.full(len(sizes), -math.log(len(sizes))), np.full(len(sizes), nothing)

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose, words
+from shipdrag_ros.diagnosis import CoastRun, diagnose, verdict, words
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
@@ -92,6 +92,13 @@ def test_what_a_rival_may_stand_for_is_not_promised_a_name(text: str) -> None:
     name, _, size = text.partition('=')
     assert name not in [effect.name for effect in answer(text).effects]
     assert (answer().limits[name].would_be_named or np.inf) > float(size)
+
+
+def test_of_many_effects_the_likeliest_have_a_size_that_is_named(monkeypatch) -> None:
+    monkeypatch.setattr(verdict, '_RIVALS', 2)
+    limits = diagnose([run_of()], SHIP, Parameters()).limits
+    assert sum(each.would_be_named is not None for each in limits.values()) <= 2
+    assert len(limits) > 10
 
 
 def test_a_limit_grows_where_the_run_shows_less() -> None:
