@@ -9,13 +9,14 @@ one at a time, so that only what kills its worker by itself is given up.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
 from shipdrag_ros import __version__
-from shipdrag_ros.errors import FleetError
+from shipdrag_ros.errors import FleetError, reason_of
 
 if TYPE_CHECKING:  # takes most of a second to import
     from distributed import Client, Future
@@ -29,6 +30,7 @@ DIED = 'its worker died'
 """What the reason begins with where nothing came back."""
 
 _CONNECT_S = 30.0
+_REACHED_S = 5.0  # a scheduler that is there answers at once
 _GIVEN_UP = '1 hour'
 _LOOK_S = 60.0  # between looks at whether a worker is left
 
@@ -178,11 +180,14 @@ class Engine:
 
         if self._scheduler is not None:
             try:
+                # a client that fails to begin takes a minute to end, so look first
+                asyncio.run(_reach(self._scheduler))
                 client = Client(self._scheduler, timeout=_CONNECT_S, set_as_default=False)
-            except (OSError, ValueError) as error:
+            except Exception as error:  # whatever a server says that is no scheduler
                 raise FleetError(
-                    f'--scheduler {self._scheduler!r} cannot be reached: {error}; start one with '
-                    '`dask scheduler` and `dask worker --nthreads 1`'
+                    f'--scheduler {self._scheduler!r} cannot be reached: {reason_of(error)}; '
+                    'start one with `dask scheduler` and `dask worker --nthreads 1`, and give '
+                    'its address, not that of its dashboard'
                 ) from error
             return self._open.enter_context(client)
         folder = self._open.enter_context(TemporaryDirectory(prefix='shipdrag-dask-'))
@@ -223,6 +228,19 @@ class Engine:
             raise FleetError(
                 f'workers run another version than {__version__}: {others}; install the same'
             )
+
+
+async def _reach(address: str) -> None:
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    security = Security().get_connection_args('client')
+    try:
+        async with asyncio.timeout(2.0 * _REACHED_S):  # connect waits for ever for a greeting
+            comm = await connect(address, timeout=_REACHED_S, **security)
+    except TimeoutError:
+        raise OSError('what is there does not answer as a scheduler does') from None
+    comm.abort()
 
 
 def _version() -> str:

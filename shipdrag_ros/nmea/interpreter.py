@@ -15,7 +15,7 @@ since is measured instead, on its clock.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
 from shipdrag_ros.nmea import sentences
-from shipdrag_ros.samples import SECOND_NS, Block, Channel
+from shipdrag_ros.samples import ALL_MOTION, SECOND_NS, Block, Channel
 
 BEHIND_NS = SECOND_NS
 """A line that comes later than others by more waited somewhere: it is of a backlog."""
@@ -208,28 +208,30 @@ class Interpreter:
     Attributes
     ----------
     sentences
-        Whose checksum is right.
+        Whose checksum is right, by address.
     rejected
-        Lines that are no sentence, by reason.
+        Lines that are no sentence, by address, then by reason.
     unknown
         Sentences that measure nothing that is used here, by address.
     no_value
         Values that a known sentence does not hold, by input and reason.
     behind
         Sentences of a backlog, stamped earlier than they were read, by address.
-    used, not_taken
-        Values by input; not taken are those of a source that was not chosen, and those that
-        came while it was being chosen.
+    used
+        Values by input.
+    not_taken
+        Those of a source that was not chosen, and those that came while it was being chosen,
+        by address, then by input.
     """
 
     def __init__(self, mounting: sentences.Mounting | None = None) -> None:
-        self.sentences = 0
-        self.rejected: Counter[str] = Counter()
+        self.sentences: Counter[str] = Counter()
+        self.rejected: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self.unknown: Counter[str] = Counter()
         self.no_value: Counter[str] = Counter()
         self.behind: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
-        self.not_taken: Counter[str] = Counter()
+        self.not_taken: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self._reader = sentences.SentenceReader(mounting)
         self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
@@ -252,14 +254,14 @@ class Interpreter:
         # a lost line end leaves two sentences in a line
         _, *texts = sentences.START.split(text)
         if not texts:
-            self.rejected['no sentence'] += 1
+            self.rejected[address]['no sentence'] += 1
         found = []
         for each in texts:
             sentence = self._reader.read(each.strip())
             if isinstance(sentence, str):
-                self.rejected[sentence] += 1
+                self.rejected[address][sentence] += 1
             else:
-                self.sentences += 1
+                self.sentences[address] += 1
                 clock = self._clocks.setdefault(address, WireClock())
                 for stamped in clock.stamped(sentence, read_ns):
                     found += self._of_sentence(stamped, address)
@@ -274,6 +276,19 @@ class Interpreter:
             if choice.held is not None:
                 by_input.setdefault(channel.input, {})[str(choice.held[0])] = None
         return {name: ', '.join(sources) for name, sources in by_input.items()}
+
+    def gives_way_to(self, address: str) -> str:
+        """
+        Return the address of the source of a motion that one on this address could take over.
+
+        It is '' where there is none.
+        """
+        for channel, choice in self._choices.items():
+            before = '' if choice.held is None else choice.held[1]
+            speaks = any(each == address for _, each in choice.counts)
+            if channel.input in ALL_MOTION and speaks and before not in ('', address):
+                return before
+        return ''
 
     def _of_sentence(self, stamped: Stamped, address: str) -> list[EncodedMessage]:
         sentence, stamp_ns, read_ns = stamped
@@ -291,7 +306,7 @@ class Interpreter:
         for value in sentence.values:
             choice = self._choices.setdefault(value.channel, _Choice(read_ns))
             if not choice.takes((value.source, address), read_ns):
-                self.not_taken[value.channel.input] += 1
+                self.not_taken[address][value.channel.input] += 1
                 continue
             self.used[value.channel.input] += 1
             samples.append((int(value.channel), stamp_ns, read_ns, value.a, value.b))

@@ -24,14 +24,14 @@ from rclpy.publisher import Publisher
 
 from shipdrag_ros.messages import EventKind, Source, decode
 from shipdrag_ros.messages.topics import ERROR, OK, STALE, WARN, Status
-from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
+from shipdrag_ros.nmea.interpreter import SILENT_NS, TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.live import Address, LiveNmea, SourceCounts, parse_addresses
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.health import SILENT_S
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
-from shipdrag_ros.samples import ALL_MOTION
+from shipdrag_ros.samples import ALL_MOTION, SECOND_NS
 
 _MOTION = ', '.join(
     kind
@@ -191,19 +191,24 @@ class NmeaFeed:
         Say what is heard of each source while no motion is known; '' without sources.
         """
         return '; '.join(
-            f'NMEA {address}: {self._heard(count)}'
+            f'NMEA {address}: {self._heard(str(address), count)}'
             for address, count in self._live.counts().items()
         )
 
-    def _heard(self, counts: SourceCounts) -> str:
+    def _heard(self, address: str, counts: SourceCounts) -> str:
         if counts.problem:
             return counts.problem
         if not counts.lines:
             return 'open, nothing heard yet'
-        if not self._interpreter.sentences:
+        if not self._interpreter.sentences[address]:
             return f'{counts.lines} lines heard, none a sentence: look at baud rate and wiring'
         if counts.age_s is not None and counts.age_s > SILENT_S:
             return f'no line for {counts.age_s:.0f} s'
+        if before := self._interpreter.gives_way_to(address):
+            return (
+                f'{counts.lines} lines heard; {before} was chosen, and gives way when it has '
+                f'said nothing for {SILENT_NS / SECOND_NS:.0f} s'
+            )
         return f'{counts.lines} lines heard, none of use yet for speed or position ({_MOTION})'
 
     def statuses(self) -> list[Status]:
@@ -259,7 +264,7 @@ class NmeaFeed:
         return Source(self._published[source].topic_name, source.type)
 
     def _status(self, address: str, counts: SourceCounts) -> Status:
-        level, text = self._health(counts)
+        level, text = self._health(address, counts)
         found = self._interpreter
         values: dict[str, object] = {
             'times opened': counts.opened,
@@ -271,16 +276,16 @@ class NmeaFeed:
             'datagrams dropped by the system': counts.dropped,
             'of all sources: lines lost, none took them': self._live.lost,
             'of all sources: lines not used, node inactive or without clock': self._unused,
-            'of all sources: sentences': found.sentences,
+            'sentences': found.sentences[address],
         }
         groups: tuple[tuple[str, Mapping[str, object]], ...] = (
-            ('rejected', found.rejected),
+            ('rejected', found.rejected[address]),
             ('unknown sentence', found.unknown),
             ('no value', found.no_value),
             ('feeds', found.feeding()),
             ('used', found.used),
             ('of a backlog, stamped by their own times', found.behind),
-            ('not taken, of another source', found.not_taken),
+            ('not taken, of another source', found.not_taken[address]),
             ('not used, a topic feeds', self._nmea_refused),
             ('messages of the topic not used, NMEA feeds', self._topic_refused),
         )
@@ -288,9 +293,10 @@ class NmeaFeed:
             values |= {f'{group} {name}': value for name, value in entries.items()}
         return Status.of(f'nmea {address}', level, text, values)
 
-    def _health(self, counts: SourceCounts) -> tuple[int, str]:
+    def _health(self, address: str, counts: SourceCounts) -> tuple[int, str]:
         found = self._interpreter
-        bad = found.rejected.total() + counts.too_long + counts.binary
+        sound = found.sentences[address]
+        bad = found.rejected[address].total() + counts.too_long + counts.binary
         if counts.problem:
             return ERROR, counts.problem
         if counts.age_s is None:
@@ -299,9 +305,9 @@ class NmeaFeed:
             return STALE, f'no line for {counts.age_s:.0f} s'
         if counts.dropped or counts.flooded or self._live.lost:
             return WARN, 'more lines than any ship sends: not all of them can be used'
-        if bad > BAD_SHARE * max(found.sentences + bad, 20):
+        if bad > BAD_SHARE * max(sound + bad, 20):
             return WARN, (
-                f'{bad} of {found.sentences + bad} lines are damaged; look at baud rate and wiring'
+                f'{bad} of {sound + bad} lines are damaged; look at baud rate and wiring'
             )
         if self._topic_refused:
             names = ', '.join(self._topic_refused)

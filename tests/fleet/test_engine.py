@@ -7,7 +7,9 @@ import json
 import os
 import shutil
 import signal
+import socket
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -186,13 +188,36 @@ def test_a_run_is_counted_once_however_often_it_was_copied(
     assert left.bag == 'a copy/run.mcap'
 
 
-def test_a_scheduler_that_cannot_be_reached_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('shipdrag_ros.fleet.engine._CONNECT_S', 0.5)
-    with (
-        pytest.raises(FleetError, match='cannot be reached'),
-        Engine(scheduler='tcp://127.0.0.1:9'),
-    ):
+@pytest.mark.parametrize('place', ['tcp://127.0.0.1:9', 'nonsense', 'http://127.0.0.1:8786'])
+def test_a_scheduler_that_cannot_be_reached_is_told(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('shipdrag_ros.fleet.engine._REACHED_S', 0.5)
+    start_s = time.monotonic()
+    with pytest.raises(FleetError, match='cannot be reached'), Engine(scheduler=place):
         pass
+    assert time.monotonic() - start_s < 20.0
+
+
+@pytest.mark.parametrize('says', [b'', b'HTTP/1.1 400 Bad Request\r\n\r\n'])
+def test_what_is_no_scheduler_is_told(says: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('shipdrag_ros.fleet.engine._REACHED_S', 0.5)
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        place = f'tcp://127.0.0.1:{server.getsockname()[1]}'
+
+        def answer() -> None:
+            line, _ = server.accept()
+            with line:
+                line.sendall(says)
+                while line.recv(4096):  # until the other side goes
+                    pass
+
+        thread = threading.Thread(target=answer, daemon=True)
+        thread.start()
+        with pytest.raises(FleetError, match='cannot be reached'), Engine(scheduler=place):
+            pass
+        thread.join(10.0)
+        assert not thread.is_alive()
 
 
 def test_a_folder_without_a_bag_is_told(

@@ -98,7 +98,7 @@ def test_two_instruments_are_never_mixed() -> None:
     assert interpreter.messages(single, LINE, now_ns) == []
     assert len(interpreter.messages(dual, LINE, now_ns)) == 1
     assert interpreter.feeding() == {'speed_through_water': 'VWVBW'}
-    assert interpreter.not_taken['speed_through_water'] == 7
+    assert interpreter.not_taken[LINE]['speed_through_water'] == 7
 
     later_ns = now_ns + SILENT_NS + 1
     assert interpreter.messages(single, LINE, later_ns) == []
@@ -138,10 +138,12 @@ def test_what_gives_nothing_is_counted() -> None:
         good + good,
     ):
         assert interpreter.messages(text, LINE, START_NS) == []
-    assert interpreter.rejected == {'wrong checksum': 1, 'without checksum': 1, 'no sentence': 1}
+    assert interpreter.rejected == {
+        LINE: {'wrong checksum': 1, 'without checksum': 1, 'no sentence': 1}
+    }
     assert interpreter.unknown == {'GPXYZ': 1, 'PRDID': 1}
     assert interpreter.no_value == {'heading HDT: empty': 1, 'heading HDT: not a number': 1}
-    assert interpreter.sentences == 6
+    assert interpreter.sentences == {LINE: 6}
 
 
 @pytest.mark.parametrize(
@@ -240,3 +242,19 @@ def test_a_clock_of_the_node_that_is_set_forward_is_known_after_two_minutes() ->
     times = {k: k + 20.0 * (k >= 30) for k in range(300)}
     stamps = _stamps(times, _line_of)
     assert stamps[-1] == times[299]
+
+
+def test_each_address_is_judged_by_its_own_lines() -> None:
+    interpreter = Interpreter()
+    other = 'serial:/dev/ttyUSB0:4800'
+    speed = sentence('IIVHW,,T,,M,10.0,N,,K')
+    interpreter.messages('noise', other, START_NS)
+    assert interpreter.rejected[LINE] == {}
+    assert interpreter.rejected[other] == {'no sentence': 1}
+    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
+        interpreter.messages(speed, LINE, stamp_ns)
+    assert interpreter.gives_way_to(other) == ''  # which gave no reading yet
+    assert interpreter.messages(speed, other, START_NS + SETTLE_NS) == []
+    assert interpreter.sentences == {LINE: 2, other: 1}
+    assert interpreter.gives_way_to(other) == LINE
+    assert interpreter.gives_way_to(LINE) == ''

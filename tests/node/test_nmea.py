@@ -135,3 +135,23 @@ def test_a_topic_that_is_there_feeds_and_nmea_is_counted(
     late.publish(b'\x00\x01\x00\x00 not used')
     status = diagnostics.wait_for(part, 'heading: also published as a topic, which is not used')
     assert status.level == b'\x01'
+
+
+def test_a_line_is_not_blamed_for_the_noise_of_another(
+    start_node: Any, diagnostics: Any, peer: Any, instruments: Instruments
+) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        noisy = f'tcp://127.0.0.1:{server.getsockname()[1]}'
+        start_node(nmea=f'{instruments.source} {noisy}')
+        line, _ = server.accept()
+        with line:
+            line.sendall(b'$IIVHW,,T,,M,10.0,N,,K\r\n' * 40)  # no checksum
+            status = diagnostics.wait_for(f'nmea {noisy}', '40 of 40 lines are damaged')
+            assert values(status)['rejected without checksum'] == '40'
+            instruments.say(sentence('HEHDT,90.0,T'))
+            part = f'nmea {instruments.source}'
+            diagnostics.wait_for(part, '1', value='sentences')
+            status = diagnostics.wait_for(part, 'nothing used yet')
+            assert status.level == b'\x00'
+            assert 'rejected without checksum' not in values(status)
+            diagnostics.wait_for('state', '40 lines heard, none a sentence: look at baud rate')
