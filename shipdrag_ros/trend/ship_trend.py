@@ -329,9 +329,11 @@ def ship_trend(
     first_ns = used[0].time_ns
     runs = _runs(used)
     inside = [event for event in known if first_ns < event.time_ns <= used[-1].time_ns]
+    # two notes of one kind at one time are of one step
+    once = tuple({(event.time_ns, event.kind): event for event in inside}.values())
     steps = Steps(
-        np.array([(event.time_ns - first_ns) / YEAR_NS for event in inside]),
-        tuple(event.kind for event in inside),
+        np.array([(event.time_ns - first_ns) / YEAR_NS for event in once]),
+        tuple(event.kind for event in once),
     )
     found = search(runs, steps, growth or Growth())
     state, open_state = found.state, found.open
@@ -345,7 +347,7 @@ def ship_trend(
     slope = open_state.growth_per_year()
     result = ShipTrend(
         series,
-        _events(state, inside, found.steps, first_ns),
+        _events(state, once, found.steps, first_ns),
         Parameter(float(slope.value[0]), float(slope.sd[0])),
         now,
         _times(now, kw),
@@ -380,13 +382,15 @@ def _events(
     """Return known and found steps with their changes, in the order of time."""
     changes = state.changes()
     events = []
-    for year, value, sd in zip(state.steps.years, changes.value, changes.sd):
-        time_ns = first_ns + round(float(year) * YEAR_NS)
+    book = iter(known)  # in the order of the steps, of which several may be at one time
+    for year, kind, value, sd in zip(
+        state.steps.years, state.steps.kinds, changes.value, changes.sd, strict=True
+    ):
         change = Parameter(float(value), float(sd))
-        book = [event for event in known if abs(event.time_ns - time_ns) < 1_000_000_000]
-        if book:
-            events.append(TrendEvent(book[0].time_ns, book[0].kind, True, 1.0, change))
+        if kind:
+            events.append(TrendEvent(next(book).time_ns, kind, True, 1.0, change))
         else:
+            time_ns = first_ns + round(float(year) * YEAR_NS)
             [probability] = [each.probability for each in found if each.year == year]
             events.append(TrendEvent(time_ns, UNKNOWN_KIND, False, probability, change))
     return tuple(events)

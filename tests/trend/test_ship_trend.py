@@ -72,6 +72,16 @@ def test_known_and_unknown_steps(priced):
     assert any('no `economics`' in note for note in trends['Known'].notes)
 
 
+def test_events_of_one_time_keep_their_kinds_and_one_noted_twice_is_one_step():
+    time_ns = START_NS + 400 * DAY_NS
+    noted = [('coating', ''), ('docking', ''), ('docking', 'Lisbon')]
+    events = [HullEvent(time_ns, *each) for each in noted]
+    [trend] = fleet_trends(rows('Test', 0.15, cleaned=400.0), {}, {'Test': events})
+    found = [(event.time_ns, event.kind) for event in trend.events if event.known]
+    assert found == [(time_ns, 'coating'), (time_ns, 'docking')]
+    assert not any('outside the time' in note for note in trend.notes)
+
+
 def test_a_docking_that_takes_off_half_of_the_resistance_is_one_step():
     """At 45 % of fouling, after which nothing of it is left; seeds 1 to 4."""
     docking = HullEvent(START_NS + 400 * DAY_NS, 'docking')
