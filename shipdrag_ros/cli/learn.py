@@ -11,7 +11,7 @@ Options
 BAG_OR_STORE
     bag, or a store of `shipdrag fleet`, of which all bags are taken; {PART}
 --ship FILE
-    ship file with a baseline (default: the one attached to the first bag)
+    ship file with a baseline (default: the one attached to the first bag, or kept in the store)
 --out FILE
     file of the effect, where one is learnt; an existing one is not overwritten
 --name NAME
@@ -26,7 +26,7 @@ shipdrag learn clean_1.mcap clean_2.mcap --ship ship.yaml -o new.yaml --json lea
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from shipdrag_ros.cli import arguments
@@ -58,13 +58,16 @@ def run(options: argparse.Namespace) -> int:
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
     from shipdrag_ros.library.diagnosis import learn_from
+    from shipdrag_ros.replay.playback import SHIP_FILE
 
     output = Output(options.json)
     name = options.name or options.out.stem
     check_name(name)
     given = None if options.ship is None else Ship.load(options.ship)
-    bags = _bags(options.bags)
+    bags, kept = _bags(options.bags)
     runs = open_windowed(bags, remap=dict(options.remap), output=output)
+    if given is None and kept and not any(SHIP_FILE in run.attachments for run, _ in runs):
+        given = _one(kept)
     with stages(output) as progress:
         found = learn_from(output, runs, given, name, progress)
     output.say(words.sentence(found))
@@ -84,15 +87,17 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _bags(given: Sequence[WindowedBag]) -> list[WindowedBag]:
-    """Return bags, those of each store in its place."""
+def _bags(given: Sequence[WindowedBag]) -> tuple[list[WindowedBag], dict[str, str]]:
+    """Return bags, those of each store in its place, and ship files of stores by ship."""
     found: list[WindowedBag] = []
+    kept: dict[str, str] = {}
     for each in given:
         if not (each.path / 'coastdowns').is_dir():
             found.append(each)
             continue
         need('pyarrow')
-        from shipdrag_ros.fleet.store import read_bags
+        from shipdrag_ros.fleet.find import SHIP_FILE
+        from shipdrag_ros.fleet.store import read_bags, ship_texts
 
         rows = [row for row in read_bags(each.path).to_pylist() if row['coastdowns']]
         if not rows:
@@ -101,7 +106,20 @@ def _bags(given: Sequence[WindowedBag]) -> list[WindowedBag]:
             WindowedBag(_place(each.path, Path(row['root'], row['bag'])), each.window)
             for row in rows
         ]
-    return found
+        texts, ships = ship_texts(each.path), {row['ship'] for row in rows}
+        kept |= {ship: texts[ship].get(SHIP_FILE, '') for ship in sorted(ships & texts.keys())}
+    return found, kept
+
+
+def _one(kept: Mapping[str, str]) -> Ship:
+    """Return the ship of stores whose bags have none attached."""
+    if len(kept) > 1:
+        raise FleetError(
+            f'the store holds {", ".join(map(repr, kept))}, and an effect is learnt from runs of '
+            'one ship; give the bags of one, and --ship FILE'
+        )
+    [(name, text)] = kept.items()
+    return Ship.from_yaml(text, subject=f'ship file of {name!r} in the store')
 
 
 def _place(store: Path, bag: Path) -> Path:

@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
@@ -72,6 +74,54 @@ def test_the_bags_of_a_store_are_found_from_anywhere(
     monkeypatch.chdir(tmp_path)
     assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['runs']) == 1
+
+
+def bare(fleet: Path, folder: Path, *ships: str) -> Path:
+    """A store of a bag with no ship file attached, kept in the store for each ship."""
+    (folder / 'bags').mkdir()
+    store = Store(folder / 'store')
+    with (fleet / 'bags' / 'run.mcap').open('rb') as stream:
+        whole = list(make_reader(stream).iter_messages())
+    for number, ship in enumerate(ships):
+        bag = folder / 'bags' / f'{number}.mcap'
+        with bag.open('wb') as out:
+            writer = Writer(out)
+            writer.start(profile='ros2')
+            schemas: dict[int, int] = {}
+            channels: dict[int, int] = {}
+            for schema, channel, message in whole:
+                assert schema is not None
+                if channel.id not in channels:
+                    schemas[schema.id] = writer.register_schema(
+                        schema.name, schema.encoding, schema.data
+                    )
+                    channels[channel.id] = writer.register_channel(
+                        channel.topic, channel.message_encoding, schemas[schema.id]
+                    )
+                writer.add_message(
+                    channels[channel.id], message.log_time, message.data, message.publish_time
+                )
+            writer.finish()
+        row = bag_row('bags', bag.name, f'{number}' * 64)
+        store.write(BagResult({**row, 'ship': ship, 'coastdowns': 1}))
+        store.keep_ship(ship, {'ship.yaml': SHIP.read_text()})
+    return store.path
+
+
+def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = bare(fleet, tmp_path, 'Vitus Bering')
+    assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
+    assert len(json.loads(capsys.readouterr().out)['runs']) == 1
+
+
+def test_a_store_of_two_ships_names_them(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = bare(fleet, tmp_path, 'Alder', 'Birch')
+    assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
+    assert "the store holds 'Alder', 'Birch'" in capsys.readouterr().err
 
 
 def test_a_window_of_a_store_counts(
