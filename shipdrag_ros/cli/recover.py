@@ -59,7 +59,10 @@ def _show(output: Output, source: Path, result: Recovery) -> None:
         )
     output.say(f'{result.bytes_lost} of {result.bytes_read} bytes gave nothing.')
     if not result.damage:
-        output.say('No damage was met.')
+        output.say(
+            'All data are whole. If `shipdrag check` says otherwise, it means the index of '
+            f'{source}, which is not needed; {result.output} has one of its own.'
+        )
         return
     output.heading(f'{result.damage_count} damage(s)')
     damage_table(output, result.damage, result.damage_count)

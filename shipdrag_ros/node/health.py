@@ -265,8 +265,8 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
             and facts.seconds > 0.5 * RECENT_S
             and recent.used < RATE_MIN_HZ * facts.seconds
         ):
-            rate = recent.used / facts.seconds
-            yield Finding(WARN, f'{rate:.2g} Hz is too slow, at least 0.2 Hz is needed')
+            rate = math.floor(100.0 * recent.used / facts.seconds) / 100.0  # never rounded to 0.2
+            yield Finding(WARN, f'{rate:g} Hz is too slow, at least 0.2 Hz is needed')
         return
     motion = facts.name in ALL_MOTION
     grave = share < MOTION_USED_MIN if motion else not recent.used

@@ -90,6 +90,21 @@ def test_the_words(damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert 'chunk' in words
 
 
+def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(
+    steady_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(steady_bag.read_bytes())
+    content[-12] ^= 4  # the checksum of the summary
+    path, output = tmp_path / 'index.mcap', tmp_path / 'saved.mcap'
+    path.write_bytes(content)
+    assert main(['check', str(path)]) == 1
+    capsys.readouterr()
+    assert main(['recover', str(path), '-o', str(output)]) == 0
+    said = ' '.join(capsys.readouterr().out.split())
+    assert 'All data are whole. If `shipdrag check` says otherwise, it means the index' in said
+    assert main(['check', str(output)]) == 0
+
+
 @pytest.mark.parametrize('verb', [['check'], ['recover', '-o', 'saved.mcap']])
 def test_no_bag_is_an_error(
     verb: list[str],

@@ -56,6 +56,7 @@ def test_what_is_well_is_receiving() -> None:
         ({'recent': Counts(300, 1, {'duplicate': 299}, 0, 300)}, ERROR, 'holds no time'),
         ({'recent': Counts(300, 300, {}, 7)}, WARN, '7 messages lost in 30 s'),
         ({'recent': counts(3)}, WARN, '0.1 Hz is too slow'),
+        ({'recent': counts(5), 'seconds': 25.3}, WARN, '0.19 Hz is too slow, at least 0.2'),
         ({'behind': ('position', 6.0)}, WARN, '6.0 s behind those of position'),
         ({'behind': ('position', 1.0)}, OK, 'receiving'),
         ({'offset_s': 8.0}, WARN, '8.0 s behind that of this computer'),
