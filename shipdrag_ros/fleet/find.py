@@ -372,14 +372,14 @@ def find(places: Sequence[str], *, without: Path | None = None) -> FoundBags:
     Raises
     ------
     FleetError
-        If one of the places does not exist or cannot be reached.
+        If one of the places does not exist, cannot be reached or lies in the store.
     """
     sources: list[BagToRead] = []
     skipped: list[Skipped] = []
     notes: list[str] = []
     left_alone = 0
     for place in places:
-        search = _Search(Tree(place), None if without is None else str(without.resolve()))
+        search = _Search(Tree(place), without)
         sources += search.sources()
         skipped += search.skipped
         left_alone += search.left_alone
@@ -390,9 +390,14 @@ def find(places: Sequence[str], *, without: Path | None = None) -> FoundBags:
 class _Search:
     """The search of one folder; what it skips is gathered."""
 
-    def __init__(self, tree: Tree, without: str | None) -> None:
+    def __init__(self, tree: Tree, store: Path | None) -> None:
         self._tree = tree
-        self._without = without
+        self._store = None if store is None else store.resolve()
+        if self._in_store(tree.root):
+            raise FleetError(
+                f'{tree.place!r} lies in the store {str(store)!r}, where no bag is looked for; '
+                'give a store beside the bags or below them'
+            )
         self._top = tree.root
         self._ships: dict[str, Beside] = {}
         self.skipped: list[Skipped] = []
@@ -401,18 +406,17 @@ class _Search:
 
     def sources(self) -> Iterator[BagToRead]:
         for folder in self._tree.folders():
-            if self._without is not None and self._is_store(folder):
+            if self._in_store(folder.path):
                 continue
             if folder.problem:
                 self._skip('/'.join(folder.parts) or '.', folder.problem)
                 continue
             yield from self._in_folder(folder)
 
-    def _is_store(self, folder: Folder) -> bool:
-        if self._tree.protocol != LOCAL:
+    def _in_store(self, path: str) -> bool:
+        if self._store is None or self._tree.protocol != LOCAL:
             return False
-        here = str(Path(folder.path).resolve())
-        return here == self._without or here.startswith(f'{self._without}/')
+        return Path(path).resolve().is_relative_to(self._store)
 
     def _in_folder(self, folder: Folder) -> Iterator[BagToRead]:
         if any(entry.name == _METADATA or entry.name.endswith('.db3') for entry in folder.files):

@@ -28,3 +28,13 @@ def test_where_no_bag_lies_no_store_is_left(
     assert main(['fleet', str(tmp_path / 'empty'), '-o', str(store)]) == 1
     assert 'no bag lies below' in capsys.readouterr().err
     assert not store.exists()
+
+
+def test_bags_in_the_folder_of_the_store_are_not_passed_over_in_silence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'bags' / 'ship').mkdir(parents=True)
+    store = str(tmp_path / 'bags')
+    for place in (store, f'{store}/ship'):
+        assert main(['fleet', place, '-o', store]) == 1
+        assert f'{place!r} lies in the store {store!r}' in capsys.readouterr().err
