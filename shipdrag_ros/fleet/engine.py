@@ -249,9 +249,14 @@ def _version() -> str:
 
 def _result(future: Future[Any]) -> Any:
     from distributed import KilledWorker
+    from distributed.client import FutureCancelledError
 
     try:
         return future.result()
+    except FutureCancelledError as error:  # nobody here cancels; it was lost with the scheduler
+        raise FleetError(
+            f'the scheduler is gone: {error.reason}; what is done is kept: run it again'
+        ) from error
     except KilledWorker:
         return Lost(
             f'{DIED} {DEATHS} times, and so it did when nothing else was being done: it '

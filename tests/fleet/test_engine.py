@@ -8,17 +8,19 @@ import os
 import shutil
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import cloudpickle
 import dask
 import pytest
 from dask.utils import parse_timedelta
-from distributed import get_worker
+from distributed import Client, get_worker
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import FleetError
@@ -241,3 +243,41 @@ def test_that_no_worker_is_left_is_an_error_and_no_wait_for_ever(
             time.sleep(0.1)
         with pytest.raises(FleetError, match='no worker is left, and 1 bag'):
             list(lonely.map(deadly, {'a': 'a'}))
+
+
+def slow(item: str) -> str:
+    time.sleep(60.0)
+    return item
+
+
+def test_a_scheduler_that_dies_is_an_error_that_says_so(tmp_path: Path) -> None:
+    file = tmp_path / 'scheduler.json'
+    dask_line = [sys.executable, '-m', 'dask']
+    here = ['--no-dashboard', '--host', '127.0.0.1', '--scheduler-file', str(file)]
+    one = ['--nthreads', '1', '--no-nanny', '--death-timeout', '20']
+    with ExitStack() as ended:
+
+        def start(*arguments: str) -> subprocess.Popen[bytes]:
+            process = ended.enter_context(subprocess.Popen([*dask_line, *arguments]))
+            ended.callback(process.kill)
+            return process
+
+        scheduler = start('scheduler', '--port', '0', *here)
+        start('worker', *here, *one)
+        end_s = time.monotonic() + 60.0
+        while not file.exists():
+            assert time.monotonic() < end_s
+            time.sleep(0.1)
+        with Engine(scheduler=_with_worker(file, end_s)) as remote:
+            threading.Timer(1.0, scheduler.kill).start()
+            with pytest.raises(FleetError, match='the scheduler is gone'):
+                list(remote.map(slow, {'a': 'a'}))
+
+
+def _with_worker(file: Path, end_s: float) -> str:
+    """Return the address of a scheduler once it has a worker."""
+    while True:
+        assert time.monotonic() < end_s
+        with suppress(json.JSONDecodeError), Client(scheduler_file=str(file)) as client:
+            client.wait_for_workers(1, timeout=30.0)
+            return str(client.scheduler.address)
