@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
@@ -181,7 +182,8 @@ class Engine:
         if self._scheduler is not None:
             try:
                 # a client that fails to begin takes a minute to end, so look first
-                asyncio.run(_reach(self._scheduler))
+                with ThreadPoolExecutor(1) as pool:  # where called from, a loop may run already
+                    pool.submit(asyncio.run, _reach(self._scheduler)).result()
                 client = Client(self._scheduler, timeout=_CONNECT_S, set_as_default=False)
             except Exception as error:  # whatever a server says that is no scheduler
                 raise FleetError(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import shutil
@@ -199,6 +200,14 @@ def test_a_scheduler_that_cannot_be_reached_is_told(
     with pytest.raises(FleetError, match='cannot be reached'), Engine(scheduler=place):
         pass
     assert time.monotonic() - start_s < 20.0
+
+
+def test_a_scheduler_is_reached_from_within_a_loop(engine: Engine) -> None:
+    async def address() -> str:
+        with Engine(scheduler=engine.address) as found:
+            return found.address
+
+    assert asyncio.run(address()) == engine.address
 
 
 @pytest.mark.parametrize('says', [b'', b'HTTP/1.1 400 Bad Request\r\n\r\n'])
