@@ -15,6 +15,7 @@ import numpy as np
 from shipdrag_ros.inference.learning import learn, of_steady
 from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
@@ -83,7 +84,25 @@ def whitener_of(
     whitener = np.eye(len(time))
     white = Noise(found.variance, WHITE, *damping_of(ship, speed))
     whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
-    return np.ascontiguousarray(whitener.T)
+    shaken = np.linalg.inv(whitener.T)
+    sailed = np.tril(np.broadcast_to(speed * np.diff(time, prepend=time[0]), shaken.shape))
+    wandered = sailed @ yaw_wander(time) @ sailed.T
+    return np.linalg.inv(np.linalg.cholesky(shaken @ shaken.T + wandered))
+
+
+def yaw_wander(time_s: Float64) -> Float64:
+    """
+    Return the covariance (n, n) of what a heading, and the course with it, wanders by.
+
+    A steady record shows it while she is steered with way on, not as she glides.
+
+    Parameters
+    ----------
+    time_s : (n,)
+    """
+    apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
+    result: Float64 = priors.YAW_WANDERS.sd**2 * np.exp(-apart)
+    return result
 
 
 def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:

@@ -224,7 +224,7 @@ COURSE = Declared(
 YAW = Declared('-', 'yaw of a mean over a minute', normal(0.03), 'rad', 'a ship yaws in the waves')
 YAW_WANDERS = Declared(
     '-',
-    'slow part of that, of ship and compass',
+    'slow part of that, of ship and compass; her course wanders with it',
     normal(0.04),
     'rad',
     'steady stretches of sailing records',
@@ -232,6 +232,13 @@ YAW_WANDERS = Declared(
 YAW_WANDERS_S = Declared('-', 'the same, time', 300.0, 's', _REALITY)
 SHAFT = Declared('-', 'shaft speed in a minute, of the steady one', normal(0.03), '', _TAKEN)
 SHAFT_OFF = Declared('-', 'the same of all minutes of a glide', normal(0.05), '', _TAKEN)
+SHAFT_FRICTION = Declared(
+    '-',
+    'speed, over that at the stop, at which friction stops a shaft that is free in the baseline',
+    normal(0.3),
+    '',
+    '0.1 of bearings alone, 0.2 to 0.5 of a diesel that stays coupled',
+)
 SHAFT_FALL = Declared(
     'tau',
     'logarithm of the run-down of the thrust over that of a shaft that is seen to stop',
