@@ -22,13 +22,14 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, shown
+from shipdrag_ros.diagnosis.standing import StandingLog
 from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
-from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import OUTLIER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.simulation.effect import Scope, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -64,20 +65,20 @@ def diagnose_sailing(
     DiagnosisError
         If there is no log, nothing over ground, or too little even sailing.
     """
-    still = stands_still(records, parameters)
+    standing = StandingLog.of(records, parameters)
     try:
         legs = Legs.of(records, parameters)
     except DiagnosisError as error:
-        if still is None:
+        if standing is None:
             raise
-        return zeros_alone(still, why=str(error), no_coastdown=no_coastdown)
+        return _zeros_alone(standing, str(error), no_coastdown)
     question = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
     if question:
         return waiting(question, baseline='none', examined=(LOG_TRACK,), no_coastdown=no_coastdown)
-    return with_zeros(_diagnosed(legs, no_coastdown), still)
+    return _diagnosed(legs, standing, no_coastdown)
 
 
-def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
+def _diagnosed(legs: Legs, standing: StandingLog | None, no_coastdown: str) -> DiagnosisResult:
     """Diagnose legs on which the log turns."""
     model = SailingModel.learnt(legs)
     # legs that no effect and no noise explains
@@ -85,22 +86,26 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
-    found = model.compare()
+    found = model.compare(standing)
     judged = judge(found, model.inseparable)
-    verdict, best = judged.decision.verdict, found.best[judged.top]
+    verdict, best, effects = judged.decision.verdict, found.best[judged.top], judged.effects
+    if standing and not effects and standing.named.probability >= CERTAIN:
+        # a name that something without one, beside it, does not touch
+        verdict, effects = Verdict.NAMED, (standing.named,)
     return DiagnosisResult(
         verdict=verdict,
-        effects=judged.effects,
+        effects=effects,
         candidates=judged.candidates,
         nothing=found.probability.get(NONE, 0.0),
         unnamed=found.probability.get(UNKNOWN, 0.0),
         would_decide=declared(judged.candidates) if verdict is Verdict.ONE_OF else (),
-        where=None if verdict is Verdict.NONE else _where(model, best),
+        where=None if verdict is Verdict.NONE else _where(model, standing, best),
         before=_gap(found.best[NONE]),
         after=_gap(best) if judged.missing else None,
         baseline='none',
         best=judged.best,
         notes=(
+            *([standing.note] if standing else []),
             *legs.notes,
             *_about(model, int(outlier.sum())),
             *(_why(model, found, best) if judged.missing else ()),
@@ -114,9 +119,34 @@ def _gap(fit: SailingFit) -> Gap:
     return Gap(float(np.sqrt(np.mean(fit.residual_m_s**2))), None, fit.chi2)
 
 
-def _where(model: SailingModel, best: SailingFit) -> Where:
+def _zeros_alone(standing: StandingLog, why: str, no_coastdown: str) -> DiagnosisResult:
+    """Return the result where too little is left beside the zeros."""
+    none = np.zeros(0)
+    nothing = SailingFit(Explanation(), none, none, none, none, np.zeros((0, 0)), 0.0)
+    fits = nothing, standing.joined(nothing)
+    found = ComparedHypotheses((standing.way.effect,), fits)
+    judged = judge(found, ())
+    return DiagnosisResult(
+        verdict=judged.decision.verdict,
+        effects=judged.effects,
+        candidates=judged.candidates,
+        nothing=found.probability[NONE],
+        unnamed=0.0,
+        where=standing.where if judged.missing else None,
+        before=Gap(standing.rms_m_s, None, math.nan),
+        baseline='none',
+        best=judged.best,
+        notes=(standing.note, f'nothing else between log and track was examined: {why}'),
+        examined=(LOG_TRACK,),
+        no_coastdown=no_coastdown,
+    )
+
+
+def _where(model: SailingModel, standing: StandingLog | None, best: SailingFit) -> Where:
     """Return where log and ground disagree; which is wrong is known only of a name."""
     legs, names = model.legs, best.names
+    if standing and names == (standing.way.effect.name,):
+        return standing.where
     of_log = bool(names) and all(LIBRARY[name].scope is Scope.SENSOR for name in names)
     half = 0.5 * legs.length_s
     return Where(

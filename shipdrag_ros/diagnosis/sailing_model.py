@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -30,6 +31,9 @@ from shipdrag_ros.simulation import Action, Frame, Scenario
 from shipdrag_ros.simulation.effect import Effect, Measure, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
+if TYPE_CHECKING:
+    from shipdrag_ros.diagnosis.standing import StandingLog
+
 _LOG = 'speed_through_water'
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
 _NOISE = (
@@ -44,7 +48,7 @@ _EVALUATIONS = 400
 _LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
 # what log and track show acts alike on all ships, so that any will do
-_ANY_SHIP = Ship(
+ANY_SHIP = Ship(
     length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
 )
 
@@ -169,11 +173,16 @@ class SailingModel:
     @staticmethod
     def _plain(effects: Sequence[Effect]) -> tuple[EffectWay, ...]:
         """Return effects whose sizes are any near 0, of either sign."""
-        return tuple(next(ways_of(effect, _ANY_SHIP, _LONGEST_S, 1)) for effect in effects)
+        return tuple(next(ways_of(effect, ANY_SHIP, _LONGEST_S, 1)) for effect in effects)
 
-    def compare(self) -> ComparedHypotheses[SailingFit]:
+    def compare(self, standing: StandingLog | None = None) -> ComparedHypotheses[SailingFit]:
         """
         Compare nothing, each effect, pairs of them, and what errs smoothly besides.
+
+        Parameters
+        ----------
+        standing
+            What zeros of the log say, independent of what it reads otherwise.
         """
         ways = self._plain(self.effects)
         pairs = [
@@ -187,7 +196,11 @@ class SailingModel:
             for names, p in found.probability.items()
             if names not in (NONE, UNKNOWN) and p > LIKELY
         ]
-        return ComparedHypotheses(self.effects, (*fits, *beside))
+        weighed = (*fits, *beside)
+        if standing is None:
+            return ComparedHypotheses(self.effects, weighed)
+        with_it = tuple(standing.joined(fit) for fit in weighed)
+        return ComparedHypotheses((*self.effects, standing.way.effect), weighed + with_it)
 
     def action(self, ways: Sequence[EffectWay], z: Float64) -> Action:
         """
@@ -253,7 +266,7 @@ class SailingModel:
     @cached_property
     def _frame(self) -> Frame:
         """A current is stated along the first leg."""
-        return Frame(_ANY_SHIP, Scenario(speed_m_s=1.0), float(self.legs.direction_rad[0]))
+        return Frame(ANY_SHIP, Scenario(speed_m_s=1.0), float(self.legs.direction_rad[0]))
 
     @cached_property
     def _splines(self) -> Float64:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import SailingRecord, diagnose_sailing
-from shipdrag_ros.diagnosis.zeros import stands_still
+from shipdrag_ros.diagnosis.standing import StandingLog
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -50,20 +50,26 @@ def record(
 def test_a_wheel_that_stands_still_has_a_dead_band() -> None:
     # N = 5, seeds 0 .. 4: the speed lies between those that are and are not read
     for seed in range(5):
-        found = stands_still([record(band_m_s=BAND_M_S, seed=seed)], Parameters())
+        found = StandingLog.of([record(band_m_s=BAND_M_S, seed=seed)], Parameters())
         assert found is not None
-        assert found.effect.probability > 0.99
-        (size,) = found.effect.parameters.values()
-        assert 0.4 < size.value < 1.5
+        assert found.log_factor > 9.0  # odds of 1 to 50 beforehand
+        assert 0.4 < found.way.unknowns[0].prior.at(found.z) < 1.5
         assert found.share > 0.95
-        assert found.fastest_m_s < BAND_M_S
+        assert found.at_m_s.max() < BAND_M_S
 
 
 @pytest.mark.parametrize('other', [{}, {'dropped': 0.3}, {'drifting': True}])
 def test_other_zeros_are_no_dead_band(other: dict[str, float]) -> None:
     # N = 5, seeds 0 .. 4
     for seed in range(5):
-        assert stands_still([record(**other, seed=seed)], Parameters()) is None
+        found = StandingLog.of([record(**other, seed=seed)], Parameters())
+        assert found is None or found.log_factor < 0.0
+
+
+def test_zeros_at_any_speed_are_said_and_not_named() -> None:
+    found = diagnose_sailing([record(dropped=0.3)], Parameters())
+    assert found.notes[0].startswith('the log reads exactly 0 in')
+    assert not any('log_dead_band' in each.names for each in found.candidates)
 
 
 def test_the_diagnosis_names_it_and_says_why() -> None:
