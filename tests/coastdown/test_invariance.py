@@ -149,7 +149,7 @@ def thinned(block: Block, every) -> Block:
     return block[kept]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     data=st.data(),
     seed=st.integers(0, 1000),
@@ -244,7 +244,7 @@ def long_records(ship, long_record) -> list:
     return [(block, run(ship, [block])[0]) for block in (long_record, fixes)]
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(start_s=st.integers(1, 2000), globe=st.booleans())
 @example(start_s=686, globe=False)
 def test_a_monitor_that_starts_later_says_the_same(
