@@ -130,7 +130,9 @@ class Context:
             blocks.append(np.array([[priors.DEPTH_READ.sd**2]]))
         if len(shaft):
             values += [shaft, np.array([0.0])]
-            slower = _slower(shaft_s - stop.lead_in_s, stop.speed_m_s, ship) if turns else 0.0 * shaft
+            slower = (
+                _slower(shaft_s - stop.lead_in_s, stop.speed_m_s, ship) if turns else 0.0 * shaft
+            )
             own = np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2
             blocks.append(own + np.outer(slower, slower))
             blocks.append(np.eye(1))

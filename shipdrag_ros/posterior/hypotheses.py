@@ -39,6 +39,7 @@ _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # 
 # turns, scatter of the resistance from run to run, light air to the east and to the north
 _PORT, _HEADING, _FREE, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 7)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
+_ABSENT = 1e10  # precision from which an instrument is not there
 _STEP_M_S = 0.1  # of differences
 _NOTHING = Action()
 
@@ -316,7 +317,7 @@ class ShipRuns:
         width, size = self.width(hypothesis), self.size
         q = len(hypothesis.unknowns)
         name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
-        families = self.runs[0].model.families
+        families = max((run.model.families for run in self.runs), key=len)
         # without a baseline the hull is something smooth in any case
         hulls = [each for each in families if each.name == name] or list(families)
         total = math.fsum(each.chance for each in hulls)
@@ -358,14 +359,21 @@ class ShipRuns:
     def _base(self, name: str, number: int) -> tuple[Float64, Float64]:
         """Return mean and precision of the unknowns that are no coefficients, in a family."""
         mean, precision = np.zeros(self.size), np.ones(self.size)
+        given = np.zeros(self.size, bool)
         k = self.coefficients
         calm = priors.sheltered(max(run.model.speed_m_s for run in self.runs))
         for run, place in zip(self.runs, self.places):
             all_ = run.model.families
             alike = [each for each in all_ if each.name == name] or all_
             family = alike[number % len(alike)]  # a run without a log has fewer
-            own = place[_OF_MOTION][k:]
-            mean[own], precision[own] = family.mean[k:], family.precision[k:]
+            own, own_mean, own_precision = (
+                each[k:] for each in (place[_OF_MOTION], family.mean, family.precision)
+            )
+            # an instrument that runs share may not be in all of them
+            acts = own_precision < _ABSENT
+            known = acts | ~given[own]
+            mean[own[known]], precision[own[known]] = own_mean[known], own_precision[known]
+            given[own[acts]] = True
             mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
             precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0
             mean[place[k + motion.STOP]] = run.stop_s
@@ -375,7 +383,7 @@ class ShipRuns:
             for i in _AIR:
                 precision[place[k + i]] = (calm * priors.LIGHT_AIR.sd) ** -2.0
             at = place[k + motion.CURRENT]
-            if precision[at] < 1e10:
+            if precision[at] < _ABSENT:
                 precision[at] = (calm * priors.CALM_CURRENT.sd) ** -2.0
         return mean, precision
 

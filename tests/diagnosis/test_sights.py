@@ -18,6 +18,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
@@ -120,3 +121,20 @@ def test_light_air_is_that_of_the_day(cargo: Ship, seen_of: Callable[..., Observ
         other = replace(first, name='other', context=replace(first.context, stop=later))
         sizes.append(ship_runs([first, other], cargo).size)
     assert sizes[1] == sizes[0] + 2
+
+
+def test_a_log_that_one_run_lacks_is_as_well_known_in_either_order(cargo: Ship) -> None:
+    both, bare = (
+        Observation.of(window_of(cargo, *inputs), cargo, Parameters(), name='run')
+        for inputs in (('speed_through_water', 'position'), ('position',))
+    )
+    found = []
+    for seen in ([both, bare], [bare, both]):
+        runs = ship_runs(seen, cargo)
+        families = runs.priors(Explanation(), np.zeros(runs.size))
+        place = runs.places[seen.index(both)]
+        at = place[[runs.coefficients + i for i in (motion.SCALE, motion.OFFSET, motion.LAG)]]
+        found.append((families.mean[:, at], families.precision[:, at], families.log_chance))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other)
+    assert found[0][1].max() < 1e6  # none is known to be right

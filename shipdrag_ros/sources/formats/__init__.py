@@ -3,7 +3,7 @@
 The formats of logs: every module or package in this folder is one.
 
 A new format is a new module with a `FORMAT`; it is found here. A package may
-keep it in its module `declaration`. One from another package is an entry point of
+keep it in its module `importer`. One from another package is an entry point of
 the group `shipdrag.formats`, as those of this folder are.
 """
 
