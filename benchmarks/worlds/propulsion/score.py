@@ -20,6 +20,7 @@ from shipdrag_ros.samples import in_arrival_order
 HELD_SHARE = 0.8
 SPANS = bool(os.environ.get('SPANS'))  # spans alone, without an estimate: a tenth of the time
 DRIVEN_S = 10.0
+SURE = 0.7  # probability of a glide that is said
 INPUTS: dict[str, tuple[str, ...]] = {
     'log': ('log',),
     'track': ('track',),
@@ -77,6 +78,9 @@ class Row:
         Coastdowns taken back when they ended; they count as not reported.
     said
         What the program says of candidates that it dismissed.
+    sure_s
+        Of what it says of the time about slow-downs: in how much of it she glides with a
+        probability of 0.7 or more, how much that expects, and in how much she does [s].
     """
 
     case: Case
@@ -96,6 +100,7 @@ class Row:
     withdrawn: int
     record_s: float
     said: str
+    sure_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
@@ -156,7 +161,26 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         len(ended) - len(standing),
         truth.seconds,
         _said(truth, events),
+        _sure(truth, ended),
     )
+
+
+def _sure(truth: Truth, ended: list[Any]) -> tuple[float, float, float]:
+    """Return in how much she is said to glide, how much that expects, and how much is true."""
+    found = np.zeros(3)
+    for event in ended:
+        regimes = getattr(event, 'regimes', None)
+        if regimes is None or len(regimes.time_ns) < 2:
+            continue
+        row = np.round(seconds(regimes.time_ns) / ROW_S).astype(int)
+        chance = regimes.probability['gliding']
+        sure = (chance >= SURE) & (row >= 0) & (row < len(truth.gliding))
+        step_s = float(np.median(np.diff(regimes.time_ns))) * 1e-9
+        found += step_s * np.array(
+            [sure.sum(), chance[sure].sum(), truth.gliding[row[sure]].sum()]
+        )
+    said_s, expected_s, true_s = found.tolist()
+    return said_s, expected_s, true_s
 
 
 def _named(events: list[Any], name: str) -> list[Any]:
