@@ -92,7 +92,7 @@ def test_before_there_is_anything_to_show(
         if level is not None:
             source.hear(health(level, text))
         viewer = view(url)
-        viewer.wait_for('#headline', 'NO ')  # no node, or no speed
+        viewer.wait_for('#headline', 'NO')  # no node, no speed, or one that is silent by now
         assert not viewer.page.is_visible('#player')  # nothing is played
         for width in SCREENS:
             if level is not None:
