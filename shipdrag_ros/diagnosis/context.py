@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from shipdrag_ros.diagnosis.measured import damping_of, yaw_wander
+from shipdrag_ros.diagnosis.measured import slowed_m_s, yaw_wander
 from shipdrag_ros.estimation.run_down import TURNS
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import bin_means
@@ -130,11 +130,12 @@ class Context:
             blocks.append(np.array([[priors.DEPTH_READ.sd**2]]))
         if len(shaft):
             values += [shaft, np.array([0.0])]
-            slower = (
-                _slower(shaft_s - stop.lead_in_s, stop.speed_m_s, ship) if turns else 0.0 * shaft
-            )
             own = np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2
-            blocks.append(own + np.outer(slower, slower))
+            if turns:
+                slowed = slowed_m_s(ship, stop.speed_m_s, shaft_s - stop.lead_in_s)
+                slower = _slower(slowed / stop.speed_m_s)
+                own += np.outer(slower, slower)
+            blocks.append(own)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
         blocks.append(_yaw_covariance(yaw_s))
@@ -269,10 +270,8 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
 
 
-def _slower(after_s: Float64, speed_m_s: float, ship: Ship) -> Float64:
-    """Return what the friction of its bearings takes off the revs of a free shaft, (b,)."""
-    damping, _ = damping_of(ship, np.array([speed_m_s]))
-    slowed = 1.0 / (1.0 + 0.5 * damping[0] * np.maximum(after_s, 0.0))
+def _slower(slowed: Float64) -> Float64:
+    """Return what friction may take off the revs of a free shaft, by speed over the first."""
     load = np.minimum((priors.SHAFT_FRICTION.sd / slowed) ** 2, 1.0)
     result: Float64 = priors.FREE_SHAFT.mean * slowed * load
     return result

@@ -3,7 +3,8 @@
 Rows of measurements along one direction, and the noise of places to port of it.
 
 The noise is that of the steady record before the stop, colour included: what a
-coastdown leaves over a fit would hold the very effect that is sought.
+coastdown leaves over a fit would hold the very effect that is sought. Beside it stands
+what a ship wanders by as she glides, which no steady record shows.
 """
 
 from __future__ import annotations
@@ -78,9 +79,7 @@ def whitener_of(
     )
     # the engine damps the steady record; behind the stop the hull does
     learnt = learn(seen, speed_m_s).typical
-    # the ship slows down about as v0 / (1 + t / t0)
-    after = np.maximum(time - lead_in_s, 0.0)
-    speed = speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
+    speed = slowed_m_s(ship, speed_m_s, time - lead_in_s)
     whitener = np.eye(len(time))
     white = Noise(found.variance, WHITE, *damping_of(ship, speed))
     whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
@@ -88,6 +87,24 @@ def whitener_of(
     sailed = np.tril(np.broadcast_to(speed * np.diff(time, prepend=time[0]), shaken.shape))
     wandered = sailed @ yaw_wander(time) @ sailed.T
     return np.linalg.inv(np.linalg.cholesky(shaken @ shaken.T + wandered))
+
+
+def slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
+    """
+    Return roughly the speed (n,) of a gliding ship: v_0 / (1 + t / t_0).
+
+    Parameters
+    ----------
+    ship
+        With a baseline.
+    speed_m_s
+        At the stop.
+    after_s : (n,)
+        Since then.
+    """
+    damping, _ = damping_of(ship, np.array([speed_m_s]))
+    result: Float64 = speed_m_s / (1.0 + 0.5 * float(damping[0]) * np.maximum(after_s, 0.0))
+    return result
 
 
 def yaw_wander(time_s: Float64) -> Float64:

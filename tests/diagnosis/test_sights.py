@@ -138,3 +138,15 @@ def test_a_log_that_one_run_lacks_is_as_well_known_in_either_order(cargo: Ship) 
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other)
     assert found[0][1].max() < 1e6  # none is known to be right
+
+
+def test_a_course_that_wanders_on_the_glide_is_no_turn(cargo: Ship) -> None:
+    seen = Observation.of(window_of(cargo, 'position'), cargo, Parameters(), name='run')
+    assert seen.across is not None
+    time_s = seen.across.rows.time_s
+    after_s = np.maximum(time_s - seen.lead_in_s, 0.0)
+    # to one side and back within ten minutes, by half a standard deviation of a heading
+    course_rad = 0.02 * np.sin(after_s / 95.0) * (after_s < 600.0)
+    way_m = np.cumsum(course_rad * 3.0 * np.diff(time_s, prepend=time_s[0]))
+    away = seen.across_whitener @ way_m
+    assert float(away @ away) < 4.0
