@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from shipdrag_ros.diagnosis.measured import slowed_m_s, yaw_wander
+from shipdrag_ros.diagnosis.measured import yaw_wander
 from shipdrag_ros.estimation.run_down import TURNS
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import bin_means
@@ -130,12 +131,7 @@ class Context:
             blocks.append(np.array([[priors.DEPTH_READ.sd**2]]))
         if len(shaft):
             values += [shaft, np.array([0.0])]
-            own = np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2
-            if turns:
-                slowed = slowed_m_s(ship, stop.speed_m_s, shaft_s - stop.lead_in_s)
-                slower = _slower(slowed / stop.speed_m_s)
-                own += np.outer(slower, slower)
-            blocks.append(own)
+            blocks.append(np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
         blocks.append(_yaw_covariance(yaw_s))
@@ -208,10 +204,13 @@ class Context:
         """Return shaft speeds over the steady one, and how odd it is that the shaft stands."""
         after = columns.time_s[self.at_shaft] - self.stop.lead_in_s
         speed = columns.speed_through_water_m_s[:, self.at_shaft]
-        stall, free, fraction, decay_s = np.array(
-            [(a.stall_m_s, a.free_shaft, a.residual_fraction, a.residual_decay_s) for a in actions]
-        ).T[:, :, None]
-        turned = free * speed / self.stop.speed_m_s * turning(speed, stall)
+        wanted = attrgetter(
+            'stall_m_s', 'friction_m_s', 'free_shaft', 'residual_fraction', 'residual_decay_s'
+        )
+        asked = np.array([wanted(action) for action in actions])
+        stall, friction, free, fraction, decay_s = asked.T[:, :, None]
+        at_rest = np.maximum(stall, friction)
+        turned = free * speed / self.stop.speed_m_s * turning(speed, at_rest)
         if not self.turns:
             turned[stall[:, 0] == 0.0] = 0.0
         driven = fraction * np.exp(-after / np.maximum(decay_s, 1e-3))
@@ -268,13 +267,6 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     turned = priors.WIND_TURNED.sd**2 * np.outer(other, other)
     gain = priors.WIND_GAIN.sd**2 * np.outer(values, values)
     return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
-
-
-def _slower(slowed: Float64) -> Float64:
-    """Return what friction may take off the revs of a free shaft, by speed over the first."""
-    load = np.minimum((priors.SHAFT_FRICTION.sd / slowed) ** 2, 1.0)
-    result: Float64 = priors.FREE_SHAFT.mean * slowed * load
-    return result
 
 
 def _yaw_covariance(time_s: Float64) -> Float64:

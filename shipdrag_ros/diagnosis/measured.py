@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from shipdrag_ros.inference.learning import learn, of_steady
 from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
@@ -19,6 +20,9 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
+
+_SLOWEST = 0.02  # of the speed at the stop, that a glide is followed to
+_SPEEDS = 200
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ def whitener_of(
 
 def slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     """
-    Return roughly the speed (n,) of a gliding ship: v_0 / (1 + t / t_0).
+    Return the speed (n,) of a ship that glides in calm deep water by her baseline.
 
     Parameters
     ----------
@@ -102,8 +106,12 @@ def slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     after_s : (n,)
         Since then.
     """
-    damping, _ = damping_of(ship, np.array([speed_m_s]))
-    result: Float64 = speed_m_s / (1.0 + 0.5 * float(damping[0]) * np.maximum(after_s, 0.0))
+    speed = speed_m_s * np.geomspace(1.0, _SLOWEST, _SPEEDS)
+    stated = np.clip(speed, *ship.baseline_range_m_s)
+    # beyond what the baseline states, as its square
+    r = ship.resistance_n(stated) / ship.mass_kg * (speed / stated) ** 2
+    glided_s = cumulative_trapezoid((1.0 + ship.n_r(stated)) / r, -speed, initial=0.0)
+    result: Float64 = np.interp(after_s, glided_s, speed)
     return result
 
 

@@ -111,6 +111,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         stated,
         ship.baseline.run_scatter if ship.baseline else 0.0,
         -run.stop_moved_s,
+        run.context.turns,
         _simulating(run, frame),
     )
 

@@ -265,9 +265,14 @@ def _mixed(one: Estimate, other: Estimate, doubt: float, note: str) -> Estimate:
             calm.speed_m_s, other.calm, other.calm.resistance_m_s2
         )
         parts['log'] = np.hypot(parts.get('log', 0.0), _between(doubt) * np.abs(apart))
+    shared = one.sigma_shared_m_s2
+    if len(shared):
+        its = _at(calm.speed_m_s, other.calm, other.sigma_shared_m_s2)
+        shared = (1.0 - doubt) * shared[use] + doubt * its
     mixed = replace(
         one,
         calm=calm,
+        sigma_shared_m_s2=shared,
         conditions=conditions,
         froude_valid=(low, high),
         sigma_parts=parts,

@@ -38,7 +38,7 @@ class Combined:
     resistance_m_s2 : (m,)
         Mean weighted by the repeatable variances.
     sigma_m_s2 : (m,)
-        Standard deviation with the error of n_r, which all runs share.
+        Standard deviation with the error of n_r.
     sigma_repeatable_m_s2 : (m,)
         The same without it, widened where the runs differ by more than it says.
     scatter_m_s2 : (m,)
@@ -81,8 +81,10 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
 
     Notes
     -----
-    The band is widened by Birge's ratio, the root of chi^2 per degree of
-    freedom between the runs where it is above 1.
+    What all runs share by their priors, the errors of the ship file's curve, of
+    the log and of n_r, does not average out. What they do not is widened by
+    Birge's ratio, the root of chi^2 per degree of freedom between the runs where
+    it is above 1.
     """
     if len(estimates) < 2:
         raise EstimationError(f'{len(estimates)} coastdown(s) to combine, give two or more')
@@ -95,7 +97,8 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
     shifts = np.zeros(len(estimates))
     if current is not None:
         shifts = np.where(over_ground, current * np.nan_to_num(along), 0.0)
-    return _mean(curves, shifts, current, current_sigma)
+    shared = [_shared(*each) for each in zip(estimates, curves)]
+    return _mean(curves, shared, shifts, current, current_sigma)
 
 
 def comparable(estimates: Sequence[Estimate]) -> list[ResistanceCurve]:
@@ -155,8 +158,8 @@ def _agreement(
     bound = _LARGEST_CURRENT * min(float(curve.speed_m_s[0]) for curve in curves)
 
     def misfit(current: float) -> float:
-        chi2, _ = _between(curves, np.where(over_ground, current * along, 0.0))
-        return chi2
+        _, r, weight, mean = _mean_r(curves, np.where(over_ground, current * along, 0.0))
+        return _chi2(r, weight, mean)
 
     from scipy.optimize import minimize_scalar  # slow to import
 
@@ -179,42 +182,61 @@ def _grid(curves: Sequence[ResistanceCurve], shifts: Float64) -> Float64:
     return np.linspace(low, high, _POINTS)
 
 
-def _at(curves: Sequence[ResistanceCurve], shifts: Float64, speed: Float64) -> Float64:
-    """Return r, repeatable variance and variance of n_r: (3, runs, m)."""
-    found = np.empty((3, len(curves), len(speed)))
-    for i, (curve, shift) in enumerate(zip(curves, shifts)):
-        repeatable = curve.sigma_repeatable_m_s2**2
-        parts = curve.resistance_m_s2, repeatable, curve.sigma_m_s2**2 - repeatable
-        found[:, i] = [np.interp(speed + shift, curve.speed_m_s, part) for part in parts]
-    return found
+def _shared(estimate: Estimate, curve: ResistanceCurve) -> Float64:
+    """Return what other runs have too, at the speeds of a curve: of n_r, and of the rest."""
+    of_n_r = np.sqrt(np.maximum(curve.sigma_m_s2**2 - curve.sigma_repeatable_m_s2**2, 0.0))
+    rest = np.zeros(len(curve))
+    if len(estimate.sigma_shared_m_s2):
+        rest = np.interp(curve.speed_m_s, estimate.calm.speed_m_s, estimate.sigma_shared_m_s2)
+    return np.stack([of_n_r, np.minimum(rest, curve.sigma_repeatable_m_s2)])
 
 
-def _between(curves: Sequence[ResistanceCurve], shifts: Float64) -> tuple[float, Float64]:
-    """Return chi^2 between the runs, mean over the speeds, and the speeds."""
+def _at(
+    curves: Sequence[ResistanceCurve],
+    values: Sequence[Float64],
+    shifts: Float64,
+    speed: Float64,
+) -> Float64:
+    """Return values of each run at shifted speeds, (runs, m)."""
+    rows = zip(curves, values, shifts)
+    return np.array([np.interp(speed + at, curve.speed_m_s, value) for curve, value, at in rows])
+
+
+def _mean_r(
+    curves: Sequence[ResistanceCurve], shifts: Float64
+) -> tuple[Float64, Float64, Float64, Float64]:
+    """Return speeds (m,), r of each run, the weights of the runs, and the mean of r."""
     speed = _grid(curves, shifts)
-    r, variance, _ = _at(curves, shifts, speed)
+    r = _at(curves, [each.resistance_m_s2 for each in curves], shifts, speed)
+    variance = _at(curves, [each.sigma_repeatable_m_s2**2 for each in curves], shifts, speed)
     weight = 1.0 / variance
-    mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
-    return float((weight * (r - mean) ** 2).sum(axis=0).mean()), speed
+    return speed, r, weight, (weight * r).sum(axis=0) / weight.sum(axis=0)
+
+
+def _chi2(r: Float64, weight: Float64, mean: Float64) -> float:
+    """Return chi^2 between the runs, mean over the speeds."""
+    return float((weight * (r - mean) ** 2).sum(axis=0).mean())
 
 
 def _mean(
     curves: Sequence[ResistanceCurve],
+    shared: Sequence[Float64],
     shifts: Float64,
     current: float | None,
     current_sigma: float | None,
 ) -> Combined:
-    chi2, speed = _between(curves, shifts)
-    r, variance, of_n_r = _at(curves, shifts, speed)
+    speed, r, weight, mean = _mean_r(curves, shifts)
+    of_n_r, rest = (_at(curves, part, shifts, speed) for part in zip(*shared))
+    share = weight / weight.sum(axis=0)
+    # what the runs share is in each weight as if it were of that run alone
+    common = (share * rest).sum(axis=0) ** 2 - (share**2 * rest**2).sum(axis=0)
     runs, first = len(curves), curves[0]
-    weight = 1.0 / variance
-    mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
-    excess = max(1.0, chi2 / (runs - 1))
-    repeatable = np.sqrt(excess / weight.sum(axis=0))
+    excess = max(1.0, _chi2(r, weight, mean) / (runs - 1))
+    repeatable = np.sqrt(excess / weight.sum(axis=0) + common)
     return Combined(
         speed_m_s=speed,
         resistance_m_s2=mean,
-        sigma_m_s2=np.sqrt(repeatable**2 + of_n_r.mean(axis=0)),
+        sigma_m_s2=np.hypot(repeatable, (share * of_n_r).sum(axis=0)),
         sigma_repeatable_m_s2=repeatable,
         scatter_m_s2=r.std(axis=0, ddof=1),
         froude=speed * float(first.froude[-1] / first.speed_m_s[-1]),

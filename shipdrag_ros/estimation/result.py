@@ -149,6 +149,9 @@ class Estimate:
     sigma_parts
         Parts of the sigma of `calm` by cause (m,) [m/s^2], whose squares add up to its
         square; none where they are not known.
+    sigma_shared_m_s2
+        Part of the sigma of `calm` (m,) that other runs of the ship have too, by the prior of her
+        curve and of her log; empty where it is not known.
     """
 
     __repr__ = short_repr
@@ -177,6 +180,7 @@ class Estimate:
     notes: tuple[str, ...] = field(default=())
     reference: Reference = field(default_factory=Reference)
     sigma_parts: dict[str, Float64] = field(default_factory=dict)
+    sigma_shared_m_s2: Float64 = field(default_factory=lambda: np.empty(0))
 
     @property
     def curve(self) -> ResistanceCurve:

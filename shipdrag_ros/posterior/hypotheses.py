@@ -37,7 +37,7 @@ _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 # behind the extras: place to port, first heading, shaft speed of a propeller that the water
 # turns, scatter of the resistance from run to run, light air to the east and to the north
-_PORT, _HEADING, _FREE, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 7)
+_PORT, _HEADING, _FREE, _STALL, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 8)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
 _ABSENT = 1e10  # precision from which an instrument is not there
 _STEP_M_S = 0.1  # of differences
@@ -84,6 +84,8 @@ class RunSight:
         Of the resistance from run to run, relative.
     stop_s
         Where the stop was taken for at first.
+    turned
+        Whether the water is seen to turn the shaft.
     simulate
         From actions and steady speeds (m,).
     """
@@ -97,6 +99,7 @@ class RunSight:
     stated_run_down_s: float
     scatter: float
     stop_s: float
+    turned: bool
     simulate: Callable[[Sequence[Action], Float64], SimulatedRows]
 
     @cached_property
@@ -432,7 +435,11 @@ class ShipRuns:
             for form in hypothesis.forms
         ]
         base, acting = batch.add(still, speed), batch.add(whole, speed)
-        turned = batch.add(whole + Action(free_shaft=_STEP_Z), speed)
+        turned = []
+        if run.turned:
+            stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
+            shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
+            turned = [batch.add(whole + shaft, speed) for shaft in shafts]
         winds = (_STEP_M_S, 0.0), (0.0, _STEP_M_S)
         blown = [batch.add(whole + Action(wind_m_s=wind), speed) for wind in winds]
         return _Places(base, acting, steps, without, turned, blown, sum(actions, _NOTHING))
@@ -446,8 +453,14 @@ class ShipRuns:
         """Return what acts in a run without effects, and her steady speed."""
         run, place, k = self.runs[j], self.places[j], self.coefficients
         tau_s = run.model.forces.tau_s * math.exp(float(at[place[k + motion.TAU]]))
-        free = float(at[place[k + _FREE]])
-        still = Action(run_down_change_s=tau_s - run.stated_run_down_s, free_shaft=free)
+        friction = priors.SHAFT_FRICTION
+        still = Action(
+            run_down_change_s=tau_s - run.stated_run_down_s,
+            free_shaft=float(at[place[k + _FREE]]),
+            friction_m_s=run.model.speed_m_s
+            * friction.mean
+            * math.exp(friction.sd * float(at[place[k + _STALL]])),
+        )
         return still, float(at[place[k + motion.SPEED]])
 
     def _table(
@@ -482,7 +495,8 @@ class ShipRuns:
         for i, column in zip(_AIR, plan.blown):
             along[1 + k + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_M_S
             rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_M_S
-        rest[1 + k + _FREE] = (shown.rest[plan.turned] - shown.rest[plan.acting]) / _STEP_Z
+        for i, column in zip((_FREE, _STALL), plan.turned):
+            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
             trace = sd * (shown.along[plan.acting] - shown.along[column])
@@ -546,7 +560,7 @@ class _Places(NamedTuple):
     acting: int
     steps: list[int]
     without: list[int]
-    turned: int
+    turned: list[int]
     blown: list[int]
     action: Action
 

@@ -235,7 +235,7 @@ SHAFT_OFF = Declared('-', 'the same of all minutes of a glide', normal(0.05), ''
 SHAFT_FRICTION = Declared(
     '-',
     'speed, over that at the stop, at which friction stops a shaft that is free in the baseline',
-    normal(0.3),
+    log_normal(0.2, 0.7),
     '',
     '0.1 of bearings alone, 0.2 to 0.5 of a diesel that stays coupled',
 )

@@ -28,6 +28,9 @@ class ReadOut:
         Parts of sigma by cause (m,): `n_r`, `log`, `wind`, `depth`, `law` and `noise`, whose
         squares add up to its square. Each is what would go if the cause were known, of what
         those before it leave.
+    shared_m_s2 : (m,)
+        What the errors of the ship file's curve and of the log as they are expected, which are
+        those of her other runs too, put into sigma.
     """
 
     speed_m_s: Float64
@@ -36,6 +39,7 @@ class ReadOut:
     slope_1_s: Float64
     slope_sigma_1_s: Float64
     parts_m_s2: dict[str, Float64]
+    shared_m_s2: Float64
 
     @property
     def repeatable_m_s2(self) -> Float64:
@@ -75,7 +79,20 @@ def read(found: RunPosterior, speed_m_s: Float64, *, calm: bool = True) -> ReadO
         known[1] + theta @ slopes,
         np.sqrt(of_slope),
         _parts(found, cross, variance),
+        _shared(found, cross),
     )
+
+
+def _shared(found: RunPosterior, cross: Float64) -> Float64:
+    """
+    Return the sd of r by the prior of what her runs share.
+
+    A posterior covariance V is V (P + D) V, of the errors of prior P and of those of the data D.
+    """
+    which = [*range(found.problem.of_hull), *_causes(found)['log']]
+    prior = found.family @ np.array([1.0 / each.precision for each in found.problem.families])
+    shared: Float64 = np.sqrt(cross[:, which] ** 2 @ (1.0 / prior[which]))
+    return shared
 
 
 def _causes(found: RunPosterior) -> dict[str, list[int]]:

@@ -63,6 +63,8 @@ class Action:
     free_shaft
         Shaft speed of the baseline's free propeller, over that under power at
         the same speed of the ship, where it is seen to turn.
+    friction_m_s
+        Speed through water below which friction stops that propeller.
     depth_m
         Depth of the water, where it is less than the scenario's.
     log_factor, log_offset_m_s
@@ -94,6 +96,7 @@ class Action:
     turns: tuple[Turn, ...] = ()
     stall_m_s: float = 0.0
     free_shaft: float = 0.0
+    friction_m_s: float = 0.0
     depth_m: float = inf
     log_factor: float = 0.0
     log_offset_m_s: float = 0.0

@@ -34,6 +34,7 @@ from shipdrag_ros.simulation.terms import (
 )
 
 _LULL = 0.1  # of the stall speed, within which a shaft stops
+_STALLS = 0.12  # of its free revs, at which the torque of a propeller is largest: B4-70, B6-80
 _WINDMILLING = 0.7  # of the shaft speed that drives the ship as fast: no torque, a higher advance
 _QUIET_STEP_S = 1.0  # before the first order or turn nothing happens but the disturbances
 
@@ -268,13 +269,13 @@ def turning(speed_m_s: Float64, stall_m_s: Float64 | float) -> Float64:
     """
     Return the revs of a shaft whose friction is constant over those without friction.
 
-    Torque is a parabola of the revs, largest at half of the free ones; below the stall the shaft
+    Torque falls as the revs grow, from its largest at few of them; below the stall the shaft
     stands, and some way above it, for it stops from a chance lull on.
     """
     stall = np.maximum(stall_m_s, 1e-9)
     load = np.minimum(stall / np.maximum(speed_m_s, 1e-9), 1.0)
     stands = 0.5 * (1.0 - np.tanh((speed_m_s / stall - 1.0) / _LULL))
-    found: Float64 = 0.5 * (1.0 + np.sqrt(1.0 - load**2)) * (1.0 - stands)
+    found: Float64 = (1.0 - (1.0 - _STALLS) * load**2) * (1.0 - stands)
     return found
 
 

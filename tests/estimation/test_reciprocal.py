@@ -59,6 +59,21 @@ def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     np.testing.assert_allclose(of_n_r.max(), expected.max(), rtol=1e-6)
 
 
+def test_what_runs_share_does_not_average_out(coast, ship) -> None:
+    # the scale of her log, and what the file says of her curve, are the same in every run
+    one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
+    eight = combine([one] * 8, [None] * 8)
+    alone = one.valid_curve.sigma_repeatable_m_s2
+    shared = np.minimum(one.sigma_shared_m_s2, alone)
+    own = np.sqrt(alone**2 - shared**2)
+    expected = np.sqrt(shared**2 + own**2 / 8.0)
+    at = eight.speed_m_s, one.valid_curve.speed_m_s
+    np.testing.assert_allclose(eight.sigma_repeatable_m_s2, np.interp(*at, expected), rtol=0.03)
+    log_alone = replace(one, sigma_shared_m_s2=alone.copy())
+    held = combine([log_alone] * 8, [None] * 8)
+    np.testing.assert_allclose(held.sigma_repeatable_m_s2, np.interp(*at, alone), rtol=0.02)
+
+
 def test_runs_are_of_one_kind(coast, ship) -> None:
     # wind and depth are known of one alone: what it is in calm deep water is not that of the other
     one = run(coast, ship, current_m_s=0.0, seed=1, log=True)

@@ -102,12 +102,14 @@ def test_fouling_of_a_tabulated_baseline_uses_the_usual_surface_and_form():
 def test_a_windmilling_propeller_drags_more_towards_the_stall_and_as_a_locked_one_below_it():
     action = run(quadratic(), 'windmilling_propeller=0.1,stall_speed_m_s=3').action
     pressure = 0.5 * 1025.0 * DISC
-    friction = (0.36 - 0.1) * 3.0**2  # a constant force while it turns
-    np.testing.assert_allclose(action.resistance_n(5.0), pressure * (0.1 * 25.0 + friction))
-    np.testing.assert_allclose(action.resistance_n(2.0), pressure * 0.36 * 4.0)
+    friction = (1.15 * 0.36 - 0.1) * 3.0**2  # a constant force while it turns
+    np.testing.assert_allclose(
+        action.resistance_n(5.0), pressure * (0.1 * 25.0 + friction), rtol=1e-6
+    )
+    np.testing.assert_allclose(action.resistance_n(2.0), pressure * 0.36 * 4.0, rtol=1e-3)
     standing = 'windmilling_propeller=0.1,stall_speed_m_s=3,locked_coefficient=0.3'
     np.testing.assert_allclose(
-        run(quadratic(), standing).action.resistance_n(2.0), pressure * 0.3 * 4.0
+        run(quadratic(), standing).action.resistance_n(2.0), pressure * 0.3 * 4.0, rtol=1e-3
     )
 
 
@@ -117,9 +119,9 @@ def test_the_flow_turns_a_windmilling_shaft_ever_less_until_it_stalls():
     u = truth.speed_through_water_m_s[late]
     share = truth.shaft_rad_s[late] / (0.7 * 11.5 * u / 8.0)
     assert np.all(np.diff(share) < 1e-12)
-    # a parabola of torque: (v_s / v)^2 = 4 share (1 - share)
+    # torque, as (v_s / v)^2, falls from 1 at 0.12 of the free revs to none at those
     fast = u > 1.4 * 4.0
-    np.testing.assert_allclose((4.0 / u[fast]) ** 2, 4.0 * (share * (1 - share))[fast], atol=0.01)
+    np.testing.assert_allclose(share[fast], 1.0 - 0.88 * (4.0 / u[fast]) ** 2, atol=1e-3)
     assert np.all(share[u < 3.0] < 0.01)
 
 

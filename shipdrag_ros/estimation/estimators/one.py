@@ -268,6 +268,7 @@ def _result(
         conditions=conditions,
         reference=reference,
         sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
+        sigma_shared_m_s2=part.shared_m_s2[use],
         start_ns=int(stamps.min()),
         end_ns=int(stamps.max()),
         order=None,
