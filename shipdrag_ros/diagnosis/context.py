@@ -77,6 +77,8 @@ class Context:
         Times of the observation that rows are nearest to.
     draught_m
         None where there is no row of depth.
+    odd
+        Whether a shaft that stands is odd: the baseline's propeller is free.
     run_down_s
         Of the thrust as the ship file states it; None where there is no row of the fall.
     depth_m
@@ -93,6 +95,7 @@ class Context:
     at_yaw: NDArray[np.intp]
     draught_m: float | None
     turns: bool
+    odd: bool = False
     run_down_s: float | None = None
     depth_m: float | None = None
 
@@ -121,7 +124,7 @@ class Context:
         wind_s, wind = _binned(window, 'wind_apparent', stop, edges)
         yaw_s, yaw = _binned(window, 'heading', stop, edges)
         depth = _binned(window, 'depth', stop, edges)[1]
-        shaft_s, shaft, turns = _shaft(window, ship, stop, edges)
+        shaft_s, shaft, turns = _shaft(window, ship, stop, times[-1])
         values = [wind[:, 0], wind[:, 1]]
         blocks = [_wind_covariance(wind[:, i], wind[:, 1 - i]) for i in range(2)]
         draught_m = ship.draught_m if len(depth) else None
@@ -149,6 +152,7 @@ class Context:
             np.searchsorted(times, yaw_s).clip(max=last),
             draught_m,
             turns,
+            not turns and (ship.propeller is None or ship.propeller.state_in_baseline == 'free'),
             run_down_s,
             float(np.median(depth)) if len(depth) else None,
         )
@@ -214,13 +218,11 @@ class Context:
         if not self.turns:
             turned[stall[:, 0] == 0.0] = 0.0
         driven = fraction * np.exp(-after / np.maximum(decay_s, 1e-3))
-        odd = np.where(stall == 0.0, 0.0 if self.turns else _STANDS_SD, 0.0)
+        odd = np.where(stall == 0.0, _STANDS_SD if self.odd else 0.0, 0.0)
         return [turned + (1.0 - turned) * driven, odd]
 
 
-def _shaft(
-    window: Window, ship: Ship, stop: Stop, edges: Float64
-) -> tuple[Float64, Float64, bool]:
+def _shaft(window: Window, ship: Ship, stop: Stop, end_s: float) -> tuple[Float64, Float64, bool]:
     """Return times and values of the shaft after its run-down, and whether the water turns it."""
     nothing = np.empty(0), np.empty(0), False
     if window.before is None or len(window.before.shaft) == 0:
@@ -228,14 +230,14 @@ def _shaft(
     steady = float(np.median(np.abs(window.before.shaft.value)))
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
     fallen_s = stop.lead_in_s + RUN_DOWNS * max(run_down_s, stop.shaft_s)
-    time_s, value = _binned(window, 'shaft', stop, edges)
-    late = time_s > fallen_s
-    if steady <= 0.0 or not late.any():
+    # a bin with readings from before holds some of the steady ones
+    time_s, value = _binned(window, 'shaft', stop, np.arange(fallen_s, end_s + _BIN_S, _BIN_S))
+    if steady <= 0.0 or not len(time_s):
         return nothing
-    shaft = value[late, 0] / steady
+    shaft = value[:, 0] / steady
     # soon after the fall, before it may stall
     turns = bool(np.median(shaft[:3]) > TURNS)
-    return time_s[late], shaft, turns
+    return time_s, shaft, turns
 
 
 def _binned(window: Window, name: str, stop: Stop, edges: Float64) -> tuple[Float64, Float64]:
