@@ -3,7 +3,8 @@
 Write tables of the docs from the code.
 
 `python docs/tables.py` rewrites what stands between the markers in docs/ros.md, docs/effects.md,
-docs/results/effects.txt and docs/model.md; a test fails while the two differ.
+docs/model.md, docs/results/effects.txt and regimes_numbers.txt; a test fails while the two
+differ.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.fields import keys_of
 from shipdrag_ros.forecast import priors as forecast_priors
 from shipdrag_ros.inference import priors as noise_priors
@@ -27,6 +29,7 @@ DOCS = Path(__file__).resolve().parent
 ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
 EFFECTS_MORE = DOCS / 'results' / 'effects.txt'
+REGIMES = DOCS / 'results' / 'regimes_numbers.txt'
 MODEL = DOCS / 'model.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
@@ -236,6 +239,7 @@ PAGES: Mapping[Path, Tables] = {
         'families': model_families,
         'forecast priors': model_forecast,
     },
+    REGIMES: {'numbers': numbers.table},
 }
 
 

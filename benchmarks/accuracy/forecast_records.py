@@ -8,13 +8,14 @@ Reads the folder that SHIPDRAG_DATA names. After a quarter, a third and a half o
 rest is foretold from the readings until then, and compared with speed and way at eighths of what
 was left. Rivals: the deceleration persists; the polynomial of S1 goes on; a fit of u' = -k u^2. A
 rival's band is as wide as holds 90 % of its errors on the other records. `--write` puts the tables
-into docs/forecast.md.
+into docs/forecast.md, and what was not foretold into docs/results/forecast_records.txt.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,6 +39,7 @@ from shipdrag_ros.ship import Ship
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'forecast.md'
+REASONS = ROOT / 'docs' / 'results' / 'forecast_records.txt'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 EIGHTHS = np.arange(1, 9) / 8.0
 OURS, RIVALS = 'forecast', ('persistence', 'polynomial', 'v^2')
@@ -280,6 +282,7 @@ def report(every: list[Case], problems: list[str]) -> str:
             f'{which} records ({len(of_half)}): {held:.0%} inside, better score than persistence '
             f'in {better[0]}, less error in {better[1]}'
         )
+    missed = len({re.split('[,:]', each)[0] for each in problems})
     lines = [
         *table(head, rows),
         '',
@@ -295,7 +298,8 @@ def report(every: list[Case], problems: list[str]) -> str:
         '',
         f'By half of the list: {"; ".join(halves)}.',
         '',
-        *(f'- Not foretold: {each}' for each in problems),
+        f'Of {missed} of {len(ONCE)} records some or all was not foretold: '
+        '[each with its reason](results/forecast_records.txt).',
     ]
     return '\n'.join(lines)
 
@@ -305,7 +309,7 @@ def main() -> None:
     Print the tables, and write them into the page if asked.
     """
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into docs/forecast.md')
+    parser.add_argument('--write', action='store_true', help='into docs/forecast.md, docs/results')
     parser.add_argument('--estimator', default='one', help='of the estimate that is used')
     parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'forecast')
     options = parser.parse_args()
@@ -325,9 +329,11 @@ def main() -> None:
                 every.append(each)
             print(each if isinstance(each, str) else (each.record, each.part), flush=True)
     text = report(with_bands(every), problems)
-    print(text)
+    print(text, *problems, sep='\n')
     if options.write:
         put(PAGE, {'records': text})
+        head = 'Not foretold by `python -m benchmarks.accuracy.forecast_records --write`:\n'
+        REASONS.write_text('\n'.join([head, *problems, '']), encoding='utf-8')
 
 
 if __name__ == '__main__':

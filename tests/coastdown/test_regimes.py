@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
-from shipdrag_ros.coastdown.regimes.numbers import NUMBERS, table
+from shipdrag_ros.coastdown.regimes.numbers import NUMBERS
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
@@ -140,9 +139,7 @@ def test_a_record_of_what_no_ship_does_is_explained_less_well(ship, record) -> N
     assert explained[0] > 0.05 > explained[1]
 
 
-def test_the_docs_print_the_numbers_of_the_code() -> None:
-    page = (Path(__file__).resolve().parents[2] / 'docs' / 'regimes.md').read_text()
-    assert table() in page
+def test_every_number_has_a_unit_and_a_source() -> None:
     assert all(each.unit and each.source for each in NUMBERS)
 
 

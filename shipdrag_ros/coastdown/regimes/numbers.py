@@ -211,7 +211,3 @@ def table() -> str:
         for each in NUMBERS
     ]
     return '\n'.join(['| number | value | unit | source |', '|---|---|---|---|', *rows])
-
-
-if __name__ == '__main__':
-    print(table())
