@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,21 @@ import pytest
 
 from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Ship, TableBaseline
-from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.samples import Channel, Float64
+from shipdrag_ros.ship import Propulsion, Ship, TableBaseline
+from shipdrag_ros.simulation import (
+    START_NS,
+    Action,
+    Scenario,
+    Truth,
+    sense,
+    simulate,
+    simulate_columns,
+    standard_sensors,
+)
+from shipdrag_ros.simulation.surge import turning
+
+_TIMES = np.arange(0.0, 5610.0, 10.0)
 
 
 @pytest.mark.parametrize(('gain', 'turned_rad'), [(1.05, 0.0), (1.0, 0.05)])
@@ -41,28 +54,43 @@ def test_an_anemometer_that_is_wrong_by_its_sd_is_no_other_speed(
     assert float(away @ away) < 1.5
 
 
-def test_a_free_shaft_that_friction_stops_is_no_other_propeller(cargo: Ship) -> None:
+def _shaft_of(cargo: Ship, after: Callable[[Float64, Float64], Float64]) -> tuple[Context, Truth]:
+    """Return the context of a run whose shaft, over the steady one, is some function after it."""
     speed = np.linspace(0.0, 10.0, 101)
-    ship = replace(cargo, baseline=TableBaseline(tuple(speed), tuple(3e3 * speed**2), 0.01))
-    scenario = Scenario(speed_m_s=8.0, lead_in_s=600.0, duration_s=5000.0)
-    truth = simulate(ship, scenario)
+    baseline = TableBaseline(tuple(speed), tuple(3e3 * speed**2), 0.01)
+    ship = replace(cargo, baseline=baseline, propulsion=Propulsion(2.0, 0.5))
+    truth = simulate(ship, Scenario(speed_m_s=8.0, lead_in_s=610.0, duration_s=5000.0))
     block = sense(truth, standard_sensors(inputs=('speed_through_water', 'shaft')), seed=3)
     first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
     shaft = block.channel == Channel.SHAFT
-    time_s = (block.stamp_ns[shaft] - START_NS) * 1e-9
-    part = np.interp(time_s, truth.time_s, truth.speed_through_water_m_s) / 8.0
-    free = np.where(time_s > 600.0, 0.5 * part, 1.0)
-    held = np.where(time_s > 600.0, free * (1.0 - np.minimum(0.3 / part, 1.0) ** 2), 1.0)
-    assert held[-1] < 0.2 * free[-1]
-    found = []
-    for revs in (free, held):
-        value = block.value.copy()
-        value[shaft, 0] = 11.0 * revs
-        other = replace(block, value=value)
-        window = Window.from_block(other, START_NS + 600 * 10**9, last, before_ns=first)
-        stop = Stop(first, 600.0, 0.0, 8.0)
-        found.append(Context.of(window, ship, np.arange(0.0, 5600.0, 10.0), stop))
-    assert found[0].turns
-    away = found[1].whitener @ (found[1].value - found[0].value)
-    # about one standard deviation of one unknown
-    assert float(away @ away) < 4.0
+    after_s = (block.stamp_ns[shaft] - START_NS) * 1e-9 - 610.0
+    part = np.interp(after_s + 610.0, truth.time_s, truth.speed_through_water_m_s) / 8.0
+    value = block.value.copy()
+    value[shaft, 0] = 11.0 * np.where(after_s > 0.0, after(after_s, part), 1.0)
+    window = Window.from_block(
+        replace(block, value=value), START_NS + 610 * 10**9, last, before_ns=first
+    )
+    return Context.of(window, ship, _TIMES, Stop(first, 610.0, 0.0, 8.0)), truth
+
+
+def test_a_free_shaft_that_friction_stops_is_no_other_propeller(cargo: Ship) -> None:
+    found, truth = _shaft_of(cargo, lambda _, part: 0.5 * part * turning(part, 0.25))
+    assert found.turns
+    columns = simulate_columns(
+        truth.ship, truth.scenario, [Action()], _TIMES, speed_m_s=np.array([8.0])
+    )
+    chi2 = {}
+    for friction_m_s in (0.0, 2.0):
+        action = Action(free_shaft=0.5, friction_m_s=friction_m_s)
+        away = found.whitener @ (found.value - found.predict(columns, [action])[0])
+        chi2[friction_m_s] = float(away @ away)
+    assert chi2[0.0] > 10.0
+    assert chi2[2.0] < 1.0
+
+
+def test_rows_of_the_shaft_hold_no_reading_from_before_its_fall(cargo: Ship) -> None:
+    # one minute of them says that the water turns her propeller
+    found, _ = _shaft_of(cargo, lambda after_s, _: np.exp(-after_s / 2.0))
+    assert not found.turns
+    assert len(found.at_shaft) > 80
+    assert np.abs(found.value[: len(found.at_shaft)]).max() < 0.01
