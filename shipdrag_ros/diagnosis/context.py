@@ -213,8 +213,8 @@ class Context:
         )
         asked = np.array([wanted(action) for action in actions])
         stall, friction, free, fraction, decay_s = asked.T[:, :, None]
-        at_rest = np.maximum(stall, friction)
-        turned = free * speed / self.stop.speed_m_s * turning(speed, at_rest)
+        stands = np.where(stall > 0.0, stall, friction)  # of another propeller, or the baseline's
+        turned = free * speed / self.stop.speed_m_s * turning(speed, stands)
         if not self.turns:
             turned[stall[:, 0] == 0.0] = 0.0
         driven = fraction * np.exp(-after / np.maximum(decay_s, 1e-3))

@@ -111,7 +111,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         stated,
         ship.baseline.run_scatter if ship.baseline else 0.0,
         -run.stop_moved_s,
-        run.context.turns,
+        len(run.context.at_shaft) > 0,
         _simulating(run, frame),
     )
 

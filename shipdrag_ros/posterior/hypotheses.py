@@ -84,8 +84,8 @@ class RunSight:
         Of the resistance from run to run, relative.
     stop_s
         Where the stop was taken for at first.
-    turned
-        Whether the water is seen to turn the shaft.
+    shaft
+        Whether it is measured after its fall.
     simulate
         From actions and steady speeds (m,).
     """
@@ -99,7 +99,7 @@ class RunSight:
     stated_run_down_s: float
     scatter: float
     stop_s: float
-    turned: bool
+    shaft: bool
     simulate: Callable[[Sequence[Action], Float64], SimulatedRows]
 
     @cached_property
@@ -436,7 +436,7 @@ class ShipRuns:
         ]
         base, acting = batch.add(still, speed), batch.add(whole, speed)
         turned = []
-        if run.turned:
+        if run.shaft:
             stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
             shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
             turned = [batch.add(whole + shaft, speed) for shaft in shafts]
