@@ -25,6 +25,7 @@ _SPEEDS = (
     types.ODOMETRY,
     types.DVL,
 )
+# one more type: its name in types.py, here, and how it is read at the end of decoding.py
 _FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': _SPEEDS,
     'speed_over_ground': _SPEEDS,
