@@ -135,8 +135,11 @@ def match_inputs(
     types_of: dict[str, list[str]] = {}
     for topic, type_name in topics:
         types_of.setdefault(_absolute(topic), []).append(type_name)
-    renamed = dict(_topic_and_input(*each) for each in (remap or {}).items())
+    pairs = list(dict.fromkeys(_topic_and_input(*each) for each in (remap or {}).items()))
+    renamed = dict(pairs)
     problems = _remap_problems(renamed, types_of)
+    if len(pairs) > len(renamed):
+        problems.append('--remap gives one topic as two inputs; give it as one')
 
     heard: dict[tuple[str, str], Source] = {}
     unaccepted: dict[tuple[str, str], str] = {}
