@@ -421,4 +421,4 @@ def show(value: object) -> str:
     """
     Return a value for a message, however large it is.
     """
-    return _SHORT.repr(value)
+    return _SHORT.repr(value.tolist() if isinstance(value, array) else value)

@@ -181,7 +181,19 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
     """
     Add `--remap FROM:=TO`.
     """
-    parser.add_argument('--remap', action='append', default=[], type=remap, metavar='FROM:=TO')
+    parser.add_argument('--remap', action=_Remap, default={}, type=remap, metavar='FROM:=TO')
+
+
+class _Remap(argparse.Action):
+    """Collects remappings by name, of which none takes the place of another unseen."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: Any, pair: Any, *_: Any
+    ) -> None:
+        found = getattr(namespace, self.dest)
+        if pair[0] in found:
+            parser.error(f'argument --remap: {pair[0]!r} is remapped twice; give it once')
+        setattr(namespace, self.dest, found | dict([pair]))
 
 
 def add_effects(parser: argparse.ArgumentParser) -> None:

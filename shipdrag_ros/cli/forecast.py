@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     ship = None if options.ship is None else Ship.load(options.ship)
     parameters = None if options.parameters is None else Parameters.load(options.parameters)
-    given = open_windowed(options.bags, remap=dict(options.remap), output=output)
+    given = open_windowed(options.bags, remap=options.remap, output=output)
     if options.if_stopped_now:  # a window says when `now` is, not that she glides in it
         given = [WindowedRun(run.part(*own) if own else run, None) for run, own in given]
     results = [

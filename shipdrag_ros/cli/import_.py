@@ -27,10 +27,10 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Option
@@ -89,7 +89,8 @@ def run(options: argparse.Namespace) -> int:
         for option in each.options
         if (value := getattr(options, option.key)) is not None
     }
-    chosen = [_chosen(options, source, given) for source in options.sources]
+    named = next((each for each in formats.found() if each.name == options.format), None)
+    chosen = [format_of(source, given, named) for source in options.sources]
     for key in given:
         if not any(key in _keys(each) for each in chosen):
             options.misused(_foreign(key, chosen))
@@ -106,7 +107,14 @@ def run(options: argparse.Namespace) -> int:
             (each, replace(job_of(each, source, given), progress=progress))
             for source, each in zip(options.sources, chosen, strict=True)
         ]
-        found = read_joined(parts)
+        try:
+            found = read_joined(parts)
+        except ImportDataError as error:
+            if named is None:
+                raise
+            raise ImportDataError(
+                f'{error}; read as {named.kind} for --format: without it the content decides'
+            ) from error
         found.log.copy_to(bag)
     documents = []
     for source, each, result in zip(options.sources, chosen, found.results, strict=True):
@@ -128,11 +136,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _keys(each: Format) -> set[str]:
     return {option.key for option in each.options}
-
-
-def _chosen(options: argparse.Namespace, source: Path, given: dict[str, Any]) -> Format:
-    named = [each for each in formats.found() if each.name == options.format]
-    return named[0] if named else format_of(source, given)
 
 
 def _foreign(key: str, chosen: Sequence[Format]) -> str:

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     Show what is in the bags.
     """
     output = Output(options.json)
-    found = [info(each) for each in open_parts(options.bags, output, remap=dict(options.remap))]
+    found = [info(each) for each in open_parts(options.bags, output, remap=options.remap)]
     for about in found:
         _show(output, about)
     output.json({'bags': [asdict(about) for about in found]})

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     check_name(name)
     given = None if options.ship is None else Ship.load(options.ship)
     bags, kept = _bags(options.bags)
-    runs = open_windowed(bags, remap=dict(options.remap), output=output)
+    runs = open_windowed(bags, remap=options.remap, output=output)
     if given is None and kept and not any(SHIP_FILE in run.attachments for run, _ in runs):
         given = _one(kept)
     with stages(output) as progress:

@@ -20,9 +20,12 @@ shipdrag recover damaged.mcap -o again.mcap --json recover.json
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from shipdrag_ros.bags.check import FileCheck, check
 from shipdrag_ros.bags.recover import Recovery, recover
 from shipdrag_ros.cli.arguments import add_json, add_out, bag, new_file
 from shipdrag_ros.cli.check import damage_table
@@ -45,12 +48,26 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     with output.progress(f'reading {options.source}') as progress:
         result = recover(options.source, options.out, progress=progress)
-    _show(output, options.source, result)
+    whole = not result.damage
+    if whole:  # the salvage does without the index, of which the check speaks
+        result = _with_index(result, check([options.source]))
+    _show(output, options.source, result, whole=whole)
     output.json(_document(result))
     return 0
 
 
-def _show(output: Output, source: Path, result: Recovery) -> None:
+def _with_index(result: Recovery, found: Sequence[FileCheck]) -> Recovery:
+    damage = [
+        replace(each, file=file.path.name if len(found) > 1 else '')
+        for file in found
+        for each in file.damage
+    ]
+    return replace(
+        result, damage=tuple(damage), damage_count=sum(file.damage_count for file in found)
+    )
+
+
+def _show(output: Output, source: Path, result: Recovery, *, whole: bool) -> None:
     output.say(f'{result.output}: {result.messages_recovered} messages of {source}')
     if result.quarantine is not None:
         output.say(
@@ -58,14 +75,16 @@ def _show(output: Output, source: Path, result: Recovery) -> None:
             'for, cut off or with a wrong checksum'
         )
     output.say(f'{result.bytes_lost} of {result.bytes_read} bytes gave nothing.')
-    if not result.damage:
+    if whole:
+        output.say('All data are whole.')
+    if whole and result.damage:
         output.say(
-            'All data are whole. If `shipdrag check` says otherwise, it means the index of '
-            f'{source}, which is not needed; {result.output} has one of its own.'
+            f'The index of {source} is damaged, which is not needed; {result.output} has one of '
+            'its own.'
         )
-        return
-    output.heading(f'{result.damage_count} damage(s)')
-    damage_table(output, result.damage, result.damage_count)
+    if result.damage:
+        output.heading(f'{result.damage_count} damage(s)')
+        damage_table(output, result.damage, result.damage_count)
 
 
 def _document(result: Recovery) -> dict[str, Any]:

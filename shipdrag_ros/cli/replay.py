@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     results = [
         replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
         for each, own in open_windowed(
-            options.bags, remap=dict(options.remap), window=window, output=output
+            options.bags, remap=options.remap, window=window, output=output
         )
     ]
     ranking = rank(results) if options.compare else None

@@ -144,7 +144,7 @@ def _source(
     from shipdrag_ros.live.source import BagSource, NodeSource
 
     if options.bags:
-        runs = open_parts(options.bags, output, remap=dict(options.remap))
+        runs = open_parts(options.bags, output, remap=options.remap)
         player = BagSource(runs, ship=ship, speed=options.speed, past=past)
         with contextlib.closing(player) as bags:
             yield bags, None

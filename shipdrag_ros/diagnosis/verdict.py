@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From compared hypotheses to what is answered: sizes, limits, and how runs differ."""
+"""
+From compared hypotheses to what is answered: sizes, limits, and how runs differ.
+
+Whether that is `named`, `one_of`, `unknown` or `none` is decided by `inference.decision.decide`.
+"""
 
 from __future__ import annotations
 

@@ -209,22 +209,19 @@ class ReadOptions:
             found['rate'] = self.rate_hz
         return found | self._read_others()
 
-    def format_of(self, source: Path, options: Mapping[str, Any]) -> Format:
+    @property
+    def named(self) -> Format | None:
         """
-        Return the format of a file: the one that was named, or by its options or content.
-
-        Parameters
-        ----------
-        source, options
+        The format that was named, if one was.
 
         Raises
         ------
         ImportDataError
-            If there is none of the name, or it is of none that is known.
+            If there is none of the name.
         """
         name = (self.others or {}).get(_FORMAT)
         if name is None:
-            return format_of(source, options)
+            return None
         known = {each.name: each for each in formats.found()}
         if name not in known:
             raise ImportDataError(f'options {_FORMAT!r}: {name!r}, there are {", ".join(known)}')
@@ -360,15 +357,14 @@ def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_P
         source = FrameTable(source)
         how = how.of_dates(source.dates)
         options = how.options(source, alone=alone)
-        # a frame is a table, however few columns it has
-        declared = how.format_of(path, {'map': (), **options})
+        declared = how.named or TABLE  # however few columns it has
         if declared.name != TABLE.name:
             raise ImportDataError(f'a frame is a table, and not {declared.kind}; leave format out')
         found: ImportResult = read_csv(source, log, job_of(declared, path, options).options)
     else:
         name, path = str(source), source
         options = how.options(path, alone=alone)
-        declared = how.format_of(path, options)
+        declared = format_of(path, options, how.named)
         found = declared.read(job_of(declared, path, options), log)
     run = LogRun(log, [path])
     run.name = name

@@ -25,6 +25,7 @@ _SPEEDS = (
     types.ODOMETRY,
     types.DVL,
 )
+# one more type: its name in types.py, here, and how it is read at the end of decoding.py
 _FIRST: Mapping[str, tuple[str, ...]] = {
     'speed_through_water': _SPEEDS,
     'speed_over_ground': _SPEEDS,
@@ -134,8 +135,11 @@ def match_inputs(
     types_of: dict[str, list[str]] = {}
     for topic, type_name in topics:
         types_of.setdefault(_absolute(topic), []).append(type_name)
-    renamed = dict(_topic_and_input(*each) for each in (remap or {}).items())
+    pairs = list(dict.fromkeys(_topic_and_input(*each) for each in (remap or {}).items()))
+    renamed = dict(pairs)
     problems = _remap_problems(renamed, types_of)
+    if len(pairs) > len(renamed):
+        problems.append('--remap gives one topic as two inputs; give it as one')
 
     heard: dict[tuple[str, str], Source] = {}
     unaccepted: dict[tuple[str, str], str] = {}

@@ -175,6 +175,7 @@ class _Choice:
     since_ns: int
     counts: Counter[HeardSentence] = field(default_factory=Counter)
     held: HeardSentence | None = None
+    before: HeardSentence | None = None
     last_ns: int = 0
 
     def takes(self, heard: HeardSentence, now_ns: int) -> bool:
@@ -182,7 +183,7 @@ class _Choice:
         # a clock that was set back must not make it wait
         self.since_ns, self.last_ns = min(self.since_ns, now_ns), min(self.last_ns, now_ns)
         if self.held not in (None, heard) and now_ns - self.last_ns > SILENT_NS:
-            self.held, self.since_ns = None, now_ns
+            self.before, self.held, self.since_ns = self.held, None, now_ns
             self.counts.clear()
         if len(self.counts) < _KINDS or heard in self.counts:
             self.counts[heard] += 1
@@ -222,6 +223,8 @@ class Interpreter:
     not_taken
         Those of a source that was not chosen, and those that came while it was being chosen,
         by address, then by input.
+    changes
+        What is fed by another source than before, a sentence each, until it is taken from here.
     """
 
     def __init__(self, mounting: sentences.Mounting | None = None) -> None:
@@ -232,6 +235,7 @@ class Interpreter:
         self.behind: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
         self.not_taken: defaultdict[str, Counter[str]] = defaultdict(Counter)
+        self.changes: list[str] = []
         self._reader = sentences.SentenceReader(mounting)
         self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
@@ -290,6 +294,14 @@ class Interpreter:
                 return before
         return ''
 
+    def lose(self, address: str) -> None:
+        """
+        Let the sources on an address give way at once: its line is gone.
+        """
+        for choice in self._choices.values():
+            if choice.held is not None and choice.held[1] == address:
+                choice.last_ns = 0
+
     def _of_sentence(self, stamped: Stamped, address: str) -> list[EncodedMessage]:
         sentence, stamp_ns, read_ns = stamped
         if stamp_ns < read_ns:
@@ -308,6 +320,12 @@ class Interpreter:
             if not choice.takes((value.source, address), read_ns):
                 self.not_taken[address][value.channel.input] += 1
                 continue
+            before, choice.before = choice.before, None
+            if before not in (None, choice.held):
+                self.changes.append(
+                    f'{value.channel.input}: now from {value.source} on {address}, no longer from '
+                    f'{before[0]} on {before[1]}'
+                )
             self.used[value.channel.input] += 1
             samples.append((int(value.channel), stamp_ns, read_ns, value.a, value.b))
         return list(encode(Block.of_samples(samples)))

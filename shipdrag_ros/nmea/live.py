@@ -277,6 +277,7 @@ class LineListener:
         self.counts = SourceCounts()
         self._deliver = deliver
         self._closing = threading.Event()
+        self._splitter = LineSplitter()
         self._budget = BURST_LINES
         self._budget_s = monotonic()
         self._thread = threading.Thread(target=self._run, name=f'nmea {address}', daemon=True)
@@ -318,28 +319,32 @@ class LineListener:
 
     def _hear(self, read: Read) -> None:
         """Read until the other side ends it."""
-        splitter = LineSplitter()
         heard_s = monotonic()
-        before = (self.counts.too_long, self.counts.binary)
-        while not self._closing.is_set():
-            data = read()
-            if data is None:
-                if self.address.way is Way.TCP and monotonic() - heard_s > SILENT_S:
-                    raise OSError(0, f'nothing came for {SILENT_S:.0f} s')
-                continue
-            heard_s = monotonic()
-            lines = splitter.feed(data)
-            if self.address.way is Way.UDP:  # a datagram is whole
-                lines += splitter.end()
-            self.counts.too_long = before[0] + splitter.too_long
-            self.counts.binary = before[1] + splitter.binary
-            if lines:
-                self.counts.lines += len(lines)
-                self.counts.last_s = heard_s
-                self._deliver(self.address, lines)
-            if not data and self.address.way is not Way.UDP:
-                return
-            self._slow_down(max(len(lines), len(data) / 80.0))
+        try:
+            while not self._closing.is_set():
+                data = read()
+                if data is None:
+                    if self.address.way is Way.TCP and monotonic() - heard_s > SILENT_S:
+                        raise OSError(0, f'nothing came for {SILENT_S:.0f} s')
+                    continue
+                heard_s = monotonic()
+                lines = self._splitter.feed(data)
+                if self.address.way is Way.UDP:  # a datagram is whole
+                    lines += self._splitter.end()
+                self._take(lines)
+                if not data and self.address.way is not Way.UDP:
+                    return
+                self._slow_down(max(len(lines), len(data) / 80.0))
+        finally:  # a line that the end cut is recorded, and counted as what it is
+            self._take(self._splitter.end())
+
+    def _take(self, lines: list[str]) -> None:
+        self.counts.too_long = self._splitter.too_long
+        self.counts.binary = self._splitter.binary
+        if lines:
+            self.counts.lines += len(lines)
+            self.counts.last_s = monotonic()
+            self._deliver(self.address, lines)
 
     def _slow_down(self, lines: float) -> None:
         """Read no faster than any ship's instruments talk, so that a flood takes no core."""

@@ -99,8 +99,8 @@ class Recently:
         """
         Take the counts of a moment on a steady clock [s].
         """
-        if self._past and counts.used < self._past[-1][1].used:
-            self._past.clear()  # a new activation counts from 0
+        if self._past and (counts == self._past[0][1] or counts.used < self._past[-1][1].used):
+            self._past.clear()  # nothing came yet; a new activation counts from 0
         self._past.append((now_s, counts))
         while self._past[0][0] < now_s - RECENT_S:
             self._past.popleft()

@@ -182,9 +182,12 @@ class NmeaFeed:
         session = self._session()
         if before and session is not None:
             text = f'{name}: now from {who}, no longer from {before}, which sends less'
-            self._node.get_logger().warning(text)
-            session.note(EventKind.SOURCE, text, now_ns)
+            self._say(text, session, now_ns)
         return used
+
+    def _say(self, text: str, session: Session, now_ns: int) -> None:
+        self._node.get_logger().warning(text)
+        session.note(EventKind.SOURCE, text, now_ns)
 
     def silence(self) -> str:
         """
@@ -225,6 +228,7 @@ class NmeaFeed:
             if count.problem != before:
                 log = self._node.get_logger()
                 if count.problem:
+                    self._interpreter.lose(str(address))
                     log.warning(f'NMEA {address}: {count.problem}')
                 else:
                     log.info(f'NMEA {address}: open')
@@ -251,6 +255,8 @@ class NmeaFeed:
                     continue
                 topic.feed(f'NMEA {line.address}', self._publish(source, message.payload))
                 session.receive(source, message.payload, now_ns, topic.count)
+            while self._interpreter.changes:
+                self._say(self._interpreter.changes.pop(0), session, now_ns)
         if self._live.waiting:
             self._wake()
 

@@ -87,9 +87,7 @@ class CoastdownNode(LifecycleNode):
     """
 
     def __init__(self, *, context: Context, arguments: Sequence[str] = ()) -> None:
-        super().__init__(
-            NAME, context=context, automatically_declare_parameters_from_overrides=True
-        )
+        super().__init__(NAME, context=context)
         check_sections(arguments, self)
         self._node_parameters = NodeParameters(self)
         self._failure: ShipdragError | None = None

@@ -308,8 +308,7 @@ class NodeParameters:
     Parameters
     ----------
     node
-        Made with `automatically_declare_parameters_from_overrides`, so that unknown
-        names can be seen.
+        Whose overrides are read, so that unknown names and values without a type are seen.
 
     Raises
     ------
@@ -322,12 +321,10 @@ class NodeParameters:
         self.fixed = False
         given = {
             name: parameter.value
-            for name, parameter in node.get_parameters_by_prefix('').items()
+            for name, parameter in node._parameter_overrides.items()
             if name not in ROS_OWN and not name.startswith('qos_overrides.')
         }
         values = NodeSettings.from_mapping(given, subject=SUBJECT).to_mapping()
-        for name in given:
-            node.undeclare_parameter(name)
         for name, value in values.items():
             node.declare_parameter(name, value, _descriptor(name), ignore_override=True)
         node.add_on_set_parameters_callback(self._on_set)

@@ -210,10 +210,10 @@ class Session:
         self._obey_in_replay(stopped, arrival_ns)
         if self._waiting or not self._ready():
             self._in_turn(partial(self.monitor.engine_stopped, arrival_ns))
-            return True, 'recorded; it is weighed once compiled code is there'
+            return True, 'taken; it is weighed once compiled code is there'
         why = self.monitor.engine_stopped(arrival_ns)
         weighed = 'the stop is weighed with the readings, as of now within some seconds'
-        return (False, f'recorded, and of no use: {why}') if why else (True, weighed)
+        return (False, f'of no use: {why}') if why else (True, weighed)
 
     def reset(self, reason: str, now_ns: int) -> None:
         """

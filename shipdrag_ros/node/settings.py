@@ -30,7 +30,7 @@ from shipdrag_ros.fields import (
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.nmea.live import FORMS as NMEA_FORMS
 from shipdrag_ros.nmea.live import parse_addresses
-from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.parameters import FORMER_KEYS, Parameters
 
 ParameterValue = bool | int | float | str | list[float]
 
@@ -129,7 +129,7 @@ class NodeSettings:
             Naming every unknown key and every bad value at once.
         """
         problems: list[str] = []
-        given = read_keys(KEYS, dict(values), '', problems)
+        given = read_keys(KEYS, dict(values), '', problems, former=FORMER_KEYS)
         try:
             parse_addresses(given.get('nmea', ''))
         except ShipdragError as error:

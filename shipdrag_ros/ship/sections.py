@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small sections of the ship file."""
+"""
+Sections of the ship file: water, air, propeller, propulsion, effects, economics, added mass.
+
+What a key may hold is declared with its field; the merchant polynomial of n_r is `_MERCHANT`,
+and the L / V^(1/3) outside of which it is refused stands in `consistency`.
+"""
 
 from __future__ import annotations
 

@@ -443,23 +443,21 @@ def _imported(
     return LogRun(log, [path], remap)
 
 
-def format_of(source: Path, options: Mapping[str, Any]) -> Format:
+def format_of(source: Path, options: Mapping[str, Any], named: Format | None = None) -> Format:
     """
-    Return the format of a file: the one that an option chooses, or by its beginning.
+    Return the format of a file: the named one, that which an option chooses, or by its beginning.
 
     Raises
     ------
     ImportDataError
-        If it is of none that is known, or a bag that needs no import.
+        If it is of none that is known, no regular file, or a bag that needs no import.
     """
     known = formats.found()
-    for each in known:
-        if each.chosen_by in options:
-            return each
     head = head_of(source)
     if head.raw.startswith(MAGIC) or is_bag(source):
         raise ImportDataError(f'{str(source)!r} is a bag already: `shipdrag replay` takes it')
-    return best_of(known, head)
+    chosen = [each for each in known if each.chosen_by in options]
+    return named or (chosen[0] if chosen else best_of(known, head))
 
 
 def job_of(declared: Format, source: Path, options: Mapping[str, Any]) -> Job:

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BufferedReader, TextIOWrapper
 from itertools import compress, islice, zip_longest
+from os import PathLike
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
@@ -406,7 +407,9 @@ class Numbers:
         return values
 
 
-def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = ()) -> Numbers:
+def read_numbers(
+    path: str | PathLike[str], names: Sequence[str], *, optional: Sequence[str] = ()
+) -> Numbers:
     """
     Read columns of a CSV file by name.
 
@@ -427,7 +430,7 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
     ImportDataError
         If the file is no table.
     """
-    table = LogTable(path)
+    table = LogTable(Path(path))
     there = [name for name in optional if name in (table.header or ()) and name not in names]
     wanted = (*names, *there)
     places, problems = [], []

@@ -74,3 +74,15 @@ def test_json_does_not_overwrite_what_is_no_json(
         with pytest.raises(SystemExit):
             parser.parse_args(['--json', str(tmp_path / name)])
         assert 'would be overwritten by the JSON; for stdout put' in capsys.readouterr().err
+
+
+def test_no_remapping_takes_the_place_of_another(capsys: pytest.CaptureFixture[str]) -> None:
+    parser = argparse.ArgumentParser()
+    arguments.add_remap(parser)
+    assert parser.parse_args([]).remap == {}
+    line = ['--remap', 'depth:=/a', '--remap', '/b:=heading']
+    assert parser.parse_args(line).remap == {'depth': '/a', '/b': 'heading'}
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args([*line, '--remap', 'depth:=/c'])
+    assert end.value.code == 2
+    assert "'depth' is remapped twice" in capsys.readouterr().err

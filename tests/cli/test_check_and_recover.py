@@ -99,9 +99,13 @@ def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(
     path.write_bytes(content)
     assert main(['check', str(path)]) == 1
     capsys.readouterr()
-    assert main(['recover', str(path), '-o', str(output)]) == 0
+    document = tmp_path / 'recover.json'
+    assert main(['recover', str(path), '-o', str(output), '--json', str(document)]) == 0
     said = ' '.join(capsys.readouterr().out.split())
-    assert 'All data are whole. If `shipdrag check` says otherwise, it means the index' in said
+    assert 'All data are whole. The index of' in said
+    (damage,) = json.loads(document.read_text())['damage']
+    assert damage.keys() == {'offset', 'record', 'kind'}
+    assert damage['record'] == 'summary'
     assert main(['check', str(output)]) == 0
 
 

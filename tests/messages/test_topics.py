@@ -70,4 +70,6 @@ def test_a_remap_takes_both_orders_where_one_side_is_an_input() -> None:
     topics = [('/log/speed', TWIST), ('/speed_through_water', TWIST)]
     ours = match_inputs(topics, remap={'/log/speed': 'speed_through_water'})
     assert match_inputs(topics, remap={'speed_through_water': '/log/speed'}) == ours
+    with pytest.raises(BagError, match='gives one topic as two inputs'):
+        match_inputs(topics, remap={'/log/speed': 'speed_through_water', 'depth': '/log/speed'})
     assert list(ours.heard) == [('/log/speed', TWIST)]

@@ -115,6 +115,23 @@ def test_the_same_sentence_on_two_lines_is_two_sources() -> None:
     assert (len(first), len(second)) == (1, 0)
 
 
+def test_a_source_whose_line_is_gone_gives_way_at_once_and_that_is_said() -> None:
+    interpreter = Interpreter()
+    text = sentence('HEHDT,90.0,T')
+    for address in ('tcp://a:1', 'tcp://b:1'):
+        interpreter.messages(text, address, START_NS)
+    now_ns = START_NS + SETTLE_NS
+    assert len(interpreter.messages(text, 'tcp://a:1', now_ns)) == 1
+    interpreter.lose('tcp://b:1')  # feeds nothing
+    assert interpreter.messages(text, 'tcp://b:1', now_ns + 1) == []
+    interpreter.lose('tcp://a:1')
+    assert interpreter.messages(text, 'tcp://b:1', now_ns + 2) == []
+    assert len(interpreter.messages(text, 'tcp://b:1', now_ns + 2 + SETTLE_NS)) == 1
+    assert interpreter.changes == [
+        'heading: now from HEHDT on tcp://b:1, no longer from HEHDT on tcp://a:1'
+    ]
+
+
 def test_a_clock_set_back_makes_no_source_wait() -> None:
     interpreter = Interpreter()
     text = sentence('HEHDT,90.0,T')

@@ -128,6 +128,9 @@ def test_tcp_is_opened_again_when_it_drops(monkeypatch: pytest.MonkeyPatch) -> N
                     assert [it.text for it in heard.take(10)] == [TEXT]
                 until(lambda: counts(heard).problem)
                 assert 'closed the connection' in counts(heard).problem
+                # what the end cut off is handed on, to be recorded and counted
+                assert [it.text for it in heard.take(10)] == ['$HALF']
+        assert counts(heard).lines == 4
 
 
 def test_a_tcp_peer_that_vanished_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

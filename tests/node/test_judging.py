@@ -117,6 +117,16 @@ def test_only_what_came_lately_counts() -> None:
     assert recently.rate_hz == pytest.approx(10.0)
 
 
+def test_a_sensor_that_is_switched_on_late_is_not_too_slow() -> None:
+    recently = Recently()
+    for second in range(22):
+        said = 10 * max(second - 20, 0)
+        recently.add(float(second), Counts(said, said))
+    found = judge(replace(WELL, recent=recently.counts, seconds=recently.seconds))
+    assert recently.seconds == 1.0
+    assert found.level == OK
+
+
 def test_counts_that_begin_anew_are_no_loss() -> None:
     recently = Recently()
     recently.add(0.0, Counts(100, 100))

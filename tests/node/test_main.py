@@ -51,6 +51,7 @@ def attachments(bag: Path) -> dict[str, str]:
         ('record', 1, 'record: 1, expected true or false'),
         ('depth.type', 'std_msgs/msg/Float64', 'expected one of sensor_msgs/msg/Range'),
         ('ship_file', '', 'expected the path of a ship file'),
+        ('forecast_speeds', [], 'forecast_speeds: None, expected a list'),
     ],
 )
 def test_bad_parameters_are_user_errors(

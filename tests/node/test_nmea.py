@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import socket
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -155,3 +156,47 @@ def test_a_line_is_not_blamed_for_the_noise_of_another(
             assert status.level == b'\x00'
             assert 'rejected without checksum' not in values(status)
             diagnostics.wait_for('state', '40 lines heard, none a sentence: look at baud rate')
+
+
+def test_of_two_lines_the_second_takes_over_when_the_first_is_cut(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    speed = sentence('VWVHW,,T,,M,9.0,N,,K').encode() + b'\r\n'
+    with ExitStack() as open_lines:
+        servers = [
+            open_lines.enter_context(socket.create_server(('127.0.0.1', 0))) for _ in range(2)
+        ]
+        names = [f'tcp://127.0.0.1:{server.getsockname()[1]}' for server in servers]
+        node = start_node(nmea=' '.join(names))
+        lines = [open_lines.enter_context(server.accept()[0]) for server in servers]
+
+        def fed_by() -> str:
+            status = diagnostics.of('input speed_through_water')
+            return '' if status is None else values(status).get('fed by', '').removeprefix('NMEA ')
+
+        def speak_until(condition: Any, *lines: socket.socket) -> None:
+            end = time.monotonic() + 100.0
+            while not condition():
+                assert time.monotonic() < end, fed_by()
+                for line in lines:
+                    line.sendall(speed)
+                peer.spin_for(0.1)
+
+        speak_until(fed_by, *lines)
+        first = names.index(fed_by())
+        before, after = names[first], names[1 - first]
+        lines[first].sendall(speed[:9])
+        lines[first].close()
+        servers[first].close()
+        began_s = time.monotonic()
+        speak_until(lambda: fed_by() == after, lines[1 - first])
+        assert time.monotonic() < began_s + 30.0
+        status = diagnostics.of(f'nmea {before}')
+        assert [key for key in values(status) if key.startswith('rejected')]
+        assert node.stop() == 0
+    said = f'speed_through_water: now from VWVHW on {after}, no longer from VWVHW on {before}'
+    assert said in node.log
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    found = messages(bag)
+    assert any(said.encode() in payload for payload in found['/coastdown_node/events'])
+    assert any(speed[:9] in payload for payload in found['/nmea'])

@@ -120,7 +120,7 @@ def test_the_clock_is_watched_also_while_nothing_arrives(desk: Desk) -> None:
 def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk: Desk) -> None:
     done, said = desk.session.engine_stopped(START_NS)
     assert not done
-    assert 'of no use: no speed was read yet' in said
+    assert said.startswith('of no use: no speed was read yet')  # where nothing is recorded too
     desk.feed(speeds([0, 1]))
     done, said = desk.session.engine_stopped(START_NS + 2 * SECOND_NS)
     assert done

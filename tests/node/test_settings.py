@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+from array import array
 from dataclasses import fields
 from pathlib import Path
 
@@ -98,3 +99,13 @@ def test_the_error_of_a_former_name_says_the_new_one() -> None:
     estimator.read('kalman', 'estimator', problems)
     assert 's1_speed' in problems[0]
     assert 'warped' not in problems[0]
+
+
+def test_a_list_that_came_by_ros_is_shown_as_one() -> None:
+    with pytest.raises(ParameterError, match=r'forecast_speeds: \[\], expected a list'):
+        settings(forecast_speeds=array('d'))
+
+
+def test_a_former_key_is_an_error_that_names_the_successor() -> None:
+    with pytest.raises(ParameterError, match='confirm_s: no key any more; leave it out'):
+        settings(confirm_s=5.0)

@@ -16,7 +16,7 @@ from shipdrag_ros.sources.table import read_numbers
 def test_reads_columns_by_name(tmp_path: Path, mark: str) -> None:
     path = tmp_path / 'data.csv'
     path.write_text('a,b,c\n1,x,-2e-3\n\n4,y,.5\n'.replace(',', mark))
-    found = read_numbers(path, ('c', 'a'), optional=('a', 'd'))
+    found = read_numbers(str(path), ('c', 'a'), optional=('a', 'd'))
     assert found.names == ('c', 'a')
     np.testing.assert_array_equal(found.values, [[-2e-3, 1.0], [0.5, 4.0]])
     np.testing.assert_array_equal(found.column('a'), [1.0, 4.0])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -118,6 +119,7 @@ def test_times_that_go_back_are_told(
         (('--map', 'depth=v', '--rate', '1', '--date', '2026-01-01'), 2, 'and this is a CSV file'),
         (('--date', '1.1.2026'), 2, 'expected YYYY-MM-DD'),
         (('--format', 'nmea'), 1, 'holds no sentence of NMEA 0183 in 2401 line(s)'),
+        (('--format', 'gpx'), 1, 'read as a GPX track for --format: without it the content'),
         ((), 1, "'x', 'y': unit not known; --map position=x,y:m"),
     ],
 )
@@ -210,6 +212,18 @@ def test_a_bag_needs_no_import(tmp_path: Path, capsys: pytest.CaptureFixture[str
     for source in (bag, tmp_path):
         assert main(['import', str(source), '-o', str(tmp_path / 'b.mcap')]) == 1
         assert 'is a bag already: `shipdrag replay` takes it' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('option', [('--format', 'signalk'), ('--map', 'depth=v', '--rate', '1')])
+def test_no_option_lets_a_pipe_or_a_bag_in(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: tuple[str, ...]
+) -> None:
+    pipe, bag = tmp_path / 'pipe', tmp_path / 'a.mcap'
+    os.mkfifo(pipe)  # without a writer, one that reads it waits for ever
+    bag.write_bytes(b'\x89MCAP0\r\n')
+    for source, why in ((bag, 'is a bag already'), (pipe, 'is no regular file')):
+        assert main(['import', str(source), '-o', str(tmp_path / 'b.mcap'), *option]) == 1
+        assert why in capsys.readouterr().err
 
 
 def test_of_several_files_what_went_into_the_bag_is_counted(

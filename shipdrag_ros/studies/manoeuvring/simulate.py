@@ -15,7 +15,6 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 
-_ANGLES_DEG = (1.0, 90.0)
 KINDS = ('zigzag', 'turn')
 
 
@@ -143,19 +142,17 @@ def parse(text: str) -> Manoeuvre:
     Raises
     ------
     SimulationError
-        If it is neither, or the angle is impossible.
+        If it is neither; how far the rudder goes is the ship's, see `steer`.
     """
     kind, separator, size = text.partition(':')
     try:
         angle = float(size)
     except ValueError:
         angle = np.nan
-    low, high = _ANGLES_DEG
-    # written so that NaN fails
-    if kind not in KINDS or not separator or not low <= angle <= high:
+    if kind not in KINDS or not separator or not np.isfinite(angle):
         raise SimulationError(
-            f'manoeuvre {text!r}, expected zigzag:ANGLE or turn:ANGLE with {low:g}..{high:g} '
-            'degrees of rudder; write zigzag:15, for instance'
+            f'manoeuvre {text!r}, expected zigzag:ANGLE or turn:ANGLE with the degrees of rudder; '
+            'write zigzag:15, for instance'
         )
     return zigzag(angle) if kind == 'zigzag' else turn(angle)
 

@@ -196,7 +196,8 @@ class RegressionForm:
 
 
 def _sakhnovsky(hulls: Hulls) -> Float64:
-    assert hulls.lcb is not None  # checked where the form is chosen
+    if hulls.lcb is None:
+        raise DataError('sakhnovsky', ['lcb: missing, this form needs it'])
     x1, x2, x3 = hulls.L_B, hulls.B_T, hulls.C_B
     x4, x5, x6 = hulls.Fr, hulls.lcb, hulls.slenderness
     terms = (
@@ -450,14 +451,16 @@ def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
     Raises
     ------
     DataError
-        If rows are too few.
+        If there is no such form, it needs an lcb that the hulls lack, or rows are too few.
 
     Notes
     -----
     S4 (1) to (3), least squares with scaled columns.
     """
-    if form != AUTO:
+    if form in FORMS:
         return fit_form(FORMS[form], hulls, values)
+    if form != AUTO:
+        raise DataError('form', [f'{form!r}, expected one of {", ".join((*FORMS, AUTO))}'])
     fits = [
         fit_form(each, hulls, values)
         for each in FORMS.values()

@@ -173,6 +173,10 @@ def test_without_lcb_sakhnovsky_is_not_tried(fleet: Fleet, resistance: Resistanc
     value = resistance(hulls)
     bare = replace(hulls, lcb=None)
     assert fit_residual(bare, value, form='auto').form.name == 'sirotina'
+    with pytest.raises(DataError, match='lcb: missing'):
+        fit_residual(bare, value, form='sakhnovsky')
+    with pytest.raises(DataError, match="'holtrop', expected one of sakhnovsky, sirotina, auto"):
+        fit_residual(hulls, value, form='holtrop')
 
 
 def test_notes_say_what_is_doubtful(fleet: Fleet, resistance: Resistance) -> None:

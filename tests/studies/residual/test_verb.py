@@ -105,6 +105,8 @@ def test_writes_a_ship_file_or_refuses(
     assert not refused.exists()
     assert fit(table, '--ship', str(ship)) == 1
     assert 'belong together' in capsys.readouterr().err
+    assert fit(table, '--lcb', '0.005') == 1
+    assert 'of the ship of --ship FILE' in capsys.readouterr().err
     more = ('--ship', str(ship), '--write', str(refused))
     assert fit(table, *more, form='sakhnovsky') == 1
     assert 'give --lcb' in capsys.readouterr().err

@@ -92,7 +92,7 @@ def test_a_ship_file_coasts(
         (['--keep', '0'], 'keep is 0, expected 1..40'),
         (['--keep', '41'], 'keep is 41, expected 1..40'),
         (['--manoeuvre', 'spiral:15'], "manoeuvre 'spiral:15', expected zigzag:ANGLE or turn"),
-        (['--manoeuvre', 'zigzag:120'], 'with 1..90 degrees of rudder'),
+        (['--manoeuvre', 'zigzag:0'], 'more than 0 and at most 40 degrees of rudder'),
         (['--manoeuvre', 'turn:45'], 'at most 40 degrees of rudder, which is as far as it goes'),
         (['--manoeuvre', 'coastdown'], 'expected zigzag:ANGLE or turn:ANGLE'),
         (['--manoeuvre', ''], "manoeuvre '', expected zigzag:ANGLE"),

@@ -76,6 +76,10 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     if (options.ship is None) != (options.write is None):
         raise DataError('--write', ['--ship FILE and --write FILE belong together; give both'])
+    if options.lcb is not None and options.ship is None:
+        raise DataError(
+            '--lcb', ['is of the ship of --ship FILE; give it too, or leave --lcb out']
+        )
     ship = None if options.ship is None else Ship.load(options.ship)
     needed: tuple[str, ...] = fit.REQUIRED
     if options.form != fit.AUTO and fit.FORMS[options.form].needs_lcb:
