@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from shipdrag_ros.display import short_repr
@@ -232,3 +232,49 @@ class Reset:
 Event = Onset | Update | NoEstimate | NotCoastdown | EndedCoastdown | WholeGlide | Reset
 OnCoastdown = Callable[[EndedCoastdown, Window], None]
 """Called with a coastdown that has ended and its window."""
+
+
+class Dismissals:
+    """
+    What was nearly a coastdown, said without flooding the log.
+
+    A rough sea, or a ship that manoeuvres, may give many dismissals. Of each reason one is
+    said in each span of absolute time; the rest of the span is counted and stated as one.
+
+    Parameters
+    ----------
+    span_ns
+        Length of a span [ns].
+    """
+
+    def __init__(self, span_ns: int) -> None:
+        self._span_ns = span_ns
+        self._said: dict[Dismissal, int] = {}
+        self._more: dict[Dismissal, tuple[int, NotCoastdown]] = {}  # not said: count, all as one
+
+    def take(self, dismissed: NotCoastdown) -> list[Event]:
+        """
+        Take a dismissal and return what is to be said now.
+        """
+        span = dismissed.end_ns // self._span_ns
+        if self._said.get(dismissed.reason) != span:
+            self._said[dismissed.reason] = span
+            return [*self._flush(dismissed.reason), dismissed]
+        count, as_one = self._more.get(dismissed.reason, (0, dismissed))
+        self._more[dismissed.reason] = count + 1, replace(dismissed, start_ns=as_one.start_ns)
+        return []
+
+    def flush(self) -> list[Event]:
+        """
+        Return what was counted and not said, and forget everything.
+        """
+        events = [event for reason in list(self._more) for event in self._flush(reason)]
+        self._said.clear()
+        return events
+
+    def _flush(self, reason: Dismissal) -> list[Event]:
+        if reason not in self._more:
+            return []
+        count, one = self._more.pop(reason)
+        text = one.text if count == 1 else f'{count} times, the last: {one.text}'
+        return [replace(one, text=text)]

@@ -14,11 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import SOURCES, forget_speeds
-from shipdrag_ros.coastdown.direction import heading_doubt
-from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.events import (
     ENDED_BY,
     Dismissal,
+    Dismissals,
     EndedBy,
     EndedCoastdown,
     Event,
@@ -28,6 +27,7 @@ from shipdrag_ros.coastdown.events import (
     State,
     WholeGlide,
 )
+from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, heading_doubt, mean_heading
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
@@ -37,7 +37,6 @@ from shipdrag_ros.coastdown.regimes.watch import LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
-from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
 from shipdrag_ros.estimation import Window, estimate, estimate_final

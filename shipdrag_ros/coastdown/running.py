@@ -17,9 +17,9 @@ from shipdrag_ros.coastdown.events import (
     Regimes,
     Update,
 )
+from shipdrag_ros.coastdown.heading import rep103_yaw
 from shipdrag_ros.coastdown.memory import ALWAYS
 from shipdrag_ros.coastdown.regimes.watch import Dated
-from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimators import WindowEstimator, shielded

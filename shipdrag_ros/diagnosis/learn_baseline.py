@@ -16,7 +16,12 @@ import numpy as np
 from scipy.stats import t as student
 
 from shipdrag_ros.diagnosis.observation import CoastRun
-from shipdrag_ros.diagnosis.shared_baseline import Factor, Shared, SharedBaseline, factor
+from shipdrag_ros.diagnosis.shared_baseline import (
+    Factor,
+    Shared,
+    SharedBaseline,
+    stated_sd,
+)
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -136,10 +141,10 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
     begun = ship if ship.baseline is not None else _from_curves(runs, ship, parameters)
     problem = SharedBaseline.of(runs, begun, parameters)
     everything = problem.shared(problem.normals)
-    factors = _factors(problem)
+    factors = problem.factors()
     enough = len(runs) >= ENOUGH
     mean, covariance = problem.of_parts(everything)
-    stated = _stated_sd(begun)
+    stated = stated_sd(begun)
     assert begun.baseline is not None
     absolute = np.sqrt(np.diag(covariance))
     correlation = float(covariance[0, -1] / (absolute[0] * absolute[-1]))
@@ -174,23 +179,6 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
     )
 
 
-def _stated_sd(ship: Ship) -> Float64:
-    base = ship.baseline
-    if isinstance(base, CoefficientBaseline):
-        return np.array([base.relative_sd.friction, base.relative_sd.wave])
-    assert base is not None
-    return np.array([base.relative_sd])
-
-
-def _factors(problem: SharedBaseline) -> list[Factor]:
-    """Hold each run against the others."""
-    found = []
-    for j, run in enumerate(problem.normals):
-        others = [other for i, other in enumerate(problem.normals) if i != j]
-        found.append(factor(run, problem.shared(others), problem.along))
-    return found
-
-
 def _scaled(
     problem: SharedBaseline,
     shared: Shared,
@@ -216,7 +204,7 @@ def _scaled(
     assert base is not None
     # a table follows the shape as well
     parts = problem.relative_parts(np.array(base.speed_m_s))
-    change = (problem.unit * problem.z(shared)) @ parts
+    change = (problem.unit * (problem.at + shared.step)) @ parts
     force = np.array(base.resistance_n) * (1.0 + change)
     return replace(
         base,

@@ -33,7 +33,7 @@ from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.store import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
-from shipdrag_ros.replay.warnings import run_warnings
+from shipdrag_ros.replay.words import run_warnings
 from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
 from shipdrag_ros.simulation.effects import carrying
 from shipdrag_ros.sources.reading import read_any

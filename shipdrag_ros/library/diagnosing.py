@@ -29,9 +29,8 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
-from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, told_beside
-from shipdrag_ros.replay.warnings import run_warnings
+from shipdrag_ros.replay.words import cut_lines, run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
 

@@ -14,7 +14,7 @@ from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.coastdown.given import Examined, GivenPart, estimate_given
-from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
+from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters

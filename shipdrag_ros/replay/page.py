@@ -14,10 +14,10 @@ from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.replay import pictures, tables, words
-from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
+from shipdrag_ros.replay.words import cut_lines
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 

@@ -16,8 +16,8 @@ from shipdrag_ros.coastdown.events import EndedCoastdown, Regimes
 from shipdrag_ros.display import speed_unit
 from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
-from shipdrag_ros.replay.cuts import StretchSpan, inside, stretch
 from shipdrag_ros.replay.hulls import RankedHull
+from shipdrag_ros.replay.words import StretchSpan, inside, stretch
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
 from shipdrag_ros.samples import Float64
 

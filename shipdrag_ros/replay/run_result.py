@@ -11,7 +11,7 @@ from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
-from shipdrag_ros.replay.warnings import run_warnings
+from shipdrag_ros.replay.words import run_warnings
 from shipdrag_ros.ship import Ship
 
 _READ_AGAIN = 2_000_000  # messages: all their samples are held at once

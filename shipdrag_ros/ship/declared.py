@@ -31,7 +31,7 @@ from shipdrag_ros.fields import (
 )
 from shipdrag_ros.parameter import Prior, Shape, log_normal, normal
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.expression import NEWTON, PURE, Formula, Unit, Units, Values
+from shipdrag_ros.ship.expression import NEWTON, PURE, Formula, Unit, Units, Values, unit_of
 from shipdrag_ros.ship.sections import GRAVITY_M_S2
 
 SCOPES = ('hull', 'earth', 'sensor', 'run')
@@ -40,15 +40,11 @@ VARIABLES = {'speed': 'u', 'time': 't', 'heading': 'psi', 'date': 'd', 'depth': 
     dict.fromkeys(('relative_angle', 'shaft', 'wind', 'position'), '')
 )
 """What a term goes by, and what a formula calls it; nothing: it cannot be simulated."""
-_SPEED: Unit = (0.0, 1.0, -1.0)
-_LENGTH: Unit = (0.0, 1.0, 0.0)
-_TIME: Unit = (0.0, 0.0, 1.0)
-_MASS: Unit = (1.0, 0.0, 0.0)
-_GAIN: Unit = (0.0, 1.0, -2.0)
+_MASS, _LENGTH, _TIME, _SPEED, _GAIN = map(unit_of, ('kg', 'm', 's', 'm/s', 'm/s**2'))
 UNITS: Mapping[str, Unit] = {
     **dict.fromkeys(('1', 'rad'), PURE),
     'm': _LENGTH,
-    **dict.fromkeys(('m2', 'm^2'), (0.0, 2.0, 0.0)),
+    **dict.fromkeys(('m2', 'm^2'), unit_of('m**2')),
     's': _TIME,
     'm/s': _SPEED,
     'm/s2': _GAIN,
@@ -124,10 +120,10 @@ def _even(low: float, high: float, boxes: int) -> tuple[float, ...]:
 
 
 NAMES: Mapping[str, FormulaName] = {
-    'rho': FormulaName((1.0, -3.0, 0.0), 1025.0, (990.0, 1035.0)),
+    'rho': FormulaName(unit_of('kg/m**3'), 1025.0, (990.0, 1035.0)),
     'g': FormulaName(_GAIN, GRAVITY_M_S2, (GRAVITY_M_S2, GRAVITY_M_S2)),
     'L': FormulaName(_LENGTH, 100.0, (2.0, 10.0, 30.0, 100.0, 200.0, 400.0)),
-    'nabla': FormulaName((0.0, 3.0, 0.0), 9000.0, (1e-4, 0.1), 3),
+    'nabla': FormulaName(unit_of('m**3'), 9000.0, (1e-4, 0.1), 3),
     'B_WL': FormulaName(_LENGTH, 18.0, (0.05, 0.6), 1),
     'T_M': FormulaName(_LENGTH, 7.0, (0.01, 0.3), 1),
     'D_P': FormulaName(_LENGTH, 5.0, (0.005, 0.2), 1),

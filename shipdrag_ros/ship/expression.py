@@ -212,7 +212,6 @@ def _literal(node: ast.expr) -> float | None:
 Unit = tuple[float, float, float]
 """Exponents of kilogram, metre and second."""
 PURE: Unit = (0.0, 0.0, 0.0)
-NEWTON: Unit = (1.0, 1.0, -2.0)
 
 
 class Units:
@@ -267,6 +266,19 @@ def _plus(left: Unit, right: Unit, factor: float) -> Unit:
     return a, b, c
 
 
+_BASE: dict[str, Unit] = {'kg': (1.0, 0.0, 0.0), 'm': (0.0, 1.0, 0.0), 's': (0.0, 0.0, 1.0)}
+
+
+def unit_of(text: str) -> Unit:
+    """
+    Return a unit that is written as a formula of kg, m and s.
+    """
+    return Formula.parse(text).walk(Units(), _BASE)
+
+
+NEWTON = unit_of('kg*m/s**2')
+
+
 def unit_text(unit: Unit) -> str:
     """
     Return a unit in words.
@@ -275,7 +287,7 @@ def unit_text(unit: Unit) -> str:
         return 'N'
     parts = [
         name if power == 1.0 else f'{name}^{power:g}'
-        for name, power in zip(('kg', 'm', 's'), unit, strict=True)
+        for name, power in zip(_BASE, unit, strict=True)
         if power
     ]
     return ' '.join(parts) or 'a pure number'

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.linear import Factored, cholesky, products_of, substitute
+from shipdrag_ros.inference.linear import cholesky, products_of, substitute
 
 
 @pytest.mark.parametrize('n', [1, 128, 129, 1000])
@@ -26,18 +26,7 @@ def test_a_factor_solves() -> None:
     np.testing.assert_allclose(matrix @ x, right, atol=1e-9)
 
 
-def test_a_factored_matrix_solves_inverts_and_has_its_determinant() -> None:
-    rng = np.random.default_rng(4)
-    half = rng.normal(size=(6, 9)) * 10.0 ** np.arange(-3, 3)[:, np.newaxis]
-    matrix, right = half @ half.T, rng.normal(size=(6, 2))
-    found = Factored.of(matrix)
-    np.testing.assert_allclose(matrix @ found.solve(right), right, atol=1e-9)
-    np.testing.assert_allclose(found.inverse, np.linalg.inv(matrix), rtol=1e-7)
-    assert found.log_det == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-12)
-
-
 @pytest.mark.parametrize('third', [[2.0, 0.0, 4.0], [2.0, 0.0, 3.0], [np.nan, 0.0, 1.0]])
 def test_a_matrix_that_is_not_positive_is_refused(third: list[float]) -> None:
     matrix = np.array([[1.0, 0.0, 2.0], [0.0, 1.0, 0.0], third])
-    with pytest.raises(np.linalg.LinAlgError, match='not positive'):
-        Factored.of(matrix)
+    assert not cholesky(matrix)[0]

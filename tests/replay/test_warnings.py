@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Regimes, Reset
 from shipdrag_ros.messages import Unreadable
-from shipdrag_ros.replay import InputCounts, warnings
+from shipdrag_ros.replay import InputCounts, words
 from shipdrag_ros.samples import Reason
 
 SURPLUS = Unreadable.SURPLUS_JOINT.value
@@ -19,7 +19,7 @@ def told(inputs: dict[str, InputCounts], *events: Event) -> tuple[str, ...]:
     result = SimpleNamespace(
         run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events, contradictions={}
     )
-    return warnings.run_warnings(result)  # type: ignore[arg-type]
+    return words.run_warnings(result)  # type: ignore[arg-type]
 
 
 def test_a_sound_run_keeps_the_warnings_of_its_bag_alone() -> None:
@@ -70,4 +70,4 @@ def test_a_record_that_the_model_explains_badly_is_told() -> None:
 def test_every_reason_has_its_cause() -> None:
     reasons = {reason.name.lower() for reason in Reason} - {'accepted'}
     reasons |= {reason.value for reason in Unreadable} | {'type'}
-    assert set(warnings._CAUSE) == reasons
+    assert set(words._CAUSE) == reasons

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.coastdown.heading import rep103_yaw
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
@@ -25,7 +26,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     SAID,
     SHAFTS,
 )
-from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A heading held against the course over ground: is it of the convention that is stated?
+The heading of a coastdown, and compared with the course: is it of the convention stated?
 
 Drivers send compass angles as yaw and the other way round. A ship that makes way
 goes about where she points.
@@ -18,16 +18,39 @@ from shipdrag_ros.coastdown.bins import (
     newest_bin,
 )
 from shipdrag_ros.coastdown.past import FIRST_TRACK
-from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.samples import KIND, Channel
 
 _HEADING = int(Channel.HEADING)
+HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
 _SPAN_S = 20  # heading and course are means over so long
 _LOOKS = 4  # one after the other, all of which must say the same
 _SPEED_M_S = 1.0  # below, a current may set her anywhere
 _APART_RAD = 0.6  # more than drift and set make of a ship under way
 _SAME_RAD = 0.35
 _OTHER = {'rep103': 'compass', 'compass': 'rep103'}
+
+
+def mean_heading(bins: Bins, last: int, width: int) -> float:
+    """
+    Return the circular mean of the heading as sent [rad]; NaN without any.
+    """
+    _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
+    return math.atan2(sine, cosine) if count else math.nan
+
+
+def rep103_yaw(heading: float, convention: str) -> float:
+    """
+    Return the yaw from east, anticlockwise, in (-pi, pi] [rad].
+
+    Parameters
+    ----------
+    heading
+        As sent [rad].
+    convention
+        `Parameters.heading_convention`.
+    """
+    yaw = 0.5 * math.pi - heading if convention == 'compass' else heading
+    return math.atan2(math.sin(yaw), math.cos(yaw))
 
 
 def heading_doubt(bins: Bins, convention: str) -> str:
