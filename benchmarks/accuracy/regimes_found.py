@@ -52,21 +52,21 @@ def column(coasts: list[Row], none: list[Row]) -> list[str]:
         f'{sum(row.wrong > 0 for row in none)} + '
         f'{sum(row.idle > 0 and not row.wrong for row in none)} of {len(none)}',
         f'{sum(row.wrong_live > 0 for row in none)} of {len(none)}',
-        '{1:.3f}, {2:.3f} of {0:.1f}'.format(*_sure([*coasts, *none])),
+        '{1:.3f}, {2:.3f} of {0:.1f} + {3:.1f}'.format(*_sure([*coasts, *none])),
     ]
 
 
-def _sure(some: list[Row]) -> tuple[float, float, float]:
-    """Return hours in which she is said to glide, and the shares expected and true."""
-    said_s, expected_s, true_s = np.sum([row.sure_s for row in some], axis=0).tolist()
-    return said_s / 3600.0, expected_s / said_s, true_s / said_s
+def _sure(some: list[Row]) -> tuple[float, float, float, float]:
+    """Return hours in which she is said to glide, shares expected and true, and hours besides."""
+    said_s, expected_s, true_s, idle_s = np.sum([row.sure_s for row in some], axis=0).tolist()
+    return said_s / 3600.0, expected_s / said_s, true_s / said_s, idle_s / 3600.0
 
 
 NAMES = (
     'found', 'from 3 min', 'long ones', 'dated within 5 s', 'within 20 s',
     'announced after, median and 90 % [s]', 'no coastdowns left as one, + an idling screw',
     'announced that were none',
-    'said to glide with 0.7 or more: expected, true, of so many hours',
+    'said to glide with 0.7 or more: expected, true, of so many hours + where nothing pushes',
 )  # fmt: skip
 
 

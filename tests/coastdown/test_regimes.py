@@ -10,7 +10,10 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
-from shipdrag_ros.coastdown.regimes.numbers import NUMBERS
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
+from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS
+from shipdrag_ros.coastdown.regimes.state import ADVANCE, N_FIX, SAID, BankSetting
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
@@ -137,6 +140,18 @@ def test_a_record_of_what_no_ship_does_is_explained_less_well(ship, record) -> N
         (*_, ended) = of(EndedCoastdown, events_of(ship, replace(block, value=value)))
         explained.append(ended.regimes.explained)
     assert explained[0] > 0.05 > explained[1]
+
+
+@pytest.mark.parametrize('seed', [1, 2, 4])
+def test_the_error_of_fixes_is_learnt_whatever_the_first_ones_say(ship, seed) -> None:
+    # of a radar: within a bin it is a quarter of the way of a slow ship
+    fix_m, filters, said = 4.5, NoiseFilters.fresh(), np.full(SAID, np.nan)
+    setting = BankSetting.of(HullPrior.of(ship), BIN_S)
+    errors_m = fix_m * np.random.default_rng(seed).standard_normal(200)
+    for advance in 17.0 + np.diff(errors_m):
+        said[ADVANCE] = advance
+        listen(filters, setting, said, 1.0)
+    assert 0.8 < filters.used[N_FIX] / fix_m < 1.25
 
 
 def test_every_number_has_a_unit_and_a_source() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from shipdrag_ros.samples import in_arrival_order
 
 HELD_SHARE = 0.8
 SPANS = bool(os.environ.get('SPANS'))  # spans alone, without an estimate: a tenth of the time
+_NO_ESTIMATE: Any = SimpleNamespace(samples={})  # in the place of one
 DRIVEN_S = 10.0
 SURE = 0.7  # probability of a glide that is said
 INPUTS: dict[str, tuple[str, ...]] = {
@@ -79,8 +81,9 @@ class Row:
     said
         What the program says of candidates that it dismissed.
     sure_s
-        Of what it says of the time about slow-downs: in how much of it she glides with a
-        probability of 0.7 or more, how much that expects, and in how much she does [s].
+        Of what it says last of each moment about slow-downs: in how long she glides with a
+        probability of 0.7 or more, how much of that it expects, in how much she does, and in how
+        long besides nobody can tell a glide (`Truth.idle`) [s].
     """
 
     case: Case
@@ -100,7 +103,7 @@ class Row:
     withdrawn: int
     record_s: float
     said: str
-    sure_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sure_s: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
@@ -114,7 +117,7 @@ def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) ->
 def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
     parameters = Parameters(update_s=60.0)
     monitor = (
-        Monitor(world.ship, parameters, estimate=None, final=lambda window, _, __: window)
+        Monitor(world.ship, parameters, estimate=None, final=lambda *_: _NO_ESTIMATE)
         if SPANS
         else Monitor(world.ship, parameters)
     )
@@ -165,22 +168,24 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
     )
 
 
-def _sure(truth: Truth, ended: list[Any]) -> tuple[float, float, float]:
-    """Return in how much she is said to glide, how much that expects, and how much is true."""
-    found = np.zeros(3)
+def _sure(truth: Truth, ended: list[Any]) -> tuple[float, float, float, float]:
+    """Return how long she is said to glide, of that expected and true, and how long besides."""
+    said: dict[int, tuple[float, float]] = {}  # each moment once, as it was said last
     for event in ended:
         regimes = getattr(event, 'regimes', None)
         if regimes is None or len(regimes.time_ns) < 2:
             continue
-        row = np.round(seconds(regimes.time_ns) / ROW_S).astype(int)
-        chance = regimes.probability['gliding']
-        sure = (chance >= SURE) & (row >= 0) & (row < len(truth.gliding))
+        rows = np.round(seconds(regimes.time_ns) / ROW_S).astype(int).tolist()
         step_s = float(np.median(np.diff(regimes.time_ns))) * 1e-9
-        found += step_s * np.array(
-            [sure.sum(), chance[sure].sum(), truth.gliding[row[sure]].sum()]
-        )
-    said_s, expected_s, true_s = found.tolist()
-    return said_s, expected_s, true_s
+        chances = regimes.probability['gliding'].tolist()
+        said.update((row, (chance, step_s)) for row, chance in zip(rows, chances, strict=True))
+    found = np.zeros(4)
+    for row, (chance, step_s) in said.items():
+        if chance >= SURE and 0 <= row < len(truth.gliding):
+            glides, idle = bool(truth.gliding[row]), bool(truth.idle[row])
+            found += step_s * np.array([not idle, not idle and chance, glides, idle])
+    said_s, expected_s, true_s, idle_s = found.tolist()
+    return said_s, expected_s, true_s, idle_s
 
 
 def _named(events: list[Any], name: str) -> list[Any]:

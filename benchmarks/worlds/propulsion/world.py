@@ -32,6 +32,9 @@ class Truth:
         Whether an engine pushes or pulls the ship, a row each `ROW_S`.
     gliding : (n,)
         Whether no engine is on a propeller with pitch and she is above the end speed.
+    idle : (n,)
+        Whether it is no question whether she glides: below the end speed, or where an engine is
+        on a propeller that pushes nothing, a glide to the hull.
     glide
         From the end of drive to the end of the glide or what spoils it; None where
         there is no glide.
@@ -44,6 +47,7 @@ class Truth:
 
     driven: np.ndarray
     gliding: np.ndarray
+    idle: np.ndarray
     glide: tuple[float, float] | None
     first_speed_m_s: float
     seconds: float
@@ -147,6 +151,7 @@ def _truth(case: Case, plan_: Plan, motion: Motion, start: Steady, weather: Weat
     spoilt = plan_.spoilt_at - PRE_ROLL_S
     driven = motion.drive > DRIVEN_SHARE * start.thrust * start.shafts
     gliding = (motion.engaged == 0.0) & ~driven & (motion.speed > hull.end_m_s)
+    pushes_not = (motion.engaged > 0.0) & (motion.drive == 0.0)
     time = motion.time_s
     glide = None
     if case.kind in STOPS or 'kick' in case.kind:
@@ -163,6 +168,7 @@ def _truth(case: Case, plan_: Plan, motion: Motion, start: Steady, weather: Weat
     return Truth(
         driven,
         gliding,
+        pushes_not | (motion.speed <= hull.end_m_s),
         glide,
         float(motion.speed[before_stop].mean()) if before_stop.any() else start.speed_m_s,
         float(time[-1]),

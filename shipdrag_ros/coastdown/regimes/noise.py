@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     GROUND,
@@ -191,11 +191,12 @@ def _one(
         noise.jump[which] += gain * (size - noise.jump[which])
     last[0] = value
     noise.seen[which] = count + driven
-    if count < 4 or not (speed > 0.0 or which == _APART):
-        for k in range(FILTERS):
-            _start(noise.mean[which, k], noise.spread[which, k], speed, max(abs(speed), 1e-3))
-        return
     spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
+    if count < 4 or not (speed > 0.0 or which == _APART):
+        fix = spread if which == 2 else 0.0
+        for k in range(FILTERS):
+            _start(noise.mean[which, k], noise.spread[which, k], speed, fix, step)
+        return
     size = noise.mean[0 if which == _APART else which, 0, 1]
     spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
@@ -208,14 +209,15 @@ def _one(
 
 
 @compiled(uncounted=True)
-def _start(x: Float64, p: Float64, speed: float, size: float) -> None:
+def _start(x: Float64, p: Float64, speed: float, fix: float, step_s: float) -> None:
+    """Put a filter in balance at a speed, read from a log or from two fixes of that error."""
     for j in range(_STATES):
         x[j] = 0.0
         for k in range(_STATES):
             p[j, k] = 0.0
     x[0] = x[1] = speed
-    p[0, 0] = p[1, 1] = (0.05 * size) ** 2
-    p[3, 3] = 1e-4
+    p[0, 0] = p[1, 1] = (0.05 * max(abs(speed), 1e-3)) ** 2 + 2.0 * (fix / step_s) ** 2
+    p[3, 3], p[4, 4] = 1e-4, fix * fix
 
 
 @compiled(uncounted=True)
@@ -271,15 +273,15 @@ def _filter(
     for m in range(_STATES):
         gain[m] = p[m, first] + (p[m, second] if second != first else 0.0)
     total += gain[first] + (gain[second] if second != first else 0.0)
-    z2 = off * off / total
-    density = -0.5 * z2 - 0.5 * math.log(total)
-    if z2 > 16.0:  # something else than this noise
-        return -8.0 - 0.5 * math.log(total)
+    usual = (1.0 - n.BAD) * math.exp(-0.5 * off * off / total) / (ROOT_TWO_PI * math.sqrt(total))
+    # or anything, which no filter explains better than another
+    density = usual + n.BAD * n.BAD_DENSITY / (dt if which == 2 else 1.0)
+    share = usual / density
     for m in range(_STATES):
-        x[m] += gain[m] / total * off
+        x[m] += share * gain[m] / total * off
         for j in range(_STATES):
-            p[m, j] -= gain[m] * gain[j] / total
-    return float(density)
+            p[m, j] -= share * gain[m] * gain[j] / total
+    return math.log(density)
 
 
 @compiled(inline=True, uncounted=True)

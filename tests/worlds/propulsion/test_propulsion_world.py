@@ -154,6 +154,15 @@ def test_locked_shaft_shortens_the_glide() -> None:
     assert ends[Mode.BRAKE] < 0.7 * ends[Mode.OFF]
 
 
+def test_a_screw_that_slows_the_ship_down_and_pushes_nothing_is_counted_apart() -> None:
+    world = build(Case('slow-down to 30 %', 'ferry', 'calm', 1))
+    truth = world.truth
+    apart = truth.idle & (world.motion.speed > world.case.ship.end_m_s)
+    assert apart.any()
+    assert not world.motion.drive[apart].any()
+    assert not (truth.idle & truth.gliding).any()
+
+
 def test_a_case_is_its_name_and_seed() -> None:
     a, b, c = (build(Case('declutched', 'ferry', 'rough', seed)) for seed in (5, 5, 6))
     assert np.array_equal(a.blocks['log'][0].value, b.blocks['log'][0].value)
