@@ -68,15 +68,8 @@ RUN_DOWN = Declared(
     _REALITY,
 )
 RUN_DOWN_SHAPE = Declared(
-    'p',
-    'logarithm of the power of time by which the shaft runs down: 1 an exponential, 2 a ramp',
-    normal(0.3),
-    '',
-    'pitch that is wound back evenly; shafts with friction; direct drives',
-)
-RUN_DOWN_SEEN = Declared(
     'tau',
-    'error of a run-down that is seen or stated, relative',
+    'error of a run-down that is seen or stated, relative: no shaft falls as an exponential',
     normal(0.15),
     '',
     _REALITY,

@@ -240,10 +240,9 @@ def _extras(
         sd[motion.STOP] = stop.sd_s
         sd[motion.THRUST] = priors.THRUST.sd
         sd[motion.TAU] = priors.RUN_DOWN.sd
-        sd[motion.SHAPE] = priors.RUN_DOWN_SHAPE.sd
         if stop.run_down_s > 0.0:
-            seen = priors.RUN_DOWN_SEEN.sd
-            sd[motion.TAU] = math.hypot(seen, stop.run_down_sd_s / stop.run_down_s)
+            shape = priors.RUN_DOWN_SHAPE.sd
+            sd[motion.TAU] = math.hypot(shape, stop.run_down_sd_s / stop.run_down_s)
     if any(code % KIND_COUNT != LOG for code in kinds):
         sd[motion.CURRENT] = priors.CURRENT.sd * priors.sheltered(mean[motion.SPEED])
     for code in kinds:
