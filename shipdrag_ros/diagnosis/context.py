@@ -230,9 +230,11 @@ def _shaft(window: Window, ship: Ship, stop: Stop, end_s: float) -> tuple[Float6
     steady = float(np.median(np.abs(window.before.shaft.value)))
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
     fallen_s = stop.lead_in_s + RUN_DOWNS * max(run_down_s, stop.shaft_s)
+    if steady <= 0.0 or end_s <= fallen_s:
+        return nothing
     # a bin with readings from before holds some of the steady ones
     time_s, value = _binned(window, 'shaft', stop, np.arange(fallen_s, end_s + _BIN_S, _BIN_S))
-    if steady <= 0.0 or not len(time_s):
+    if not len(time_s):
         return nothing
     shaft = value[:, 0] / steady
     # soon after the fall, before it may stall

@@ -153,7 +153,7 @@ SHIPS = (
     ),
 )
 TABLES = (
-    _csv('an empty file', '', "'table.csv' is empty; give a table"),
+    _csv('an empty file', '', "'table.csv' is empty; give a log or a table"),
     _csv(
         'a header and no row',
         _HEADER,

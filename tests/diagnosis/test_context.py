@@ -94,3 +94,12 @@ def test_rows_of_the_shaft_hold_no_reading_from_before_its_fall(cargo: Ship) -> 
     assert not found.turns
     assert len(found.at_shaft) > 80
     assert np.abs(found.value[: len(found.at_shaft)]).max() < 0.01
+
+
+def test_a_run_that_ends_before_the_shaft_has_fallen_has_no_row_of_it(cargo: Ship) -> None:
+    scenario = Scenario(speed_m_s=8.0, lead_in_s=600.0, duration_s=20.0)
+    block = sense(simulate(cargo, scenario), standard_sensors(), seed=3)
+    first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
+    window = Window.from_block(block, START_NS + 600 * 10**9, last, before_ns=first)
+    found = Context.of(window, cargo, np.arange(0.0, 621.0, 10.0), Stop(first, 600.0, 0.0, 8.0))
+    assert len(found.at_shaft) == 0
