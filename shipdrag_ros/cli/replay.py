@@ -45,7 +45,6 @@ from shipdrag_ros.replay.document import document
 from shipdrag_ros.replay.hulls import Ranking, rank
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import Together, together
-from shipdrag_ros.replay.words import cut_lines
 from shipdrag_ros.ship import Ship
 
 REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'
@@ -143,7 +142,7 @@ def show_run(output: Output, run: RunResult) -> None:
 
 def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -> None:
     """Print one coastdown: knots and kN first, m/s and m/s² below."""
-    for line in cut_lines(coastdown, run.span_ns):
+    for line in words.cut_lines(coastdown, run.span_ns):
         output.say(line)
     lines = words.summary(coastdown, run.ship)
     for line in lines[:-1]:

@@ -83,7 +83,7 @@ def whitener_of(
     )
     # the engine damps the steady record; behind the stop the hull does
     learnt = learn(seen, speed_m_s).typical
-    speed = slowed_m_s(ship, speed_m_s, time - lead_in_s)
+    speed = _slowed_m_s(ship, speed_m_s, time - lead_in_s)
     whitener = np.eye(len(time))
     white = Noise(found.variance, WHITE, *damping_of(ship, speed))
     whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
@@ -93,19 +93,8 @@ def whitener_of(
     return np.linalg.inv(np.linalg.cholesky(shaken @ shaken.T + wandered))
 
 
-def slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
-    """
-    Return the speed (n,) of a ship that glides in calm deep water by her baseline.
-
-    Parameters
-    ----------
-    ship
-        With a baseline.
-    speed_m_s
-        At the stop.
-    after_s : (n,)
-        Since then.
-    """
+def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
+    """Return the speed (n,) some time after the stop, by her baseline in calm deep water."""
     speed = speed_m_s * np.geomspace(1.0, _SLOWEST, _SPEEDS)
     stated = np.clip(speed, *ship.baseline_range_m_s)
     # beyond what the baseline states, as its square

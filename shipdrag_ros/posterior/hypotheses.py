@@ -36,7 +36,8 @@ _FORMS, SMOOTH = 4, 6  # splines over a run: of the error of a formula, of somet
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 # behind the extras: place to port, first heading, shaft speed of a propeller that the water
-# turns, scatter of the resistance from run to run, light air to the east and to the north
+# turns, where friction stops it, scatter of the resistance from run to run, light air to the
+# east and to the north
 _PORT, _HEADING, _FREE, _STALL, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 8)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
 _ABSENT = 1e10  # precision from which an instrument is not there

@@ -19,7 +19,33 @@ from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
+StretchSpan = tuple[int, int]
+
+_AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
+_USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
+_RESETS_SHOWN = 3
+_UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
+_SURPLUS = Unreadable.SURPLUS_JOINT.value
+_CAUSE = {
+    'type': 'of a type that this input is not accepted in; `shipdrag info` lists the types',
+    'malformed': 'bytes that are no such message; check the driver and the recorder',
+    'no_joint': 'without a joint of that name, or without its value; name it in the driver',
+    'surplus_joint': 'joints beyond the four shafts and four pitches that are read; name those to '
+    'be read shaft_1 to shaft_4 and pitch_1 to pitch_4',
+    'duplicate': 'with the stamp of the message before; does the driver stamp each message?',
+    'out_of_order': 'stamped before the message before; check the driver',
+    'late': 'stamped long before the newest stamp of any input; set the clocks of the sensors '
+    'alike, or raise late_s',
+    'future': 'stamped more than 2 s after their arrival; set the clocks of sensor and recorder '
+    'alike',
+    'nan': 'without a value, as GNSS without a fix or a rotation of zeros; check the sensor',
+    'infinite': 'with an infinite value; check the sensor',
+    'absurd': 'faster than 40 m/s, or no place on Earth; check the unit',
+    'frozen': 'unchanged for longer than frozen_s, or than this sensor ever is; check the sensor',
+    'outlier': 'impossible beside the readings before and after, as drop-outs to 0, spikes and '
+    'jumps are; check the sensor',
+}
 
 
 def explained(regimes: Regimes) -> str:
@@ -116,11 +142,6 @@ def combined_notes(combined: Combined) -> tuple[str, ...]:
     )
 
 
-_AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
-
-StretchSpan = tuple[int, int]
-
-
 def cut_lines(coastdown: EndedCoastdown, span_ns: StretchSpan | None) -> tuple[str, ...]:
     """
     Say what was cut off a stretch, a sentence each.
@@ -167,31 +188,6 @@ def _moment(time_ns: int, span_ns: StretchSpan | None) -> str:
     if span_ns is None or not inside(time_ns, span_ns):
         return utc(time_ns)
     return f'{(time_ns - span_ns[0]) * 1e-9:.1f} s'
-
-
-_USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
-_RESETS_SHOWN = 3
-_UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
-_SURPLUS = Unreadable.SURPLUS_JOINT.value
-_CAUSE = {
-    'type': 'of a type that this input is not accepted in; `shipdrag info` lists the types',
-    'malformed': 'bytes that are no such message; check the driver and the recorder',
-    'no_joint': 'without a joint of that name, or without its value; name it in the driver',
-    'surplus_joint': 'joints beyond the four shafts and four pitches that are read; name those to '
-    'be read shaft_1 to shaft_4 and pitch_1 to pitch_4',
-    'duplicate': 'with the stamp of the message before; does the driver stamp each message?',
-    'out_of_order': 'stamped before the message before; check the driver',
-    'late': 'stamped long before the newest stamp of any input; set the clocks of the sensors '
-    'alike, or raise late_s',
-    'future': 'stamped more than 2 s after their arrival; set the clocks of sensor and recorder '
-    'alike',
-    'nan': 'without a value, as GNSS without a fix or a rotation of zeros; check the sensor',
-    'infinite': 'with an infinite value; check the sensor',
-    'absurd': 'faster than 40 m/s, or no place on Earth; check the unit',
-    'frozen': 'unchanged for longer than frozen_s, or than this sensor ever is; check the sensor',
-    'outlier': 'impossible beside the readings before and after, as drop-outs to 0, spikes and '
-    'jumps are; check the sensor',
-}
 
 
 def run_warnings(result: ReplayResult) -> tuple[str, ...]:
