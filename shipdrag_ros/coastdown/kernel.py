@@ -27,7 +27,7 @@ from shipdrag_ros.coastdown.bins import (
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning, Watch
 from shipdrag_ros.coastdown.past import NEVER
-from shipdrag_ros.coastdown.ring import append
+from shipdrag_ros.coastdown.ring import REFUSED, append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
@@ -38,8 +38,10 @@ from shipdrag_ros.coastdown.validate import (
     Limits,
     alive_ns,
     examine,
+    proves,
     reject,
     remember,
+    true_since,
 )
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
@@ -47,7 +49,7 @@ from shipdrag_ros.samples import KIND, SECOND_NS, Channel, Float64, Int64, Reaso
 
 _SHAFT, _PITCH = int(Channel.SHAFT), int(Channel.PITCH)
 _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
-_ACCEPTED = int(Reason.ACCEPTED)
+_ACCEPTED, _OUTLIER = int(Reason.ACCEPTED), int(Reason.OUTLIER)
 
 
 class WalkEvent(IntEnum):
@@ -168,6 +170,39 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     return 0
 
 
+@compiled(inline=True, uncounted=True)
+def _count(tally: InputTally, channel: int, stamp: int, arrival: int) -> None:
+    """Count an accepted sample."""
+    recent = tally.reasons[channel, _ACCEPTED] % RECENT
+    tally.stamp_ns[channel, recent] = stamp
+    tally.arrival_ns[channel, recent] = arrival
+    tally.reasons[channel, _ACCEPTED] += 1
+
+
+@compiled(uncounted=True)
+def _accept_refused(memory: Memory, width: int, channel: int) -> None:
+    """Accept the samples of the store that were refused, and are true."""
+    guard, bins, tally, store = memory.guard, memory.bins, memory.tally, memory.store
+    first = true_since(guard, channel)
+    end = begin = store.end[0]
+    while begin > 0 and not (
+        store.channel[begin - 1] == channel
+        or (store.channel[begin - 1] == channel + REFUSED and store.stamp_ns[begin - 1] < first)
+    ):
+        begin -= 1
+    for i in range(begin, end):
+        stamp, a, b = store.stamp_ns[i], store.value[i, 0], store.value[i, 1]
+        if store.channel[i] == channel + REFUSED and stamp > guard.last_ns[channel]:
+            store.channel[i] = channel
+            number = stamp // SECOND_NS
+            if bins.samples[channel] > 0 and number > bins.filling[channel]:
+                close(bins, channel, width)
+            add(bins, channel, number, stamp, a, b)
+            remember(guard, channel, stamp, a, b)
+            tally.reasons[channel, _OUTLIER] -= 1
+            _count(tally, channel, stamp, store.receive_ns[i])
+
+
 _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
 
 
@@ -176,7 +211,7 @@ _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all th
     f'(Memory, Tuning, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, i8)',
     like={
         'Memory': Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh()),
-        'Tuning': Tuning(Limits(0, 0), _SLOPES, 0, 0.0),
+        'Tuning': Tuning(Limits(0, 0, 1.0), _SLOPES, 0, 0.0),
     },
     uncounted=True,
 )
@@ -209,10 +244,13 @@ def walk(
         if code < 0:
             stop = code
             break
+        if i - kept == room:
+            stop = _FULL
+            break
         if code == _ACCEPTED:
-            if i - kept == room:
-                stop = _FULL
-                break
+            if proves(guard, tuning.limits, c, stamp, a, b, p, q):
+                _accept_refused(memory, tuning.slopes.width, c)
+                continue
             if stamp > watch.update_ns[0]:
                 stop = _UPDATE
                 break
@@ -235,16 +273,17 @@ def walk(
                 if stop != 0:
                     break
             add(bins, c, number, stamp, a, b)
-            remember(guard, c, stamp, a, b, p, q)
-            recent = tally.reasons[c, _ACCEPTED] % RECENT
-            tally.stamp_ns[c, recent] = stamp
-            tally.arrival_ns[c, recent] = arrival
+            remember(guard, c, stamp, a, b)
+            _count(tally, c, stamp, arrival)
         else:
-            reject(guard, code, c, stamp, a, b, p, q)
-            append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
-            room -= i - kept
+            reject(guard, tuning.limits, code, c, stamp, a, b, p, q)
+            last = i + (code == _OUTLIER)
+            append(store, channel, stamp_ns, receive_ns, value, variance, kept, last)
+            if code == _OUTLIER:  # it may turn out to be true
+                store.channel[store.end[0] - 1] += REFUSED
+            room -= last - kept
             kept = i + 1
-        tally.reasons[c, code] += 1
+            tally.reasons[c, code] += 1
         guard.arrival_ns[0] = arrival
         i += 1
     append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)

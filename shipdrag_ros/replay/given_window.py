@@ -48,7 +48,9 @@ class WindowSamples(NamedTuple):
     end_ns: int
 
 
-def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -> WindowSamples:
+def read_window(
+    run: Run, ship: Ship, parameters: Parameters, window: tuple[float, float]
+) -> WindowSamples:
     """
     Read and validate the samples of a window, and of a while around it.
 
@@ -56,7 +58,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     ----------
     run
         From `open_runs`.
-    parameters
+    ship, parameters
         For the validation, which needs some record before the window.
     window
         Begin and end [s from the start of the bag]; it ends with the bag at
@@ -93,7 +95,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
     inputs = run.inputs(start_ns=start_ns, end_ns=end_ns)
     deque(inputs, maxlen=0)  # counted, and the samples are there already
-    reasons = validate(block, parameters)
+    reasons = validate(block, parameters, ship.length_m)
     accepted = np.flatnonzero(reasons == Reason.ACCEPTED)
     if len(accepted):
         within = accepted[inside[accepted]]
