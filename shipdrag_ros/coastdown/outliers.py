@@ -4,12 +4,12 @@ Readings of the motion that the readings before them make impossible.
 
 A log reads 0 now and then, spikes and sticks; a fix jumps. A reading and the last accepted
 one may be apart by what is learnt (`past`), by six standard deviations that the reading
-itself states, and by what the hull can lose in the time between.
+itself states, and by what the ship has been doing in the time between.
 
 Any other needs proof. A boat brakes and leaps, a hull is caught, a radar takes another mark:
-refused readings that follow each other as a craft of her length can are the truth, once they
-are enough, and all of them are accepted after all. Those that repeat to the last bit, as
-zeros do, are not, where the sensor did not repeat before.
+refused readings that follow each other as those of a craft of her length can are the truth,
+once they are enough, and all of them are accepted after all. Those that repeat to the last
+bit, as zeros do, are not, where the sensor did not repeat before.
 """
 
 from __future__ import annotations
@@ -41,13 +41,22 @@ from shipdrag_ros.coastdown.past import (
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND
 
-_G_M_S2 = 9.81
-_PART = 0.3  # of g: what a hull loses at a Froude number of 1 and above, as its square below
-_FASTEST_M_S = 15.0  # an engine may push as hard as the hull would resist at this speed
+# A hull loses 0.3 g at a Froude number of 1 and above, and as its square below; an engine may
+# push as hard as the hull would resist at the speed that the fastest have.
+_FASTEST_M_S = 15.0
+_LOSES_M_S2 = 0.3 * 9.81
 _FASTER = 1.5  # than by the last readings a ship may get, without proof
 _AGREED_NS = 5_000_000_000
 _DOUBTS = 64  # readings refused more than accepted, after which all is learnt anew
 _DOUBTED_NS = 60_000_000_000
+
+
+def quickness(length_m: float) -> float:
+    """
+    Return what a craft may get faster or slower by in a second [m/s^2], by her length.
+    """
+    froude_square = _FASTEST_M_S**2 / (9.81 * length_m)
+    return _LOSES_M_S2 * min(froude_square, 1.0)
 
 
 @compiled(uncounted=True)
@@ -63,7 +72,7 @@ def forget_past(past: Past) -> None:
 @compiled(inline=True, uncounted=True)
 def fits(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -89,7 +98,7 @@ def fits(
         x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
         if (abs(x) + abs(y)) * M_PER_DEGREE <= past.gate[channel]:
             return True
-    return bool(_may_be(past, length_m, channel, stamp, a, b, variance_a, variance_b))
+    return bool(_may_be(past, quick, channel, stamp, a, b, variance_a, variance_b))
 
 
 @compiled(inline=True, uncounted=True)
@@ -118,7 +127,7 @@ def repeats_refused(
 @compiled(uncounted=True)
 def _may_be(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -133,13 +142,13 @@ def _may_be(
     gap = stamp - past.stamp_ns[channel, (count - 1) % KEPT]
     if KIND[channel] < FIRST_TRACK and a == 0.0:
         gap = 0  # no ship stops between two readings: the classic drop-out of a log
-    width = _width(past, length_m, 0.0, channel, gap, variance_a, variance_b)
+    width = _width(past, 0.0, 0.0, channel, gap, variance_a, variance_b)
     return bool(
         _off_accepted(past, channel, a, b) <= width
         or (
             past.refused_count[channel] + 1 >= AGREED
             and stamp - past.refused_ns[channel, 0] >= _AGREED_NS
-            and _goes_on(past, length_m, channel, stamp, a, b, variance_a, variance_b)
+            and _goes_on(past, quick, channel, stamp, a, b, variance_a, variance_b)
         )
     )
 
@@ -154,28 +163,22 @@ def _off_accepted(past: Past, channel: int, a: float, b: float) -> float:
 @compiled(uncounted=True)
 def _width(
     past: Past,
-    length_m: float,
+    quick: float,
     least: float,
     channel: int,
     gap_ns: int,
     variance_a: float,
     variance_b: float,
 ) -> float:
-    """Return how far two readings may be apart, of a ship that may have had a speed."""
+    """Return how far readings may be apart of a ship that is so quick, and at least so fast."""
     gap = gap_ns * 1e-9
     stated = variance_a if 0.0 < variance_a < np.inf else 0.0
     rate = _latest_rate(past, channel)
     if KIND[channel] < FIRST_TRACK:
-        speed = abs(past.value[channel, (past.accepted[channel] - 1) % KEPT, 0])
+        way = max(quick, _FASTER * rate) * gap
     else:
         stated += variance_b if 0.0 < variance_b < np.inf else 0.0
-        speed = rate = max(past.rate[channel], rate, least)
-    speed = max(speed, least)
-    loses = _PART * min(_G_M_S2, speed * speed / length_m)
-    if KIND[channel] < FIRST_TRACK:
-        way = max(loses, _FASTER * rate) * gap
-    else:
-        way = (_FASTER * rate + loses * gap) * gap
+        way = (_FASTER * max(past.rate[channel], rate, least) + quick * gap) * gap
     return float(max(past.gate[channel], SD * math.sqrt(stated)) + way)
 
 
@@ -202,7 +205,7 @@ def _same_as_refused(past: Past, channel: int, a: float, b: float) -> bool:
 @compiled(uncounted=True)
 def _follows(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -212,7 +215,7 @@ def _follows(
 ) -> bool:
     """Say whether a reading may follow the last one that was refused."""
     gap = stamp - past.refused_ns[channel, 1]
-    width = _width(past, length_m, _FASTEST_M_S, channel, gap, variance_a, variance_b)
+    width = _width(past, quick, _FASTEST_M_S, channel, gap, variance_a, variance_b)
     return past.refused_count[channel] > 0 and _off_refused(past, channel, a, b) <= width
 
 
@@ -225,7 +228,7 @@ def _off_refused(past: Past, channel: int, a: float, b: float) -> float:
 @compiled(uncounted=True)
 def _goes_on(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -234,7 +237,7 @@ def _goes_on(
     variance_b: float,
 ) -> bool:
     """Say whether a reading follows on from refused ones, and not as one that repeats."""
-    if not _follows(past, length_m, channel, stamp, a, b, variance_a, variance_b):
+    if not _follows(past, quick, channel, stamp, a, b, variance_a, variance_b):
         return False
     new = past.refused_new[channel] + (not _same_as_refused(past, channel, a, b))
     if 2 * new >= min(past.refused_count[channel], AGREED - 1):
@@ -246,7 +249,7 @@ def _goes_on(
 @compiled(uncounted=True)
 def proves_refused(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -259,7 +262,7 @@ def proves_refused(
     """
     return bool(
         _off_refused(past, channel, a, b) < _off_accepted(past, channel, a, b)
-        and _goes_on(past, length_m, channel, stamp, a, b, variance_a, variance_b)
+        and _goes_on(past, quick, channel, stamp, a, b, variance_a, variance_b)
     )
 
 
@@ -280,7 +283,7 @@ def take(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
 @compiled(uncounted=True)
 def refuse(
     past: Past,
-    length_m: float,
+    quick: float,
     channel: int,
     stamp: int,
     a: float,
@@ -297,7 +300,7 @@ def refuse(
     if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
     same = past.refused_count[channel] > 0 and _same_as_refused(past, channel, a, b)
-    if _follows(past, length_m, channel, stamp, a, b, variance_a, variance_b):
+    if _follows(past, quick, channel, stamp, a, b, variance_a, variance_b):
         past.refused_new[channel] += not same
     else:
         past.refused_count[channel] = 0

@@ -36,6 +36,7 @@ from shipdrag_ros.coastdown.outliers import (
     fits,
     forget_past,
     proves_refused,
+    quickness,
     refuse,
     repeats_refused,
     sticks,
@@ -145,21 +146,21 @@ class CheckMemory(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """`Parameters.frozen_s` and `late_s` in nanoseconds, and the length of the ship."""
+    """`Parameters.frozen_s` and `late_s` in nanoseconds, and how quick she is [m/s^2]."""
 
     frozen_ns: int
     late_ns: int
-    length_m: float
+    quick: float
 
     @classmethod
     def of(cls, parameters: Parameters, length_m: float) -> Limits:
         """
-        Take the limits from the parameters.
+        Take the limits from the parameters and the length of the ship [m].
         """
         return cls(
             round(parameters.frozen_s * SECOND_NS),
             round(parameters.late_s * SECOND_NS),
-            float(length_m),
+            quickness(length_m),
         )
 
 
@@ -215,7 +216,7 @@ def examine(
         )
     ):
         return _FROZEN
-    if fits(guard.past, limits.length_m, channel, stamp, a, b, variance_a, variance_b):
+    if fits(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b):
         return _ACCEPTED
     if repeats_refused(guard.past, channel, stamp, a, b, limits.frozen_ns):
         return _FROZEN
@@ -239,9 +240,7 @@ def proves(
     return bool(
         KIND[channel] <= _MOTION
         and guard.past.refused_count[channel] > 0
-        and proves_refused(
-            guard.past, limits.length_m, channel, stamp, a, b, variance_a, variance_b
-        )
+        and proves_refused(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b)
     )
 
 
@@ -296,7 +295,7 @@ def reject(
         guard.back[channel] = guard.back[channel] + 1 if ascends else 1
         guard.back_ns[channel] = stamp
     if code >= _FROZEN:
-        refuse(guard.past, limits.length_m, channel, stamp, a, b, variance_a, variance_b)
+        refuse(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b)
 
 
 @compiled(inline=True, uncounted=True)

@@ -38,6 +38,8 @@ class WindowSamples(NamedTuple):
         Which of these came in the window.
     start_ns, end_ns
         The window in stamps [ns].
+    begin_ns
+        Arrival at which the bag begins [ns].
     """
 
     inputs: RunSamples
@@ -46,6 +48,7 @@ class WindowSamples(NamedTuple):
     inside: NDArray[np.bool_]
     start_ns: int
     end_ns: int
+    begin_ns: int
 
 
 def read_window(
@@ -102,7 +105,7 @@ def read_window(
         first = int((within if len(within) else accepted)[0])  # the clock of before may be another
         clock_ns = int(block.stamp_ns[first] - block.receive_ns[first])
         start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
-    return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
+    return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns, span[0])
 
 
 def margin_around_ns(parameters: Parameters) -> int:
@@ -125,7 +128,7 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     start_ns, end_ns = samples.start_ns, samples.end_ns
     parts = [part for part in parts_of_one_clock(accepted) if inside[part].any()]
     if len(parts) > 1:
-        failure = 'a clock was set in the window; choose one before or after'
+        failure = _clock_set(accepted, parts, samples.begin_ns)
         found = Examined(GivenPart(start_ns, end_ns, failure=failure), None, failure)
     else:
         accepted = accepted[parts[0]] if parts else accepted[:0]
@@ -145,6 +148,18 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         withdrawn=found.refused,
         cuts=judged.cuts,
         stretch=judged.stretch,
+    )
+
+
+def _clock_set(accepted: Block, parts: list[slice], begin_ns: int) -> str:
+    """Say where a clock was set in a window, and which window to choose instead."""
+    set_ns = int(accepted.receive_ns[parts[-1].start])
+    failure = f'a clock was set in the window, at {(set_ns - begin_ns) / SECOND_NS:.0f} s'
+    if int(accepted.receive_ns[parts[-1].stop - 1]) > set_ns:
+        return f'{failure}; choose one that ends before or begins after it'
+    return (
+        f'{failure}; choose one that ends before it. What follows has no time of its own in this '
+        'bag: import the table again, or what follows alone'
     )
 
 
