@@ -39,6 +39,7 @@ from shipdrag_ros.coastdown.validate import (
     alive_ns,
     examine,
     proves,
+    reading_of,
     reject,
     remember,
     true_since,
@@ -191,14 +192,15 @@ def _accept_refused(memory: Memory, width: int, channel: int) -> None:
     ):
         begin -= 1
     for i in range(begin, end):
-        stamp, a, b = store.stamp_ns[i], store.value[i, 0], store.value[i, 1]
+        reading = reading_of(store.stamp_ns, store.value, store.variance, i)
+        stamp = reading.stamp
         if store.channel[i] == channel + REFUSED and stamp > guard.last_ns[channel]:
             store.channel[i] = channel
             number = stamp // SECOND_NS
             if bins.samples[channel] > 0 and number > bins.filling[channel]:
                 close(bins, channel, width)
-            add(bins, channel, number, stamp, a, b)
-            remember(guard, channel, stamp, a, b)
+            add(bins, channel, number, stamp, reading.a, reading.b)
+            remember(guard, channel, reading)
             tally.reasons[channel, _OUTLIER] -= 1
             _count(tally, channel, stamp, store.receive_ns[i])
 
@@ -239,8 +241,8 @@ def walk(
     kept, room = start, len(store.stamp_ns) - store.end[0]
     while i < len(channel):
         c, stamp, arrival = int(channel[i]), stamp_ns[i], receive_ns[i]
-        a, b, p, q = value[i, 0], value[i, 1], variance[i, 0], variance[i, 1]
-        code = examine(guard, tuning.limits, c, stamp, arrival, a, b, p, q)
+        reading = reading_of(stamp_ns, value, variance, i)
+        code = examine(guard, tuning.limits, c, arrival, reading)
         if code < 0:
             stop = code
             break
@@ -248,7 +250,7 @@ def walk(
             stop = _FULL
             break
         if code == _ACCEPTED:
-            if proves(guard, tuning.limits, c, stamp, a, b, p, q):
+            if proves(guard, tuning.limits, c, reading):
                 _accept_refused(memory, tuning.slopes.width, c)
                 continue
             if stamp > watch.update_ns[0]:
@@ -272,11 +274,11 @@ def walk(
                     stop = _look_at_shaft(bins, watch, tuning, c, closed)
                 if stop != 0:
                     break
-            add(bins, c, number, stamp, a, b)
-            remember(guard, c, stamp, a, b)
+            add(bins, c, number, stamp, reading.a, reading.b)
+            remember(guard, c, reading)
             _count(tally, c, stamp, arrival)
         else:
-            reject(guard, tuning.limits, code, c, stamp, a, b, p, q)
+            reject(guard, tuning.limits, code, c, reading)
             last = i + (code == _OUTLIER)
             append(store, channel, stamp_ns, receive_ns, value, variance, kept, last)
             if code == _OUTLIER:  # it may turn out to be true

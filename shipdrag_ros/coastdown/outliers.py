@@ -15,6 +15,7 @@ bit, as zeros do, are not, where the sensor did not repeat before.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,16 @@ _DOUBTS = 64  # readings refused more than accepted, after which all is learnt a
 _DOUBTED_NS = 60_000_000_000
 
 
+class Reading(NamedTuple):
+    """Stamp [ns], values and variances of a sample; of one column, the second is unused."""
+
+    stamp: int
+    a: float
+    b: float
+    variance_a: float
+    variance_b: float
+
+
 def quickness(length_m: float) -> float:
     """
     Return what a craft may get faster or slower by in a second [m/s^2], by her length.
@@ -70,23 +81,13 @@ def forget_past(past: Past) -> None:
 
 
 @compiled(inline=True, uncounted=True)
-def fits(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def fits(past: Past, quick: float, channel: int, reading: Reading) -> bool:
     """
     Say whether a reading of the motion may be one, by those before it.
 
     Changes nothing.
     """
-    count = past.accepted[channel]
-    last = (count - 1) % KEPT
+    last, a, b = (past.accepted[channel] - 1) % KEPT, reading.a, reading.b
     if KIND[channel] < FIRST_TRACK:
         if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
             return True
@@ -98,7 +99,7 @@ def fits(
         x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
         if (abs(x) + abs(y)) * M_PER_DEGREE <= past.gate[channel]:
             return True
-    return bool(_may_be(past, quick, channel, stamp, a, b, variance_a, variance_b))
+    return bool(_may_be(past, quick, channel, reading))
 
 
 @compiled(inline=True, uncounted=True)
@@ -110,74 +111,57 @@ def sticks(past: Past, channel: int) -> bool:
 
 
 @compiled(uncounted=True)
-def repeats_refused(
-    past: Past, channel: int, stamp: int, a: float, b: float, longest_ns: int
-) -> bool:
+def repeats_refused(past: Past, channel: int, reading: Reading, longest_ns: int) -> bool:
     """
     Say whether a reading has been refused unchanged for longer than `longest_ns`.
     """
     return bool(
         past.refused_count[channel] > 0
         and past.refused_new[channel] == 0
-        and _same_as_refused(past, channel, a, b)
-        and stamp - past.refused_ns[channel, 0] > longest_ns
+        and _same_as_refused(past, channel, reading)
+        and reading.stamp - past.refused_ns[channel, 0] > longest_ns
     )
 
 
 @compiled(uncounted=True)
-def _may_be(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def _may_be(past: Past, quick: float, channel: int, reading: Reading) -> bool:
     """Judge a reading with all there is."""
     count = past.accepted[channel]
     if count == 0:
         return True
-    gap = stamp - past.stamp_ns[channel, (count - 1) % KEPT]
-    if KIND[channel] < FIRST_TRACK and a == 0.0:
+    gap = reading.stamp - past.stamp_ns[channel, (count - 1) % KEPT]
+    if KIND[channel] < FIRST_TRACK and reading.a == 0.0:
         gap = 0  # no ship stops between two readings: the classic drop-out of a log
-    width = _width(past, 0.0, 0.0, channel, gap, variance_a, variance_b)
+    width = _width(past, 0.0, 0.0, channel, gap, reading)
     return bool(
-        _off_accepted(past, channel, a, b) <= width
+        _off_accepted(past, channel, reading) <= width
         or (
             past.refused_count[channel] + 1 >= AGREED
-            and stamp - past.refused_ns[channel, 0] >= _AGREED_NS
-            and _goes_on(past, quick, channel, stamp, a, b, variance_a, variance_b)
+            and reading.stamp - past.refused_ns[channel, 0] >= _AGREED_NS
+            and _goes_on(past, quick, channel, reading)
         )
     )
 
 
 @compiled(uncounted=True)
-def _off_accepted(past: Past, channel: int, a: float, b: float) -> float:
+def _off_accepted(past: Past, channel: int, reading: Reading) -> float:
     """Return how far a reading is from the last accepted one [m/s or m]."""
     last = past.value[channel, (past.accepted[channel] - 1) % KEPT]
-    return apart(channel, a, b, last[0], last[1])
+    return apart(channel, reading.a, reading.b, last[0], last[1])
 
 
 @compiled(uncounted=True)
 def _width(
-    past: Past,
-    quick: float,
-    least: float,
-    channel: int,
-    gap_ns: int,
-    variance_a: float,
-    variance_b: float,
+    past: Past, quick: float, least: float, channel: int, gap_ns: int, reading: Reading
 ) -> float:
     """Return how far readings may be apart of a ship that is so quick, and at least so fast."""
-    gap = gap_ns * 1e-9
-    stated = variance_a if 0.0 < variance_a < np.inf else 0.0
+    gap, own, other = gap_ns * 1e-9, reading.variance_a, reading.variance_b
+    stated = own if 0.0 < own < np.inf else 0.0
     rate = _latest_rate(past, channel)
     if KIND[channel] < FIRST_TRACK:
         way = max(quick, _FASTER * rate) * gap
     else:
-        stated += variance_b if 0.0 < variance_b < np.inf else 0.0
+        stated += other if 0.0 < other < np.inf else 0.0
         way = (_FASTER * max(past.rate[channel], rate, least) + quick * gap) * gap
     return float(max(past.gate[channel], SD * math.sqrt(stated)) + way)
 
@@ -195,82 +179,57 @@ def _latest_rate(past: Past, channel: int) -> float:
 
 
 @compiled(uncounted=True)
-def _same_as_refused(past: Past, channel: int, a: float, b: float) -> bool:
+def _same_as_refused(past: Past, channel: int, reading: Reading) -> bool:
     return bool(
-        a == past.refused[channel, 0]
-        and (KIND[channel] < FIRST_TRACK or b == past.refused[channel, 1])
+        reading.a == past.refused[channel, 0]
+        and (KIND[channel] < FIRST_TRACK or reading.b == past.refused[channel, 1])
     )
 
 
 @compiled(uncounted=True)
-def _follows(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def _follows(past: Past, quick: float, channel: int, reading: Reading) -> bool:
     """Say whether a reading may follow the last one that was refused."""
-    gap = stamp - past.refused_ns[channel, 1]
-    width = _width(past, quick, _FASTEST_M_S, channel, gap, variance_a, variance_b)
-    return past.refused_count[channel] > 0 and _off_refused(past, channel, a, b) <= width
+    gap = reading.stamp - past.refused_ns[channel, 1]
+    width = _width(past, quick, _FASTEST_M_S, channel, gap, reading)
+    return past.refused_count[channel] > 0 and _off_refused(past, channel, reading) <= width
 
 
 @compiled(uncounted=True)
-def _off_refused(past: Past, channel: int, a: float, b: float) -> float:
+def _off_refused(past: Past, channel: int, reading: Reading) -> float:
     """Return how far a reading is from the last refused one [m/s or m]."""
-    return apart(channel, a, b, past.refused[channel, 0], past.refused[channel, 1])
+    last = past.refused[channel]
+    return apart(channel, reading.a, reading.b, last[0], last[1])
 
 
 @compiled(uncounted=True)
-def _goes_on(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def _goes_on(past: Past, quick: float, channel: int, reading: Reading) -> bool:
     """Say whether a reading follows on from refused ones, and not as one that repeats."""
-    if not _follows(past, quick, channel, stamp, a, b, variance_a, variance_b):
+    if not _follows(past, quick, channel, reading):
         return False
-    new = past.refused_new[channel] + (not _same_as_refused(past, channel, a, b))
+    new = past.refused_new[channel] + (not _same_as_refused(past, channel, reading))
     if 2 * new >= min(past.refused_count[channel], AGREED - 1):
         return True
     natural = repeats_kept(past, channel, min(past.accepted[channel], KEPT), 0) > REPEATS
-    return natural and (KIND[channel] >= FIRST_TRACK or a != 0.0)
+    return natural and (KIND[channel] >= FIRST_TRACK or reading.a != 0.0)
 
 
 @compiled(uncounted=True)
-def proves_refused(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def proves_refused(past: Past, quick: float, channel: int, reading: Reading) -> bool:
     """
     Say whether an accepted reading goes on from those refused rather than from those before.
     """
     return bool(
-        _off_refused(past, channel, a, b) < _off_accepted(past, channel, a, b)
-        and _goes_on(past, quick, channel, stamp, a, b, variance_a, variance_b)
+        _off_refused(past, channel, reading) < _off_accepted(past, channel, reading)
+        and _goes_on(past, quick, channel, reading)
     )
 
 
 @compiled(inline=True, uncounted=True)
-def take(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
+def take(past: Past, channel: int, reading: Reading) -> None:
     """
     Remember an accepted reading.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if stamp < past.due_ns[channel] and not same_as_last(past, channel, a, b):
         keep(past, channel, stamp, a, b)
     else:
@@ -281,26 +240,18 @@ def take(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
 
 
 @compiled(uncounted=True)
-def refuse(
-    past: Past,
-    quick: float,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> None:
+def refuse(past: Past, quick: float, channel: int, reading: Reading) -> None:
     """
     Remember a reading that was refused for its value.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     past.heard_ns[channel] = stamp
     past.due_ns[channel] = NEVER
     learn_gate(past, channel)  # the last time may be long ago
     if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
-    same = past.refused_count[channel] > 0 and _same_as_refused(past, channel, a, b)
-    if _follows(past, quick, channel, stamp, a, b, variance_a, variance_b):
+    same = past.refused_count[channel] > 0 and _same_as_refused(past, channel, reading)
+    if _follows(past, quick, channel, reading):
         past.refused_new[channel] += not same
     else:
         past.refused_count[channel] = 0

@@ -33,6 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.outliers import (
+    Reading,
     fits,
     forget_past,
     proves_refused,
@@ -165,22 +166,27 @@ class Limits(NamedTuple):
 
 
 @compiled(inline=True, uncounted=True)
+def reading_of(stamp_ns: Int64, value: Float64, variance: Float64, i: int) -> Reading:
+    """
+    Return the reading that a sample is.
+    """
+    return Reading(stamp_ns[i], value[i, 0], value[i, 1], variance[i, 0], variance[i, 1])
+
+
+@compiled(inline=True, uncounted=True)
 def examine(
     guard: CheckMemory,
     limits: Limits,
     channel: int,
-    stamp: int,
     arrival: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
+    reading: Reading,
 ) -> int:
     """
     Return the `Reason` of one sample, or that a clock was set.
 
     Changes nothing: `remember` and `reject` do, once it is decided.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if arrival < guard.arrival_ns[0] - BACKWARD_JUMP_NS:
         return ARRIVAL_JUMPED_BACK
     if stamp > arrival + FUTURE_NS:
@@ -216,31 +222,22 @@ def examine(
         )
     ):
         return _FROZEN
-    if fits(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b):
+    if fits(guard.past, limits.quick, channel, reading):
         return _ACCEPTED
-    if repeats_refused(guard.past, channel, stamp, a, b, limits.frozen_ns):
+    if repeats_refused(guard.past, channel, reading, limits.frozen_ns):
         return _FROZEN
     return _OUTLIER
 
 
 @compiled(inline=True, uncounted=True)
-def proves(
-    guard: CheckMemory,
-    limits: Limits,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> bool:
+def proves(guard: CheckMemory, limits: Limits, channel: int, reading: Reading) -> bool:
     """
     Say whether an accepted sample shows that those refused before it were true.
     """
     return bool(
         KIND[channel] <= _MOTION
         and guard.past.refused_count[channel] > 0
-        and proves_refused(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b)
+        and proves_refused(guard.past, limits.quick, channel, reading)
     )
 
 
@@ -257,12 +254,13 @@ def true_since(guard: CheckMemory, channel: int) -> int:
 
 
 @compiled(inline=True, uncounted=True)
-def remember(guard: CheckMemory, channel: int, stamp: int, a: float, b: float) -> None:
+def remember(guard: CheckMemory, channel: int, reading: Reading) -> None:
     """
     Take an accepted sample into the memory of the tests.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if KIND[channel] <= _MOTION:
-        take(guard.past, channel, stamp, a, b)
+        take(guard.past, channel, reading)
     guard.back[channel] = 0
     guard.last_ns[channel] = stamp
     guard.newest_ns[0] = max(guard.newest_ns[0], stamp)
@@ -276,26 +274,17 @@ def remember(guard: CheckMemory, channel: int, stamp: int, a: float, b: float) -
 
 
 @compiled(inline=True, uncounted=True)
-def reject(
-    guard: CheckMemory,
-    limits: Limits,
-    code: int,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> None:
+def reject(guard: CheckMemory, limits: Limits, code: int, channel: int, reading: Reading) -> None:
     """
     Take a sample that was rejected into the memory of the tests.
     """
+    stamp = reading.stamp
     if code == _LATE and stamp < guard.last_ns[channel] - BACKWARD_JUMP_NS:
         ascends = stamp > guard.back_ns[channel]
         guard.back[channel] = guard.back[channel] + 1 if ascends else 1
         guard.back_ns[channel] = stamp
     if code >= _FROZEN:
-        refuse(guard.past, limits.quick, channel, stamp, a, b, variance_a, variance_b)
+        refuse(guard.past, limits.quick, channel, reading)
 
 
 @compiled(inline=True, uncounted=True)
@@ -377,19 +366,22 @@ def _walk(
     reasons: UInt8,
 ) -> None:
     for i in range(len(channel)):
-        c, stamp, a, b = int(channel[i]), stamp_ns[i], value[i, 0], value[i, 1]
-        p, q = variance[i, 0], variance[i, 1]
-        code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
+        c, arrival, reading = (
+            int(channel[i]),
+            receive_ns[i],
+            reading_of(stamp_ns, value, variance, i),
+        )
+        code = examine(guard, limits, c, arrival, reading)
         if code < 0:
             forget(guard)
-            code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
-        if code == _ACCEPTED and proves(guard, limits, c, stamp, a, b, p, q):
-            _accept_refused(guard, c, i, channel, stamp_ns, value, reasons)
-            code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
+            code = examine(guard, limits, c, arrival, reading)
+        if code == _ACCEPTED and proves(guard, limits, c, reading):
+            _accept_refused(guard, c, i, channel, stamp_ns, value, variance, reasons)
+            code = examine(guard, limits, c, arrival, reading)
         if code == _ACCEPTED:
-            remember(guard, c, stamp, a, b)
+            remember(guard, c, reading)
         else:
-            reject(guard, limits, code, c, stamp, a, b, p, q)
+            reject(guard, limits, code, c, reading)
         guard.arrival_ns[0] = receive_ns[i]
         reasons[i] = code
 
@@ -402,6 +394,7 @@ def _accept_refused(
     channels: UInt8,
     stamp_ns: Int64,
     value: Float64,
+    variance: Float64,
     reasons: UInt8,
 ) -> None:
     """Accept the samples before `end` that were refused, and are true."""
@@ -418,7 +411,7 @@ def _accept_refused(
             and reasons[i] == _OUTLIER
             and stamp_ns[i] > guard.last_ns[channel]
         ):
-            remember(guard, channel, stamp_ns[i], value[i, 0], value[i, 1])
+            remember(guard, channel, reading_of(stamp_ns, value, variance, i))
             reasons[i] = _ACCEPTED
 
 

@@ -111,7 +111,7 @@ def test_what_was_refused_and_was_true_is_in_live_and_replay_alike(tmp_path: Pat
         told = each.estimate.speed_through_water.time_ns
         assert np.array_equal(told[(told >= each.start_ns) & (told <= each.end_ns)], inside)
     (run,) = open_runs([write_run(tmp_path / 'a.mcap', block, BOAT)])
-    counts = replay(run, parameters=QUICK).inputs['speed_through_water']
+    counts = replay(run, parameters=replace(QUICK, update_s=60.0)).inputs['speed_through_water']
     assert counts.rejected == {'outlier': 4}
 
 
