@@ -143,6 +143,7 @@ def since(store: RingBuffer, start_ns: int, *, late_ns: int, capacity: int) -> B
 def _before(store: RingBuffer, stamp_ns: int, late_ns: int) -> int:
     """Return an index before which all stamps are older than `stamp_ns`."""
     # The stamps are sorted but for late_ns. A bisection for stamp_ns - late_ns drops what is
-    # in front of a stamp older than that, and all in front of it is older than stamp_ns.
+    # in front of a stamp older than that, and all in front of it is older than stamp_ns. One that
+    # was refused and is ahead of all only keeps more.
     end = int(store.end[0])
     return int(np.searchsorted(store.stamp_ns[:end], stamp_ns - late_ns))

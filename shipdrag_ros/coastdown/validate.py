@@ -235,8 +235,7 @@ def proves(guard: CheckMemory, limits: Limits, channel: int, reading: Reading) -
     Say whether an accepted sample shows that those refused before it were true.
     """
     return bool(
-        KIND[channel] <= _MOTION
-        and guard.past.refused_count[channel] > 0
+        guard.past.refused_count[channel] > 0
         and proves_refused(guard.past, limits.quick, channel, reading)
     )
 
