@@ -52,7 +52,7 @@ _DOUBTS = 64  # readings refused more than accepted, after which all is learnt a
 _DOUBTED_NS = 60_000_000_000
 
 
-class Reading(NamedTuple):
+class JudgedReading(NamedTuple):
     """Stamp [ns], values and variances of a sample; of one column, the second is unused."""
 
     stamp: int
@@ -81,7 +81,7 @@ def forget_past(past: Past) -> None:
 
 
 @compiled(inline=True, uncounted=True)
-def fits(past: Past, quick: float, channel: int, reading: Reading) -> bool:
+def fits(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """
     Say whether a reading of the motion may be one, by those before it.
 
@@ -111,7 +111,7 @@ def sticks(past: Past, channel: int) -> bool:
 
 
 @compiled(uncounted=True)
-def repeats_refused(past: Past, channel: int, reading: Reading, longest_ns: int) -> bool:
+def repeats_refused(past: Past, channel: int, reading: JudgedReading, longest_ns: int) -> bool:
     """
     Say whether a reading has been refused unchanged for longer than `longest_ns`.
     """
@@ -124,7 +124,7 @@ def repeats_refused(past: Past, channel: int, reading: Reading, longest_ns: int)
 
 
 @compiled(uncounted=True)
-def _may_be(past: Past, quick: float, channel: int, reading: Reading) -> bool:
+def _may_be(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """Judge a reading with all there is."""
     count = past.accepted[channel]
     if count == 0:
@@ -144,7 +144,7 @@ def _may_be(past: Past, quick: float, channel: int, reading: Reading) -> bool:
 
 
 @compiled(uncounted=True)
-def _off_accepted(past: Past, channel: int, reading: Reading) -> float:
+def _off_accepted(past: Past, channel: int, reading: JudgedReading) -> float:
     """Return how far a reading is from the last accepted one [m/s or m]."""
     last = past.value[channel, (past.accepted[channel] - 1) % KEPT]
     return apart(channel, reading.a, reading.b, last[0], last[1])
@@ -152,7 +152,7 @@ def _off_accepted(past: Past, channel: int, reading: Reading) -> float:
 
 @compiled(uncounted=True)
 def _width(
-    past: Past, quick: float, least: float, channel: int, gap_ns: int, reading: Reading
+    past: Past, quick: float, least: float, channel: int, gap_ns: int, reading: JudgedReading
 ) -> float:
     """Return how far readings may be apart of a ship that is so quick, and at least so fast."""
     gap, own, other = gap_ns * 1e-9, reading.variance_a, reading.variance_b
@@ -179,7 +179,7 @@ def _latest_rate(past: Past, channel: int) -> float:
 
 
 @compiled(uncounted=True)
-def _same_as_refused(past: Past, channel: int, reading: Reading) -> bool:
+def _same_as_refused(past: Past, channel: int, reading: JudgedReading) -> bool:
     return bool(
         reading.a == past.refused[channel, 0]
         and (KIND[channel] < FIRST_TRACK or reading.b == past.refused[channel, 1])
@@ -187,7 +187,7 @@ def _same_as_refused(past: Past, channel: int, reading: Reading) -> bool:
 
 
 @compiled(uncounted=True)
-def _follows(past: Past, quick: float, channel: int, reading: Reading) -> bool:
+def _follows(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """Say whether a reading may follow the last one that was refused."""
     gap = reading.stamp - past.refused_ns[channel, 1]
     width = _width(past, quick, _FASTEST_M_S, channel, gap, reading)
@@ -195,14 +195,14 @@ def _follows(past: Past, quick: float, channel: int, reading: Reading) -> bool:
 
 
 @compiled(uncounted=True)
-def _off_refused(past: Past, channel: int, reading: Reading) -> float:
+def _off_refused(past: Past, channel: int, reading: JudgedReading) -> float:
     """Return how far a reading is from the last refused one [m/s or m]."""
     last = past.refused[channel]
     return apart(channel, reading.a, reading.b, last[0], last[1])
 
 
 @compiled(uncounted=True)
-def _goes_on(past: Past, quick: float, channel: int, reading: Reading) -> bool:
+def _goes_on(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """Say whether a reading follows on from refused ones, and not as one that repeats."""
     if not _follows(past, quick, channel, reading):
         return False
@@ -214,7 +214,7 @@ def _goes_on(past: Past, quick: float, channel: int, reading: Reading) -> bool:
 
 
 @compiled(uncounted=True)
-def proves_refused(past: Past, quick: float, channel: int, reading: Reading) -> bool:
+def proves_refused(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """
     Say whether an accepted reading goes on from those refused rather than from those before.
     """
@@ -225,7 +225,7 @@ def proves_refused(past: Past, quick: float, channel: int, reading: Reading) -> 
 
 
 @compiled(inline=True, uncounted=True)
-def take(past: Past, channel: int, reading: Reading) -> None:
+def take(past: Past, channel: int, reading: JudgedReading) -> None:
     """
     Remember an accepted reading.
     """
@@ -240,7 +240,7 @@ def take(past: Past, channel: int, reading: Reading) -> None:
 
 
 @compiled(uncounted=True)
-def refuse(past: Past, quick: float, channel: int, reading: Reading) -> None:
+def refuse(past: Past, quick: float, channel: int, reading: JudgedReading) -> None:
     """
     Remember a reading that was refused for its value.
     """

@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.outliers import (
-    Reading,
+    JudgedReading,
     fits,
     forget_past,
     proves_refused,
@@ -166,11 +166,11 @@ class Limits(NamedTuple):
 
 
 @compiled(inline=True, uncounted=True)
-def reading_of(stamp_ns: Int64, value: Float64, variance: Float64, i: int) -> Reading:
+def reading_of(stamp_ns: Int64, value: Float64, variance: Float64, i: int) -> JudgedReading:
     """
     Return the reading that a sample is.
     """
-    return Reading(stamp_ns[i], value[i, 0], value[i, 1], variance[i, 0], variance[i, 1])
+    return JudgedReading(stamp_ns[i], value[i, 0], value[i, 1], variance[i, 0], variance[i, 1])
 
 
 @compiled(inline=True, uncounted=True)
@@ -179,7 +179,7 @@ def examine(
     limits: Limits,
     channel: int,
     arrival: int,
-    reading: Reading,
+    reading: JudgedReading,
 ) -> int:
     """
     Return the `Reason` of one sample, or that a clock was set.
@@ -230,7 +230,7 @@ def examine(
 
 
 @compiled(inline=True, uncounted=True)
-def proves(guard: CheckMemory, limits: Limits, channel: int, reading: Reading) -> bool:
+def proves(guard: CheckMemory, limits: Limits, channel: int, reading: JudgedReading) -> bool:
     """
     Say whether an accepted sample shows that those refused before it were true.
     """
@@ -253,7 +253,7 @@ def true_since(guard: CheckMemory, channel: int) -> int:
 
 
 @compiled(inline=True, uncounted=True)
-def remember(guard: CheckMemory, channel: int, reading: Reading) -> None:
+def remember(guard: CheckMemory, channel: int, reading: JudgedReading) -> None:
     """
     Take an accepted sample into the memory of the tests.
     """
@@ -273,7 +273,9 @@ def remember(guard: CheckMemory, channel: int, reading: Reading) -> None:
 
 
 @compiled(inline=True, uncounted=True)
-def reject(guard: CheckMemory, limits: Limits, code: int, channel: int, reading: Reading) -> None:
+def reject(
+    guard: CheckMemory, limits: Limits, code: int, channel: int, reading: JudgedReading
+) -> None:
     """
     Take a sample that was rejected into the memory of the tests.
     """
