@@ -46,7 +46,7 @@ def rows(world: World, number: int, parameters: Parameters) -> Iterator[Row]:
     seen = world.observe(number)
     ship = Ship.from_yaml(seen.ship_file, subject=str(number))
     block = as_block(seen.runs[0])
-    block = block[np.flatnonzero(validate(block, parameters) == Reason.ACCEPTED)]
+    block = block[np.flatnonzero(validate(block, parameters, ship.length_m) == Reason.ACCEPTED)]
     stop_ns, end_ns = world.stops_ns(number)[0], int(block.stamp_ns.max())
     window = Window.from_block(block, stop_ns, end_ns, before_ns=int(block.stamp_ns.min()))
     followed = Followed.of(window, estimate_final(window, ship, Parameters()))

@@ -27,7 +27,7 @@ from shipdrag_ros.coastdown.bins import (
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning, Watch
 from shipdrag_ros.coastdown.past import NEVER
-from shipdrag_ros.coastdown.ring import append
+from shipdrag_ros.coastdown.ring import REFUSED, append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
@@ -38,8 +38,11 @@ from shipdrag_ros.coastdown.validate import (
     Limits,
     alive_ns,
     examine,
+    proves,
+    reading_of,
     reject,
     remember,
+    true_since,
 )
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
@@ -47,7 +50,7 @@ from shipdrag_ros.samples import KIND, SECOND_NS, Channel, Float64, Int64, Reaso
 
 _SHAFT, _PITCH = int(Channel.SHAFT), int(Channel.PITCH)
 _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
-_ACCEPTED = int(Reason.ACCEPTED)
+_ACCEPTED, _OUTLIER = int(Reason.ACCEPTED), int(Reason.OUTLIER)
 
 
 class WalkEvent(IntEnum):
@@ -168,6 +171,40 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     return 0
 
 
+@compiled(inline=True, uncounted=True)
+def _count(tally: InputTally, channel: int, stamp: int, arrival: int) -> None:
+    """Count an accepted sample."""
+    recent = tally.reasons[channel, _ACCEPTED] % RECENT
+    tally.stamp_ns[channel, recent] = stamp
+    tally.arrival_ns[channel, recent] = arrival
+    tally.reasons[channel, _ACCEPTED] += 1
+
+
+@compiled(uncounted=True)
+def _accept_refused(memory: Memory, width: int, channel: int) -> None:
+    """Accept the samples of the store that were refused, and are true."""
+    guard, bins, tally, store = memory.guard, memory.bins, memory.tally, memory.store
+    first = true_since(guard, channel)
+    end = begin = store.end[0]
+    while begin > 0 and not (
+        store.channel[begin - 1] == channel
+        or (store.channel[begin - 1] == channel + REFUSED and store.stamp_ns[begin - 1] < first)
+    ):
+        begin -= 1
+    for i in range(begin, end):
+        reading = reading_of(store.stamp_ns, store.value, store.variance, i)
+        stamp = reading.stamp
+        if store.channel[i] == channel + REFUSED and stamp > guard.last_ns[channel]:
+            store.channel[i] = channel
+            number = stamp // SECOND_NS
+            if bins.samples[channel] > 0 and number > bins.filling[channel]:
+                close(bins, channel, width)
+            add(bins, channel, number, stamp, reading.a, reading.b)
+            remember(guard, channel, reading)
+            tally.reasons[channel, _OUTLIER] -= 1
+            _count(tally, channel, stamp, store.receive_ns[i])
+
+
 _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
 
 
@@ -176,7 +213,7 @@ _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all th
     f'(Memory, Tuning, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, i8)',
     like={
         'Memory': Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh()),
-        'Tuning': Tuning(Limits(0, 0), _SLOPES, 0, 0.0),
+        'Tuning': Tuning(Limits(0, 0, 1.0), _SLOPES, 0, 0.0),
     },
     uncounted=True,
 )
@@ -204,15 +241,18 @@ def walk(
     kept, room = start, len(store.stamp_ns) - store.end[0]
     while i < len(channel):
         c, stamp, arrival = int(channel[i]), stamp_ns[i], receive_ns[i]
-        a, b, p, q = value[i, 0], value[i, 1], variance[i, 0], variance[i, 1]
-        code = examine(guard, tuning.limits, c, stamp, arrival, a, b, p, q)
+        reading = reading_of(stamp_ns, value, variance, i)
+        code = examine(guard, tuning.limits, c, arrival, reading)
         if code < 0:
             stop = code
             break
+        if i - kept == room:
+            stop = _FULL
+            break
         if code == _ACCEPTED:
-            if i - kept == room:
-                stop = _FULL
-                break
+            if proves(guard, tuning.limits, c, reading):
+                _accept_refused(memory, tuning.slopes.width, c)
+                continue
             if stamp > watch.update_ns[0]:
                 stop = _UPDATE
                 break
@@ -234,17 +274,18 @@ def walk(
                     stop = _look_at_shaft(bins, watch, tuning, c, closed)
                 if stop != 0:
                     break
-            add(bins, c, number, stamp, a, b)
-            remember(guard, c, stamp, a, b, p, q)
-            recent = tally.reasons[c, _ACCEPTED] % RECENT
-            tally.stamp_ns[c, recent] = stamp
-            tally.arrival_ns[c, recent] = arrival
+            add(bins, c, number, stamp, reading.a, reading.b)
+            remember(guard, c, reading)
+            _count(tally, c, stamp, arrival)
         else:
-            reject(guard, code, c, stamp, a, b, p, q)
-            append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
-            room -= i - kept
+            reject(guard, tuning.limits, code, c, reading)
+            last = i + (code == _OUTLIER)
+            append(store, channel, stamp_ns, receive_ns, value, variance, kept, last)
+            if code == _OUTLIER:  # it may turn out to be true
+                store.channel[store.end[0] - 1] += REFUSED
+            room -= last - kept
             kept = i + 1
-        tally.reasons[c, code] += 1
+            tally.reasons[c, code] += 1
         guard.arrival_ns[0] = arrival
         i += 1
     append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)

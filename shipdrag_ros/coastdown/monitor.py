@@ -100,7 +100,7 @@ class Monitor:
         self._final_estimator = shielded(averaged(final))
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
-            Limits.of(parameters),
+            Limits.of(parameters, ship.length_m),
             slopes,
             round(parameters.data_stop_s * SECOND_NS),
             float(ship.speed(parameters.froude_min)),

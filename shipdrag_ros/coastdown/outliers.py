@@ -2,20 +2,20 @@
 """
 Readings of the motion that the readings before them make impossible.
 
-A log reads 0 now and then, spikes and sticks; a fix jumps. What is compared is the
-newest reading with the last accepted one, and with the median of the last five, so
-that one bad reading that was let in does not shut out the good ones after it. They
-may be apart by what is learnt (`past`), by six standard deviations that the reading
-itself states, and by what a ship can change in the time between.
+A log reads 0 now and then, spikes and sticks; a fix jumps. A reading and the last accepted
+one may be apart by what is learnt (`past`), by six standard deviations that the reading
+itself states, and by what the ship has been doing in the time between.
 
-The world jumps too: a hull is caught, a radar takes another mark. Refused readings
-that agree with each other for long enough are the new truth. Those that repeat to the
-last bit, as zeros do, are not, where the sensor did not repeat before.
+Any other needs proof. A boat brakes and leaps, a hull is caught, a radar takes another mark:
+refused readings that follow each other as those of a craft of her length can are the truth,
+once they are enough, and all of them are accepted after all. Those that repeat to the last
+bit, as zeros do, are not, where the sensor did not repeat before.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,20 +36,38 @@ from shipdrag_ros.coastdown.past import (
     keep_and_learn,
     learn_anew,
     learn_gate,
-    median,
     repeats_kept,
     same_as_last,
 )
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND
 
-_ACCELERATION_M_S2 = 0.15  # that needs no proof: three times what a merchant ship coasts with
+# A hull loses 0.3 g at a Froude number of 1 and above, and as its square below; an engine may
+# push as hard as the hull would resist at the speed that the fastest have.
+_FASTEST_M_S = 15.0
+_LOSES_M_S2 = 0.3 * 9.81
 _FASTER = 1.5  # than by the last readings a ship may get, without proof
-_BRAKE_M_S2 = 4.0  # between two readings that are refused
 _AGREED_NS = 5_000_000_000
-_SILENT_NS = 300_000_000_000  # after it nothing is compared with what was before
 _DOUBTS = 64  # readings refused more than accepted, after which all is learnt anew
 _DOUBTED_NS = 60_000_000_000
+
+
+class JudgedReading(NamedTuple):
+    """Stamp [ns], values and variances of a sample; of one column, the second is unused."""
+
+    stamp: int
+    a: float
+    b: float
+    variance_a: float
+    variance_b: float
+
+
+def quickness(length_m: float) -> float:
+    """
+    Return what a craft may get faster or slower by in a second [m/s^2], by her length.
+    """
+    froude_square = _FASTEST_M_S**2 / (9.81 * length_m)
+    return _LOSES_M_S2 * min(froude_square, 1.0)
 
 
 @compiled(uncounted=True)
@@ -63,16 +81,13 @@ def forget_past(past: Past) -> None:
 
 
 @compiled(inline=True, uncounted=True)
-def fits(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> bool:
+def fits(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """
     Say whether a reading of the motion may be one, by those before it.
 
     Changes nothing.
     """
-    count = past.accepted[channel]
-    last = (count - 1) % KEPT
+    last, a, b = (past.accepted[channel] - 1) % KEPT, reading.a, reading.b
     if KIND[channel] < FIRST_TRACK:
         if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
             return True
@@ -84,7 +99,7 @@ def fits(
         x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
         if (abs(x) + abs(y)) * M_PER_DEGREE <= past.gate[channel]:
             return True
-    return bool(_may_be(past, channel, stamp, a, b, variance_a, variance_b))
+    return bool(_may_be(past, quick, channel, reading))
 
 
 @compiled(inline=True, uncounted=True)
@@ -96,46 +111,58 @@ def sticks(past: Past, channel: int) -> bool:
 
 
 @compiled(uncounted=True)
-def repeats_refused(
-    past: Past, channel: int, stamp: int, a: float, b: float, longest_ns: int
-) -> bool:
+def repeats_refused(past: Past, channel: int, reading: JudgedReading, longest_ns: int) -> bool:
     """
     Say whether a reading has been refused unchanged for longer than `longest_ns`.
     """
     return bool(
         past.refused_count[channel] > 0
         and past.refused_new[channel] == 0
-        and _same_as_refused(past, channel, a, b)
-        and stamp - past.refused_ns[channel, 0] > longest_ns
+        and _same_as_refused(past, channel, reading)
+        and reading.stamp - past.refused_ns[channel, 0] > longest_ns
     )
 
 
 @compiled(uncounted=True)
-def _may_be(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> bool:
+def _may_be(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """Judge a reading with all there is."""
+    count = past.accepted[channel]
+    if count == 0:
+        return True
+    gap = reading.stamp - past.stamp_ns[channel, (count - 1) % KEPT]
+    if KIND[channel] < FIRST_TRACK and reading.a == 0.0:
+        gap = 0  # no ship stops between two readings: the classic drop-out of a log
+    width = _width(past, 0.0, 0.0, channel, gap, reading)
     return bool(
-        _silent(past, channel, stamp)
-        or _agrees_with_accepted(past, channel, stamp, a, b, variance_a, variance_b)
-        or _is_new_truth(past, channel, stamp, a, b, variance_a, variance_b)
+        _off_accepted(past, channel, reading) <= width
+        or (
+            past.refused_count[channel] + 1 >= AGREED
+            and reading.stamp - past.refused_ns[channel, 0] >= _AGREED_NS
+            and _goes_on(past, quick, channel, reading)
+        )
     )
 
 
 @compiled(uncounted=True)
-def _width(past: Past, channel: int, gap_ns: int, variance_a: float, variance_b: float) -> float:
-    """Return how far two readings so far apart in time may be apart."""
-    gap = gap_ns * 1e-9
-    stated = 0.0
-    if variance_a > 0.0 and variance_a < np.inf:
-        stated += variance_a
+def _off_accepted(past: Past, channel: int, reading: JudgedReading) -> float:
+    """Return how far a reading is from the last accepted one [m/s or m]."""
+    last = past.value[channel, (past.accepted[channel] - 1) % KEPT]
+    return apart(channel, reading.a, reading.b, last[0], last[1])
+
+
+@compiled(uncounted=True)
+def _width(
+    past: Past, quick: float, least: float, channel: int, gap_ns: int, reading: JudgedReading
+) -> float:
+    """Return how far readings may be apart of a ship that is so quick, and at least so fast."""
+    gap, own, other = gap_ns * 1e-9, reading.variance_a, reading.variance_b
+    stated = own if 0.0 < own < np.inf else 0.0
+    rate = _latest_rate(past, channel)
     if KIND[channel] < FIRST_TRACK:
-        way = max(_ACCELERATION_M_S2, _FASTER * _latest_rate(past, channel)) * gap
+        way = max(quick, _FASTER * rate) * gap
     else:
-        if variance_b > 0.0 and variance_b < np.inf:
-            stated += variance_b
-        rate = max(past.rate[channel], _latest_rate(past, channel))
-        way = (_FASTER * rate + _ACCELERATION_M_S2 * gap) * gap
+        stated += other if 0.0 < other < np.inf else 0.0
+        way = (_FASTER * max(past.rate[channel], rate, least) + quick * gap) * gap
     return float(max(past.gate[channel], SD * math.sqrt(stated)) + way)
 
 
@@ -152,162 +179,87 @@ def _latest_rate(past: Past, channel: int) -> float:
 
 
 @compiled(uncounted=True)
-def _agrees_with_accepted(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> bool:
-    """Say whether a reading is near the last accepted one, or the median of the last few."""
-    count = past.accepted[channel]
-    if count == 0:
-        return True
-    last = (count - 1) % KEPT
-    last_a, last_b = past.value[channel, last, 0], past.value[channel, last, 1]
-    gap = stamp - past.stamp_ns[channel, last]
-    if KIND[channel] < FIRST_TRACK and a == 0.0:
-        gap = 0  # no ship stops between two readings: the classic drop-out of a log
-    width = _width(past, channel, gap, variance_a, variance_b)
-    if apart(channel, a, b, last_a, last_b) <= width:
-        return True
-    if count < MIDDLE:
-        return False
-    if KIND[channel] >= FIRST_TRACK:
-        middle = (count - 1 - MIDDLE // 2) % KEPT
-        gap = stamp - past.stamp_ns[channel, middle]
-        width = _width(past, channel, gap, variance_a, variance_b)
-    middle_a = median(past, channel, count, 0, last_a)
-    middle_b = median(past, channel, count, 1, last_b)
-    return bool(apart(channel, a, b, middle_a, middle_b) <= width)
-
-
-@compiled(uncounted=True)
-def _same_as_refused(past: Past, channel: int, a: float, b: float) -> bool:
-    last = (past.refused_count[channel] - 1) % AGREED
+def _same_as_refused(past: Past, channel: int, reading: JudgedReading) -> bool:
     return bool(
-        a == past.refused[channel, last, 0]
-        and (KIND[channel] < FIRST_TRACK or b == past.refused[channel, last, 1])
+        reading.a == past.refused[channel, 0]
+        and (KIND[channel] < FIRST_TRACK or reading.b == past.refused[channel, 1])
     )
 
 
 @compiled(uncounted=True)
-def _agrees_with_refused(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> bool:
-    """Say whether a reading is near the last one that was refused."""
-    count = past.refused_count[channel]
-    if count == 0:
-        return False
-    last = (count - 1) % AGREED
-    gap = stamp - past.refused_ns[channel, 1]
-    width = _width(past, channel, gap, variance_a, variance_b)
-    last_a, last_b = past.refused[channel, last, 0], past.refused[channel, last, 1]
-    if KIND[channel] < FIRST_TRACK:
-        if count == 1:
-            width += _BRAKE_M_S2 * gap * 1e-9
-        else:  # a car that brakes goes on as it did
-            lasted = past.refused_ns[channel, 1] - past.refused_ns[channel, 0]
-            steps = gap * (count - 1) / max(1, lasted)  # stamps may be equal
-            going_on = (last_a - past.refused[channel, (count - 2) % AGREED, 0]) * steps
-            if abs(a - last_a - going_on) <= width:
-                return True
-    return bool(apart(channel, a, b, last_a, last_b) <= width)
+def _follows(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
+    """Say whether a reading may follow the last one that was refused."""
+    gap = reading.stamp - past.refused_ns[channel, 1]
+    width = _width(past, quick, _FASTEST_M_S, channel, gap, reading)
+    return past.refused_count[channel] > 0 and _off_refused(past, channel, reading) <= width
 
 
 @compiled(uncounted=True)
-def _is_new_truth(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> bool:
-    """Say whether a reading is one of those that were refused for too long."""
-    count = past.refused_count[channel]
-    if (
-        count + 1 < AGREED
-        or stamp - past.refused_ns[channel, 0] < _AGREED_NS
-        or not _agrees_with_refused(past, channel, stamp, a, b, variance_a, variance_b)
-    ):
+def _off_refused(past: Past, channel: int, reading: JudgedReading) -> float:
+    """Return how far a reading is from the last refused one [m/s or m]."""
+    last = past.refused[channel]
+    return apart(channel, reading.a, reading.b, last[0], last[1])
+
+
+@compiled(uncounted=True)
+def _goes_on(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
+    """Say whether a reading follows on from refused ones, and not as one that repeats."""
+    if not _follows(past, quick, channel, reading):
         return False
-    new = past.refused_new[channel] + (not _same_as_refused(past, channel, a, b))
-    if 2 * new >= AGREED - 1:
+    new = past.refused_new[channel] + (not _same_as_refused(past, channel, reading))
+    if 2 * new >= min(past.refused_count[channel], AGREED - 1):
         return True
     natural = repeats_kept(past, channel, min(past.accepted[channel], KEPT), 0) > REPEATS
-    return natural and (KIND[channel] >= FIRST_TRACK or a != 0.0)
+    return natural and (KIND[channel] >= FIRST_TRACK or reading.a != 0.0)
+
+
+@compiled(uncounted=True)
+def proves_refused(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
+    """
+    Say whether an accepted reading goes on from those refused rather than from those before.
+    """
+    return bool(
+        _off_refused(past, channel, reading) < _off_accepted(past, channel, reading)
+        and _goes_on(past, quick, channel, reading)
+    )
 
 
 @compiled(inline=True, uncounted=True)
-def take(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> None:
+def take(past: Past, channel: int, reading: JudgedReading) -> None:
     """
     Remember an accepted reading.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if stamp < past.due_ns[channel] and not same_as_last(past, channel, a, b):
         keep(past, channel, stamp, a, b)
     else:
-        _take(past, channel, stamp, a, b, variance_a, variance_b)
+        past.refused_count[channel] = 0
+        past.refused_new[channel] = 0
+        past.doubts[channel] = max(0, past.doubts[channel] - 1)
+        keep_and_learn(past, channel, stamp, a, b)
 
 
 @compiled(uncounted=True)
-def _take(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> None:
-    if _silent(past, channel, stamp):
-        learn_anew(past, channel)
-    if past.refused_count[channel] > 0:
-        _settle(past, channel, stamp, a, b, variance_a, variance_b)
-    past.doubts[channel] = max(0, past.doubts[channel] - 1)
-    keep_and_learn(past, channel, stamp, a, b)
-
-
-@compiled(uncounted=True)
-def _silent(past: Past, channel: int, stamp: int) -> bool:
-    """Say whether so long nothing was heard that what was before says nothing."""
-    count = past.accepted[channel]
-    if count == 0:
-        return False
-    heard = max(past.stamp_ns[channel, (count - 1) % KEPT], past.heard_ns[channel])
-    return bool(stamp - heard > _SILENT_NS)
-
-
-@compiled(uncounted=True)
-def _settle(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> None:
-    """Draw the consequence of an accepted reading after refused ones."""
-    refused = past.refused_count[channel]
-    if not _agrees_with_accepted(past, channel, stamp, a, b, variance_a, variance_b):
-        first, last = past.refused_ns[channel, 0], past.refused_ns[channel, 1]
-        learn_anew(past, channel)
-        kept = min(refused, AGREED)
-        for i in range(kept):
-            slot = (refused - kept + i) % AGREED
-            at = last - (last - first) * (kept - 1 - i) // max(1, refused - 1)
-            keep_and_learn(
-                past, channel, at, past.refused[channel, slot, 0], past.refused[channel, slot, 1]
-            )
-    past.refused_count[channel] = 0
-    past.refused_new[channel] = 0
-
-
-@compiled(uncounted=True)
-def refuse(
-    past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
-) -> None:
+def refuse(past: Past, quick: float, channel: int, reading: JudgedReading) -> None:
     """
     Remember a reading that was refused for its value.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     past.heard_ns[channel] = stamp
     past.due_ns[channel] = NEVER
     learn_gate(past, channel)  # the last time may be long ago
     if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
-    refused = past.refused_count[channel]
-    same = refused > 0 and _same_as_refused(past, channel, a, b)
-    if _agrees_with_refused(past, channel, stamp, a, b, variance_a, variance_b):
+    same = past.refused_count[channel] > 0 and _same_as_refused(past, channel, reading)
+    if _follows(past, quick, channel, reading):
         past.refused_new[channel] += not same
     else:
-        refused = 0
+        past.refused_count[channel] = 0
         past.refused_new[channel] = 0
         past.refused_ns[channel, 0] = stamp
-    past.refused[channel, refused % AGREED, 0] = a
-    past.refused[channel, refused % AGREED, 1] = b
-    past.refused_count[channel] = refused + 1
+    past.refused[channel, 0] = a
+    past.refused[channel, 1] = b
+    past.refused_count[channel] += 1
     past.refused_ns[channel, 1] = stamp
     if same:
         return

@@ -23,7 +23,7 @@ FIRST_TRACK = int(Channel.POSITION)  # this kind and those after it are position
 GEODETIC = int(Channel.POSITION_GEODETIC)
 CHANNELS = len(Channel)
 KEPT = 32  # accepted readings that the gate is learnt from
-AGREED = 5  # readings that make a truth: refused ones that agree, and the first ones
+AGREED = 5  # readings that make a truth: those refused that follow each other
 MIDDLE = 5  # readings in the median
 SD = 6.0  # standard deviations of a difference, beyond which it is none of this motion
 M_PER_DEGREE = 111_195.0
@@ -64,8 +64,8 @@ class Past(NamedTuple):
         Stamp from which on an accepted reading is more than kept [ns]; `learn_ns`, or at once.
     repeats, stuck : (channels,) int64
         How often the last one has repeated, and 1 where that means that the sensor sticks.
-    refused : (channels, AGREED, 2)
-        The last of the refused readings that agree with each other.
+    refused : (channels, 2)
+        The last of the refused readings that follow each other.
     refused_count, refused_new : (channels,) int64
         How many they are, and how many of them differ from the one before.
     refused_ns : (channels, 2) int64
@@ -115,7 +115,7 @@ class Past(NamedTuple):
             np.full(CHANNELS, NEVER),
             none(),
             none(),
-            np.zeros((CHANNELS, AGREED, 2)),
+            np.zeros((CHANNELS, 2)),
             none(),
             none(),
             np.zeros((CHANNELS, 2), np.int64),

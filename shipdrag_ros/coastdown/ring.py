@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The latest accepted samples, in constant memory and in one piece.
+The latest samples, in constant memory and in one piece.
+
+They are those accepted and, marked, those that may turn out to be true: they keep their place.
 
 Appending is compiled code's business; here room is made and windows are taken.
 The buffer is up to twice as long as what is kept, so that samples move rarely
@@ -18,6 +20,7 @@ from shipdrag_ros.samples import Block, Float64, Int64, UInt8
 
 CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a second
 _FIRST_CAPACITY = 1 << 12
+REFUSED = 128  # added to the channel of a sample that was refused
 
 
 class RingBuffer(NamedTuple):
@@ -94,7 +97,8 @@ def make_room(store: RingBuffer, *, keep_ns: int, late_ns: int, capacity: int) -
         Number of samples that are kept at most, whatever their age.
     """
     end = int(store.end[0])
-    newest = int(store.stamp_ns[:end].max()) if end else 0
+    sound = store.stamp_ns[:end][store.channel[:end] < REFUSED]
+    newest = int(sound.max()) if len(sound) else 0
     begin = max(_before(store, newest - keep_ns, late_ns), end - capacity)
     room = len(store.stamp_ns)
     if 2 * (end - begin) > room:
@@ -119,24 +123,27 @@ def first_store() -> RingBuffer:
 
 def since(store: RingBuffer, start_ns: int, *, late_ns: int, capacity: int) -> Block:
     """
-    Return the samples kept from `start_ns` on, without copying them.
+    Return the samples accepted from `start_ns` on, without copying them where none was refused.
 
     A few older ones may come first; the window leaves them out by their stamps.
     """
     end = int(store.end[0])
     begin = max(_before(store, start_ns, late_ns), end - capacity)
-    return Block(
+    block = Block(
         store.channel[begin:end],
         store.stamp_ns[begin:end],
         store.receive_ns[begin:end],
         store.value[begin:end],
         store.variance[begin:end],
     )
+    sound = block.channel < REFUSED
+    return block if sound.all() else block[sound]
 
 
 def _before(store: RingBuffer, stamp_ns: int, late_ns: int) -> int:
     """Return an index before which all stamps are older than `stamp_ns`."""
     # The stamps are sorted but for late_ns. A bisection for stamp_ns - late_ns drops what is
-    # in front of a stamp older than that, and all in front of it is older than stamp_ns.
+    # in front of a stamp older than that, and all in front of it is older than stamp_ns. One that
+    # was refused and is ahead of all only keeps more.
     end = int(store.end[0])
     return int(np.searchsorted(store.stamp_ns[:end], stamp_ns - late_ns))

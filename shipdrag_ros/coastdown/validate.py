@@ -18,7 +18,8 @@ The tests, in this order; the first that fails names the reason:
 
 `FROZEN` is a reading of the motion that repeats for longer than `frozen_s`, or half a
 dozen times where the sensor did not repeat before; `OUTLIER` one that those before it
-make impossible (`outliers`).
+make impossible (`outliers`), unless those after it show that it was true: then it is
+accepted after all.
 
 A stamp comes before its value because a clock that was set is a fact whatever
 the value says. After a clock was set everything is forgotten and the same
@@ -32,14 +33,17 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.outliers import (
+    JudgedReading,
     fits,
     forget_past,
+    proves_refused,
+    quickness,
     refuse,
     repeats_refused,
     sticks,
     take,
 )
-from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past
+from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past, learn_anew
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
@@ -143,20 +147,30 @@ class CheckMemory(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """`Parameters.frozen_s` and `late_s` in nanoseconds."""
+    """`Parameters.frozen_s` and `late_s` in nanoseconds, and how quick she is [m/s^2]."""
 
     frozen_ns: int
     late_ns: int
+    quick: float
 
     @classmethod
-    def of(cls, parameters: Parameters) -> Limits:
+    def of(cls, parameters: Parameters, length_m: float) -> Limits:
         """
-        Take the limits from the parameters.
+        Take the limits from the parameters and the length of the ship [m].
         """
         return cls(
             round(parameters.frozen_s * SECOND_NS),
             round(parameters.late_s * SECOND_NS),
+            quickness(length_m),
         )
+
+
+@compiled(inline=True, uncounted=True)
+def reading_of(stamp_ns: Int64, value: Float64, variance: Float64, i: int) -> JudgedReading:
+    """
+    Return the reading that a sample is.
+    """
+    return JudgedReading(stamp_ns[i], value[i, 0], value[i, 1], variance[i, 0], variance[i, 1])
 
 
 @compiled(inline=True, uncounted=True)
@@ -164,18 +178,15 @@ def examine(
     guard: CheckMemory,
     limits: Limits,
     channel: int,
-    stamp: int,
     arrival: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
+    reading: JudgedReading,
 ) -> int:
     """
     Return the `Reason` of one sample, or that a clock was set.
 
     Changes nothing: `remember` and `reject` do, once it is decided.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if arrival < guard.arrival_ns[0] - BACKWARD_JUMP_NS:
         return ARRIVAL_JUMPED_BACK
     if stamp > arrival + FUTURE_NS:
@@ -211,28 +222,44 @@ def examine(
         )
     ):
         return _FROZEN
-    if fits(guard.past, channel, stamp, a, b, variance_a, variance_b):
+    if fits(guard.past, limits.quick, channel, reading):
         return _ACCEPTED
-    if repeats_refused(guard.past, channel, stamp, a, b, limits.frozen_ns):
+    if repeats_refused(guard.past, channel, reading, limits.frozen_ns):
         return _FROZEN
     return _OUTLIER
 
 
 @compiled(inline=True, uncounted=True)
-def remember(
-    guard: CheckMemory,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
-) -> None:
+def proves(guard: CheckMemory, limits: Limits, channel: int, reading: JudgedReading) -> bool:
+    """
+    Say whether an accepted sample shows that those refused before it were true.
+    """
+    return bool(
+        guard.past.refused_count[channel] > 0
+        and proves_refused(guard.past, limits.quick, channel, reading)
+    )
+
+
+@compiled(inline=True, uncounted=True)
+def true_since(guard: CheckMemory, channel: int) -> int:
+    """
+    Forget what speaks against samples refused, and return the stamp of the first [ns].
+
+    Those of it and since, `OUTLIER` so far, are then to be remembered in their order.
+    """
+    first = guard.past.refused_ns[channel, 0]
+    learn_anew(guard.past, channel)
+    return int(first)
+
+
+@compiled(inline=True, uncounted=True)
+def remember(guard: CheckMemory, channel: int, reading: JudgedReading) -> None:
     """
     Take an accepted sample into the memory of the tests.
     """
+    stamp, a, b = reading.stamp, reading.a, reading.b
     if KIND[channel] <= _MOTION:
-        take(guard.past, channel, stamp, a, b, variance_a, variance_b)
+        take(guard.past, channel, reading)
     guard.back[channel] = 0
     guard.last_ns[channel] = stamp
     guard.newest_ns[0] = max(guard.newest_ns[0], stamp)
@@ -247,24 +274,18 @@ def remember(
 
 @compiled(inline=True, uncounted=True)
 def reject(
-    guard: CheckMemory,
-    code: int,
-    channel: int,
-    stamp: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
+    guard: CheckMemory, limits: Limits, code: int, channel: int, reading: JudgedReading
 ) -> None:
     """
     Take a sample that was rejected into the memory of the tests.
     """
+    stamp = reading.stamp
     if code == _LATE and stamp < guard.last_ns[channel] - BACKWARD_JUMP_NS:
         ascends = stamp > guard.back_ns[channel]
         guard.back[channel] = guard.back[channel] + 1 if ascends else 1
         guard.back_ns[channel] = stamp
     if code >= _FROZEN:
-        refuse(guard.past, channel, stamp, a, b, variance_a, variance_b)
+        refuse(guard.past, limits.quick, channel, reading)
 
 
 @compiled(inline=True, uncounted=True)
@@ -294,7 +315,7 @@ def forget(guard: CheckMemory) -> None:
     forget_past(guard.past)
 
 
-def validate(block: Block, parameters: Parameters) -> UInt8:
+def validate(block: Block, parameters: Parameters, length_m: float) -> UInt8:
     """
     Return the `Reason` of every sample of a whole record.
 
@@ -304,6 +325,8 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
         The record from its beginning, in arrival order.
     parameters
         `late_s` and `frozen_s` are used.
+    length_m
+        Of the ship [m]: a small craft is quick.
 
     Returns
     -------
@@ -317,7 +340,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     reasons = np.empty(len(block), np.uint8)
     _walk(
         CheckMemory.fresh(),
-        Limits.of(parameters),
+        Limits.of(parameters, length_m),
         np.ascontiguousarray(block.channel),
         np.ascontiguousarray(block.stamp_ns),
         np.ascontiguousarray(block.receive_ns),
@@ -330,7 +353,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
 
 @compiled(
     f'void(Memory, Limits, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, u1[::1])',
-    like={'Memory': CheckMemory.fresh(), 'Limits': Limits(0, 0)},
+    like={'Memory': CheckMemory.fresh(), 'Limits': Limits(0, 0, 1.0)},
     uncounted=True,
 )
 def _walk(
@@ -344,18 +367,53 @@ def _walk(
     reasons: UInt8,
 ) -> None:
     for i in range(len(channel)):
-        c, stamp, a, b = int(channel[i]), stamp_ns[i], value[i, 0], value[i, 1]
-        p, q = variance[i, 0], variance[i, 1]
-        code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
+        c, arrival, reading = (
+            int(channel[i]),
+            receive_ns[i],
+            reading_of(stamp_ns, value, variance, i),
+        )
+        code = examine(guard, limits, c, arrival, reading)
         if code < 0:
             forget(guard)
-            code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
+            code = examine(guard, limits, c, arrival, reading)
+        if code == _ACCEPTED and proves(guard, limits, c, reading):
+            _accept_refused(guard, c, i, channel, stamp_ns, value, variance, reasons)
+            code = examine(guard, limits, c, arrival, reading)
         if code == _ACCEPTED:
-            remember(guard, c, stamp, a, b, p, q)
+            remember(guard, c, reading)
         else:
-            reject(guard, code, c, stamp, a, b, p, q)
+            reject(guard, limits, code, c, reading)
         guard.arrival_ns[0] = receive_ns[i]
         reasons[i] = code
+
+
+@compiled(uncounted=True)
+def _accept_refused(
+    guard: CheckMemory,
+    channel: int,
+    end: int,
+    channels: UInt8,
+    stamp_ns: Int64,
+    value: Float64,
+    variance: Float64,
+    reasons: UInt8,
+) -> None:
+    """Accept the samples before `end` that were refused, and are true."""
+    first = true_since(guard, channel)
+    begin = end
+    while begin > 0 and not (
+        channels[begin - 1] == channel
+        and (reasons[begin - 1] == _ACCEPTED or stamp_ns[begin - 1] < first)
+    ):
+        begin -= 1
+    for i in range(begin, end):
+        if (
+            channels[i] == channel
+            and reasons[i] == _OUTLIER
+            and stamp_ns[i] > guard.last_ns[channel]
+        ):
+            remember(guard, channel, reading_of(stamp_ns, value, variance, i))
+            reasons[i] = _ACCEPTED
 
 
 def clock_set(memory: CheckMemory, code: int, channel: int, stamp_ns: int, receive_ns: int) -> str:

@@ -88,7 +88,7 @@ def diagnose_runs(
         and not any(SHIP_FILE in run.attachments for run, _ in runs)
     ):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        sailing = _sailing(runs, f'No coastdown was found: {why}.', progress)
+        sailing = _sailing(runs, None, f'No coastdown was found: {why}.', progress)
         return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress, stop)
     alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
@@ -125,7 +125,7 @@ def _of_coastdowns(
 ) -> DiagnosisResult:
     """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
-        log_track = _sailing(runs, seen.no_coastdown, progress)
+        log_track = _sailing(runs, seen.ship, seen.no_coastdown, progress)
         return _unused(log_track, (*seen.ship.facts, *facts), earlier)
     found = _of_force(runs, seen, facts, earlier, progress)
     return replace(found, estimates=seen.estimates)
@@ -147,11 +147,11 @@ def _of_force(
     try:
         found = diagnosed()
     except (DiagnosisError, EstimationError) as error:
-        sailing = _sailing(runs, f'No coastdown could be diagnosed: {error}.', progress)
+        sailing = _sailing(runs, seen.ship, f'No coastdown could be diagnosed: {error}.', progress)
         return _unused(sailing, (*seen.ship.facts, *facts), earlier)
     unused = _unused(found, (), earlier).earlier
     try:
-        found = with_log_track(found, _sailing(runs, '', progress))
+        found = with_log_track(found, _sailing(runs, seen.ship, '', progress))
     except DiagnosisError as error:
         why = f'the log was not compared with the way over ground: {str(error).strip()}'
         found = replace(found, notes=(*found.notes, why))
@@ -170,13 +170,13 @@ def _unused(
 
 
 def _sailing(
-    runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress
+    runs: Sequence[WindowedRun], ship: Ship | None, no_coastdown: str, progress: Progress
 ) -> DiagnosisResult:
     """Compare the logs with the ways over ground."""
     read = []
     for done, (run, _) in enumerate(runs):
         progress(f'reading {run.name}', done, len(runs))
-        read.append((run.name, *accepted_samples(run, zeros=True)))
+        read.append((run.name, *accepted_samples(run, ship, zeros=True)))
     progress('holding the log against the way over ground', 0, 0)
     records = [SailingRecord(name, block) for name, block, _ in read]
     at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)

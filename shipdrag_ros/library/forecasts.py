@@ -448,7 +448,7 @@ def _hull(coastdown: EndedCoastdown) -> HullNow:
 def _recent(run: RunResult) -> tuple[Window, Series, str]:
     """Return the end of a run, the speed that it shows, and which it is."""
     assert run.replayed is not None
-    block, _ = accepted_samples(run.replayed.run)
+    block, _ = accepted_samples(run.replayed.run, run.replayed.ship)
     if len(block):
         end_ns = int(block.stamp_ns.max())
         window = Window.from_block(block, end_ns - round(_RECENT_S * SECOND_NS), end_ns)

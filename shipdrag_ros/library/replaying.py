@@ -155,7 +155,7 @@ def replay_run(
         listener.log(f'{each.name}: {beside}')
         result = replace(result, warnings=(*result.warnings, beside))
     if not result.coastdowns:
-        astern = _astern(each)
+        astern = _astern(each, result.ship)
         if astern:
             result = replace(result, warnings=(*result.warnings, astern))
     if window is not None:
@@ -171,9 +171,9 @@ def replay_run(
     return result
 
 
-def _astern(run: Run) -> str:
+def _astern(run: Run, ship: Ship) -> str:
     """Say that a log reads astern most of the time, which a wrong sign makes too."""
-    block, _ = accepted_samples(run)
+    block, _ = accepted_samples(run, ship)
     speeds = block.value[block.channel == Channel.SPEED_THROUGH_WATER, 0]
     moving = speeds[np.abs(speeds) > _MOVING_M_S]
     share = float(np.mean(moving < 0.0)) if len(moving) else 0.0

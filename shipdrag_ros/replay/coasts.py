@@ -43,6 +43,7 @@ DISMISSED = (
     'from it'
 )
 _CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
+_SHORTEST_M = 1.0  # a craft, where no ship is known
 _MOST = 0.5  # of the messages of an input
 
 
@@ -205,7 +206,8 @@ def window_between(
     first_ns = max(start_ns - before_ns - margin_ns, 0)
     inputs = result.run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])
-    reasons = validate(_arrived_later(block) if apart else block, parameters)
+    length_m = result.ship.length_m
+    reasons = validate(_arrived_later(block) if apart else block, parameters, length_m)
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
     # a clock that was set tells some times twice
     shown = [
@@ -219,7 +221,9 @@ def window_between(
     return Window.from_block(accepted, start_ns, end_ns, before_ns=before)
 
 
-def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameters]:
+def accepted_samples(
+    run: Run, ship: Ship | None, *, zeros: bool = False
+) -> tuple[Block, Parameters]:
     """
     Read a run as it would be on board, without looking for a coastdown.
 
@@ -227,6 +231,8 @@ def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameter
     ----------
     run
         From `open_runs`.
+    ship
+        None: a craft of any size may have sailed it.
     zeros
         A log that reads exactly 0 for long is no frozen one: below some speed a
         wheel stands still.
@@ -244,7 +250,7 @@ def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameter
     """
     parameters = recorded_parameters(run)
     block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
-    reason = validate(block, parameters)
+    reason = validate(block, parameters, _SHORTEST_M if ship is None else ship.length_m)
     accepted = reason == Reason.ACCEPTED
     if zeros:
         of_log = KIND[block.channel] == Channel.SPEED_THROUGH_WATER

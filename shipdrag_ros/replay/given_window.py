@@ -38,6 +38,8 @@ class WindowSamples(NamedTuple):
         Which of these came in the window.
     start_ns, end_ns
         The window in stamps [ns].
+    begin_ns
+        Arrival at which the bag begins [ns].
     """
 
     inputs: RunSamples
@@ -46,9 +48,12 @@ class WindowSamples(NamedTuple):
     inside: NDArray[np.bool_]
     start_ns: int
     end_ns: int
+    begin_ns: int
 
 
-def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -> WindowSamples:
+def read_window(
+    run: Run, ship: Ship, parameters: Parameters, window: tuple[float, float]
+) -> WindowSamples:
     """
     Read and validate the samples of a window, and of a while around it.
 
@@ -56,7 +61,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     ----------
     run
         From `open_runs`.
-    parameters
+    ship, parameters
         For the validation, which needs some record before the window.
     window
         Begin and end [s from the start of the bag]; it ends with the bag at
@@ -93,14 +98,14 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
     inputs = run.inputs(start_ns=start_ns, end_ns=end_ns)
     deque(inputs, maxlen=0)  # counted, and the samples are there already
-    reasons = validate(block, parameters)
+    reasons = validate(block, parameters, ship.length_m)
     accepted = np.flatnonzero(reasons == Reason.ACCEPTED)
     if len(accepted):
         within = accepted[inside[accepted]]
         first = int((within if len(within) else accepted)[0])  # the clock of before may be another
         clock_ns = int(block.stamp_ns[first] - block.receive_ns[first])
         start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
-    return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
+    return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns, span[0])
 
 
 def margin_around_ns(parameters: Parameters) -> int:
@@ -123,7 +128,7 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     start_ns, end_ns = samples.start_ns, samples.end_ns
     parts = [part for part in parts_of_one_clock(accepted) if inside[part].any()]
     if len(parts) > 1:
-        failure = 'a clock was set in the window; choose one before or after'
+        failure = _clock_set(accepted, parts, samples.begin_ns)
         found = Examined(GivenPart(start_ns, end_ns, failure=failure), None, failure)
     else:
         accepted = accepted[parts[0]] if parts else accepted[:0]
@@ -143,6 +148,18 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         withdrawn=found.refused,
         cuts=judged.cuts,
         stretch=judged.stretch,
+    )
+
+
+def _clock_set(accepted: Block, parts: list[slice], begin_ns: int) -> str:
+    """Say where a clock was set in a window, and which window to choose instead."""
+    set_ns = int(accepted.receive_ns[parts[-1].start])
+    failure = f'a clock was set in the window, at {(set_ns - begin_ns) / SECOND_NS:.0f} s'
+    if int(accepted.receive_ns[parts[-1].stop - 1]) > set_ns:
+        return f'{failure}; choose one that ends before or begins after it'
+    return (
+        f'{failure}; choose one that ends before it. What follows has no time of its own in this '
+        'bag: import the table again, or what follows alone'
     )
 
 

@@ -66,7 +66,7 @@ def _why(result: ReplayResult) -> str:
             return one.failure
     if result.not_coastdowns:
         return _dismissed(result)
-    block, _ = accepted_samples(result.run)
+    block, _ = accepted_samples(result.run, result.ship)
     if not len(block):
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
     name, fall = _largest_fall(block, [each for each in ALL_MOTION if each not in result.left_out])

@@ -290,7 +290,7 @@ def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
 def _in_window(
     run: Run, ship: Ship, parameters: Parameters, window: tuple[float, float]
 ) -> ReplayResult:
-    samples = read_window(run, parameters, window)
+    samples = read_window(run, ship, parameters, window)
     coastdown = estimate_window(samples, ship, parameters)
     used: Counter[str] = Counter()
     rejected: dict[str, Counter[str]] = {}

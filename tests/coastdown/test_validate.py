@@ -8,6 +8,7 @@ from shipdrag_ros.coastdown.validate import AGREED, validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Reason, concatenate
 
+LENGTH_M = 150.0
 NOW = 1_700_000_000_000_000_000
 S = 1_000_000_000
 LOG, GROUND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
@@ -25,7 +26,7 @@ def sample(channel, stamp_s, value, *, receive_s=None) -> Block:
 
 
 def reasons(*samples: Block, **parameters) -> list[str]:
-    codes = validate(concatenate(samples), Parameters(**parameters))
+    codes = validate(concatenate(samples), Parameters(**parameters), LENGTH_M)
     return [Reason(code).name.lower() for code in codes]
 
 
@@ -141,8 +142,8 @@ def test_what_may_stand_still_is_not_frozen(channel: Channel) -> None:
 
 def test_strided_and_read_only_blocks_are_taken() -> None:
     block = concatenate([sample(LOG, t, 8.0 + 0.1 * t) for t in range(10)])
-    expected = validate(block, Parameters())[::2]
+    expected = validate(block, Parameters(), LENGTH_M)[::2]
     for part in (block[::2], block[np.arange(0, 10, 2)]):
         for array in (part.channel, part.stamp_ns, part.receive_ns, part.value, part.variance):
             array.flags.writeable = False
-        assert np.array_equal(validate(part, Parameters()), expected)
+        assert np.array_equal(validate(part, Parameters(), LENGTH_M), expected)

@@ -148,7 +148,21 @@ def test_a_clock_set_in_a_window_is_no_estimate(
     (run,) = open_runs([write_run(tmp_path / 'a.mcap', concatenate([block, second]), ship)])
     (coastdown,) = replay(run, window=(410.0, 2000.0)).coastdowns
     assert coastdown.failure is not None
-    assert 'a clock was set in the window' in coastdown.failure
+    assert 'a clock was set in the window, at 12' in coastdown.failure
+    assert 'choose one that ends before or begins after it' in coastdown.failure
+
+
+def test_what_follows_a_clock_that_was_set_may_have_no_time_of_its_own(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
+) -> None:
+    block = voyage()
+    at_once = np.full(len(block), block.receive_ns[-1])
+    both = concatenate([block, replace(block, receive_ns=at_once)])
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', both, ship)])
+    (coastdown,) = replay(run, window=(410.0, 2000.0)).coastdowns
+    assert coastdown.failure is not None
+    assert 'choose one that ends before it' in coastdown.failure
+    assert 'import the table again' in coastdown.failure
 
 
 def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after_it(

@@ -15,6 +15,7 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import Block, concatenate
 from shipdrag_ros.sources import formats
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,6 +97,21 @@ def test_times_that_go_back_are_told(
     assert main([*line, '--map', 'speed_through_water=v:kn']) == 0
     # the last of run b is as late as the last of run a
     assert '1199 rows are stamped before an earlier one' in capsys.readouterr().out
+
+
+def test_what_follows_a_clock_that_was_set_back_has_times_of_its_own(tmp_path: Path) -> None:
+    stamps = [*range(8000, 8400), 8399.5, *range(1200, 2400), *range(1000, 1100)]
+    rows = [f'{t},{6.0 + 0.01 * (i % 7)}' for i, t in enumerate(stamps)]
+    path = tmp_path / 'set.csv'
+    path.write_text('\n'.join(['t,u', *rows, '']))
+    line = ['import', str(path), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
+    assert main([*line, '--map', 'speed_through_water=u']) == 0
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    block = concatenate([each for each in run.inputs() if isinstance(each, Block)])
+    arrived_s = (block.receive_ns - block.receive_ns[0]) / 1e9
+    assert arrived_s[:400].tolist() == list(range(400))
+    assert arrived_s[401:1601].tolist() == [399.5 + i for i in range(1200)]
+    assert arrived_s[1601:].tolist() == [1598.5 + i for i in range(100)]
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ import numpy as np
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, BACKWARD_JUMP_NS, Block, Channel, Int64
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
 from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
@@ -106,6 +106,7 @@ class TableResult(ImportResult):
         return [first, *others]
 
 
+_AGREED = 3  # rows behind a step back of the time that make it a clock that was set
 _FEW = 10
 _SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
@@ -182,7 +183,8 @@ class _RowSamples:
         self._rows = self._index = self._left_out = 0
         self._backward = self._repeated = 0
         self._first_ns: int | None = None
-        self._newest_ns = -1
+        self._newest_ns = self._arrived_ns = -1
+        self._set_back_ns = 0  # by which a clock was set back so far
         self._written: Counter[str] = Counter()
         self._rejected: dict[str, dict[str, Rejected]] = {}
         self._seen: dict[str, None] = {}  # a set that keeps the order
@@ -195,11 +197,11 @@ class _RowSamples:
             return Block.empty()
         if self._first_ns is None:
             self._first_ns = int(times[0])
-        # arrival never goes back, so that a replay sees the rows in their order
         before = np.maximum.accumulate(np.r_[self._newest_ns, times])
         self._backward += int(np.sum(times < before[:-1]))
         self._repeated += int(np.sum(times == before[:-1]))
         self._newest_ns = int(before[-1])
+        arrived = self._arrived(times)
         value, known = np.zeros((n, m, 2)), np.ones((n, m), np.bool_)
         for k, (columns, places, readers) in enumerate(self._inputs):
             bad: dict[int, BadCell] = {}
@@ -220,10 +222,32 @@ class _RowSamples:
         return Block(
             channel[which],
             times[row],
-            before[1:][row],
+            arrived[row],
             value[row, which],
             np.full((len(row), 2), np.nan),
         )
+
+    def _arrived(self, times: Int64) -> Int64:
+        """
+        Return arrivals that never go back, so that a replay sees the rows in their order.
+
+        Where a clock was set back they go on with it: what follows has a time in the record.
+        """
+        first = 0
+        arrived: Int64 = np.empty(0, np.int64)
+        while True:
+            clock = times[first:] + self._set_back_ns
+            later: Int64 = np.maximum.accumulate(np.r_[self._arrived_ns, clock])[1:]
+            behind = clock < later - BACKWARD_JUMP_NS
+            behind &= np.diff(clock, prepend=clock[0]) > 0
+            agree = np.flatnonzero(np.convolve(behind, np.ones(_AGREED), 'valid') == _AGREED)
+            at = int(agree[0]) - 1 if len(agree) else len(clock)
+            arrived = np.r_[arrived, later[:at]]
+            self._arrived_ns = int(arrived[-1]) if len(arrived) else self._arrived_ns
+            if at == len(clock):
+                return arrived
+            first += at
+            self._set_back_ns = self._arrived_ns - int(times[first])
 
     def _chosen(self, rows: TableRows) -> TableRows:
         """Leave out rows without the texts that were asked for."""
