@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import ALL_MOTION, FURTHER, Float64
+from shipdrag_ros.samples import ALL_MOTION, FURTHER, Channel, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
@@ -151,16 +151,14 @@ class FirstRows:
     """
 
     def __init__(self, table: LogTable) -> None:
-        assert table.header is not None
         self.table = table
         self.path = str(table.path)
-        self.header = table.header
+        self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
         self._rows = table.first_rows(_SAMPLE_ROWS)
-        for place, name in enumerate(table.header):
-            below = table.units[place] if table.units and place < len(table.units) else ''
-            role, unit = role_and_unit(name, below)
-            key = name if table.header.count(name) == 1 else str(place + 1)
+        for place, name in enumerate(self.header):
+            role, unit = role_and_unit(*table.about(place))
+            key = name if self.header.count(name) == 1 else str(place + 1)
             if role:
                 self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
 
@@ -590,6 +588,36 @@ class _Guesser:
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
         )
         return f'{path!r} gives no speed and no position in a unit that is known: {why}'
+
+
+def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
+    """
+    Return given columns, those of a position without a unit in the unit that its columns say.
+
+    Raises
+    ------
+    ImportDataError
+        If they may be degrees, and do not say it.
+    """
+    if mapped.stated or mapped.channel.kind is not Channel.POSITION:
+        return mapped
+    rows, places = FirstRows(table), [table.column(name) for name in mapped.names]
+    said = [role_and_unit(*table.about(place)) for place in places]
+    roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
+    units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
+    if len(units) == 1:
+        return columns_of(mapped.name, mapped.names, [*units] * 2)
+    beyond = any(
+        np.any(np.isnan(degrees) & np.isfinite(rows.values(place)))
+        for place, degrees in zip(places, rows.coordinates(places), strict=True)
+    )
+    if roles == ['x', 'y'] or (beyond and not {'lat', 'lon'} & {*roles}):
+        return mapped
+    text = f'{mapped.name}={",".join(mapped.names)}'
+    raise ImportDataError(
+        f'--map {shlex.quote(text)}: these may be degrees; give {shlex.quote(f"{text}:deg")} '
+        f'for latitude and longitude, or {shlex.quote(f"{text}:m")}'
+    )
 
 
 def is_table(path: Path) -> bool:

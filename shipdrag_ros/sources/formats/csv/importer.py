@@ -48,6 +48,7 @@ from shipdrag_ros.sources.formats.csv.guess import (
     guess,
     guessed_time,
     is_table,
+    placed,
     with_dates,
 )
 from shipdrag_ros.sources.log import (
@@ -366,7 +367,7 @@ def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
     if not mapped:
         speed_unit = options.get('speed_unit', '')
         return guess(table, time=time, counted=counted, speed_unit=speed_unit)
-    found = Guess([parse_input(text) for text in mapped], time)
+    found = Guess([placed(table, parse_input(text)) for text in mapped], time)
     for name, count in Counter(each.name for each in found.inputs).items():
         if count > 1:
             raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
@@ -406,7 +407,8 @@ FORMAT = Format(
             'column (name, or number from 1) of an input; more than once for more inputs. '
             'position and wind_apparent take two, and a unit given once holds for both: '
             'position=x,y:km is position=x:km,y:km. A position in deg is latitude and longitude: '
-            'position=lat,lon:deg. speed_over_ground takes two where they are its components. '
+            'position=lat,lon:deg, as one without a unit whose columns have such names. '
+            'speed_over_ground takes two where they are its components. '
             'Units: speeds m/s kn km/h ft/s mph, lengths m km ft nmi, angles rad deg, of a '
             'heading also compass (deg clockwise from north), shaft rad/s rpm rev/s, pitch ratio '
             '%% rad deg (default: the first of each); wind_apparent=AWS:kn,AWA:deg is speed and '
