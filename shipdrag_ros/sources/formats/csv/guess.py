@@ -11,7 +11,7 @@ not used.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import tzinfo
 from pathlib import Path
@@ -226,16 +226,15 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
         If there is none.
     """
     days, times = rows.roles.get('date', []), rows.roles.get('time', [])
-    dated = [each for each in (*times, *days) if _holds_date(rows, each)]
+    dated = [each for each in (*times, *days) if _holds(rows, each, date=True)]
     if dated:
         clock = next((each for each in times if each not in dated), None)
         clocks = [parts(text)[1] for text in rows.texts(dated[0].place)]
         bare = not any(clocks[:5])
         if clock is not None and not bare:  # a spreadsheet gives a date a midnight
-            bare = _holds_time_of_day(rows, clock) and all(map(is_midnight, clocks))
-        if bare and clock is not None:
-            return TimeColumn((dated[0].key, clock.key), NANOSECONDS['s'])
-        return TimeColumn((dated[0].key,), NANOSECONDS['s'])
+            bare = _holds(rows, clock, date=False) and all(map(is_midnight, clocks))
+        names = (dated[0].key, clock.key) if bare and clock is not None else (dated[0].key,)
+        return TimeColumn(names, NANOSECONDS['s'])
     if not times:
         header = ', '.join(map(repr, rows.header))
         raise ImportDataError(
@@ -248,14 +247,10 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
     return _counted(rows, column, notes)
 
 
-def _holds_date(rows: FirstRows, column: NamedColumn) -> bool:
-    texts = [text for text in rows.texts(column.place)[:200] if text]
-    return bool(texts) and is_date(texts[0]) and bool(parts(texts[0])[0])
-
-
-def _holds_time_of_day(rows: FirstRows, column: NamedColumn) -> bool:
-    texts = [text for text in rows.texts(column.place)[:200] if text]
-    return bool(texts) and is_date(texts[0]) and not parts(texts[0])[0]
+def _holds(rows: FirstRows, column: NamedColumn, *, date: bool) -> bool:
+    """Say whether a column holds dates, or times of day alone."""
+    text = next(filter(None, rows.texts(column.place)[:200]), '')
+    return is_date(text) and bool(parts(text)[0]) is date
 
 
 def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColumn:
@@ -314,7 +309,15 @@ PLAIN_COLUMNS = {
 
 _TURN = 6.4  # no angle in rad is larger
 _NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
-_SPEED_UNIT = 'kn'  # in what is to be typed
+_LENGTHS = frozenset(('m', 'km', 'ft', 'nmi'))
+_ANGLES = ('rad', 'deg')
+# the other inputs, and their likely units by the roles of their columns
+_OTHERS: Mapping[str, Mapping[str, str]] = {
+    'rudder': {'rudder': 'deg'},
+    'wind_apparent': {'aws': 'kn', 'awa': 'deg'},
+    'shaft': {'shaft': 'rpm'},
+    'depth': {'depth': 'm'},
+}
 
 
 @dataclass
@@ -414,7 +417,8 @@ class _Guesser:
         typed = ','.join(f'{each.typed}:{unit}' for each, unit in zip(columns, units, strict=True))
         if len(set(units)) == 1:  # given once it holds for all
             typed = typed.replace(f':{units[0]},', ',')
-        speeds = f'--speed-unit {_SPEED_UNIT} or m/s, or ' if _SPEED_UNIT in units else ''
+        stated = any(each.unit for each in columns)
+        speeds = '--speed-unit kn or m/s, or ' if 'kn' in units and not stated else ''
         self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
     def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
@@ -454,30 +458,28 @@ class _Guesser:
 
     def by_names(self, time: TimeColumn | None) -> None:
         self._position(self._rows.seconds(time))
-        self._speed('stw', 'speed_through_water')
-        if not self._speed('sog', 'speed_over_ground'):
-            self._components()
+        self._speed('speed_through_water', 'kn', 'stw')
+        if not self._speed('speed_over_ground', 'kn', 'sog'):
+            self._speed('speed_over_ground', 'm/s', 'east', 'north')
         self._heading()
-        self._alone('rudder', 'deg')
-        self._wind()
-        self._alone('shaft', 'rpm')
-        self._alone('depth', 'm')
+        for name, likely in _OTHERS.items():
+            columns = self._all(likely)
+            if not columns:
+                continue
+            units = [self._unit(each, likely[role]) for each, role in zip(columns, likely)]
+            try:
+                self._take(name, columns, units)
+            except ImportDataError:  # of none, or of another quantity
+                asked = [u if u in _ANGLES else unit for u, unit in zip(units, likely.values())]
+                self._ask(name, columns, asked)
 
-    def _alone(self, name: str, likely: str) -> None:
-        column = self._one(name)
-        if column is None:
-            return
-        unit = self._angle_unit(column) if name == 'rudder' else column.unit
-        try:
-            self._take(name, [column], [unit])
-        except ImportDataError:  # of none, or of another quantity
-            self._ask(name, [column], [likely])
+    def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
+        """Return the columns of some roles, none where one is missing."""
+        columns = [self._one(role) for role in roles]
+        return [] if None in columns else [each for each in columns if each is not None]
 
     def _position(self, time_s: Float64 | None) -> None:
-        latitude, longitude = self._one('lat'), self._one('lon')
-        x, y = self._one('x'), self._one('y')
-        if latitude is not None and longitude is not None:
-            both = [latitude, longitude]
+        if both := self._all(('lat', 'lon')):
             other = next((each.unit for each in both if each.unit in _NO_COORDINATES), '')
             if other:
                 keys = ', '.join(repr(each.key) for each in both)
@@ -487,65 +489,46 @@ class _Guesser:
             if time_s is not None:
                 values = self._rows.coordinates([each.place for each in both])
                 self._track = track_speed(time_s, *values)
-        elif x is not None and y is not None:
-            if x.unit != y.unit or x.unit not in ('m', 'km', 'ft', 'nmi'):
-                self._ask('position', [x, y], ['m', 'm'])
+        elif both := self._all(('x', 'y')):
+            units = {each.unit for each in both}
+            if len(units) > 1 or not units <= _LENGTHS:
+                self._ask('position', both, ['m', 'm'])
                 return
-            self._take('position', [x, y], [x.unit, y.unit])
-            if time_s is not None and x.unit == 'm':
-                self._track = plane_speed(time_s, *map(self._rows.values, (x.place, y.place)))
+            self._take('position', both, [each.unit for each in both])
+            if time_s is not None and units == {'m'}:
+                x, y = (self._rows.values(each.place) for each in both)
+                self._track = plane_speed(time_s, x, y)
 
-    def _speed(self, role: str, name: str) -> bool:
-        column = self._one(role)
-        if column is None:
+    def _speed(self, name: str, likely: str, *roles: str) -> bool:
+        """Take a speed, of one column or of two components; say whether it was."""
+        columns = self._all(roles)
+        if not columns:
             return False
-        values = self._rows.values(column.place)
-        unit = self._unit_of_speed(column)
+        keys = ', '.join(repr(each.key) for each in columns)
+        parts = [self._rows.values(each.place) for each in columns]
+        values = np.hypot(*parts) if parts[1:] else parts[0]
+        units = {self._unit(each, likely) for each in columns}
+        unit = units.pop() if len(units) == 1 else ''
+        stated = any(each.unit for each in columns)
+        if stated and unit not in SPEED_UNITS:
+            self._ask(name, columns, [likely] * len(columns))
+            return False
         seen = '' if self._track is None else unit_of(values, self._track, unit)
         if unit and seen and seen != unit:
             why = f'is said to be in {unit}, and agrees with the positions in {seen}'
-            self._doubt(
-                f'{column.key!r} {why}; --map '
-                f'{shlex.quote(f"{name}={column.typed}:{unit}")}, or {seen}'
-            )
+            self._ask(name, columns, [unit] * len(columns), why=why, other=seen)
             return False
-        if not (unit or seen) or (column.unit and not unit):
-            self._ask(name, [column], [_SPEED_UNIT])
+        if not (unit or seen):
+            self._ask(name, columns, [likely] * len(columns))
             return False
         if not unit:
             self.found.notes.append(
-                f'{column.key!r} states no unit; it agrees with the way between the positions in '
-                f'{seen}.'
+                f'{keys} states no unit; it agrees with the way between the positions in {seen}.'
             )
-        self._take(name, [column], [unit or seen])
+        self._take(name, columns, [unit or seen] * len(columns))
         if self._track is None:  # the other speed is compared with this one
             self._track = values * SPEED_UNITS[unit or seen]
         return True
-
-    def _unit_of_speed(self, column: NamedColumn) -> str:
-        """Return the unit that is stated or given; '' for none, or one of no speed."""
-        if column.unit:
-            return column.unit if column.unit in SPEED_UNITS else ''
-        return self._speed_unit
-
-    def _components(self) -> None:
-        east, north = self._one('east'), self._one('north')
-        if east is None or north is None:
-            return
-        unit = east.unit if east.unit == north.unit else ''
-        if not unit and self._track is not None:
-            speed = np.hypot(*map(self._rows.values, (east.place, north.place)))
-            unit = unit_of(speed, self._track)
-            if unit:
-                self.found.notes.append(
-                    f'{east.key!r}, {north.key!r} agree with the way between the positions in '
-                    f'{unit}.'
-                )
-        unit = unit or self._speed_unit
-        if unit in SPEED_UNITS:
-            self._take('speed_over_ground', [east, north], [unit, unit])
-        else:
-            self._ask('speed_over_ground', [east, north], ['m/s', 'm/s'])
 
     def _heading(self) -> None:
         column = self._one('heading')
@@ -556,7 +539,7 @@ class _Guesser:
             self.found.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
             )
-        elif self._angle_unit(column) == 'deg':
+        elif self._unit(column, 'deg') == 'deg':
             self._take('heading', [column], [COMPASS])
             self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:
@@ -564,20 +547,13 @@ class _Guesser:
             why = 'whether it is yaw or compass, or its unit, is not known'
             self._ask('heading', [column], [unit], why=why, other='rad deg compass')
 
-    def _wind(self) -> None:
-        speed, angle = self._one('aws'), self._one('awa')
-        if speed is None or angle is None:
-            return
-        unit, turn = self._unit_of_speed(speed), self._angle_unit(angle)
-        if unit and turn in ('deg', 'rad'):
-            self._take('wind_apparent', [speed, angle], [unit, turn])
-        else:
-            turn = turn if turn in ('deg', 'rad') else 'deg'
-            self._ask('wind_apparent', [speed, angle], [_SPEED_UNIT, turn])
-
-    def _angle_unit(self, column: NamedColumn) -> str:
-        """Return the unit that is stated, or that the values show; '' for neither."""
-        return column.unit or ('deg' if self._rows.largest(column.place) > _TURN else '')
+    def _unit(self, column: NamedColumn, likely: str) -> str:
+        """Return the unit that is stated, given, or shown by the values; '' for none."""
+        if column.unit:
+            return column.unit
+        if likely in SPEED_UNITS:
+            return self._speed_unit
+        return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''
 
     def nothing(self) -> str:
         """Say that nothing that moves is known, and what to type."""
