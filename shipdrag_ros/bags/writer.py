@@ -232,7 +232,7 @@ class RecordWriter:
     """
 
     indexed = True
-    """Whether each chunk is listed, for an index at the end."""
+    """Whether each chunk is listed, for an index at the end; not of a file that grows."""
 
     def __init__(
         self,
@@ -255,8 +255,9 @@ class RecordWriter:
         self._times_ns: list[int] = []
         self._unpacked = self.size_bytes = 0
         try:
-            # unbuffered: what could not be written must not be tried again on closing
-            self._file = open(path, 'xb', buffering=0, opener=private_opener)  # noqa: SIM115
+            # of one that grows, what could not be written must not be tried again on closing
+            buffering = -1 if self.indexed else 0
+            self._file = open(path, 'xb', buffering, opener=private_opener)  # noqa: SIM115
         except FileExistsError:
             raise NameTakenError(
                 f'{str(path)!r} exists; choose another name or remove it'
@@ -352,6 +353,7 @@ class RecordWriter:
             covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
             self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
             with self._errors_named():
+                self._file.flush()
                 os.fsync(self._file.fileno())
         finally:
             with suppress(OSError):

@@ -113,6 +113,14 @@ def test_metres_stay_metres(
     assert set(block.channel) == {Channel.POSITION}
 
 
+@pytest.mark.parametrize('header', ['t,ve [m/s],vn [kn]', 't,ve [m/s],vn'])
+def test_components_of_which_not_both_state_one_unit_are_asked_about(
+    import_text: Import, header: str
+) -> None:
+    with pytest.raises(ImportDataError, match=r'unit not known; .*--map'):
+        import_text(f'{header}\n' + ''.join(f'{t},3,4\n' for t in range(20)), speed_unit='kn')
+
+
 def test_further_instruments_come_in_as_the_first(import_text: Import) -> None:
     maps = (
         'speed_through_water=a',

@@ -24,7 +24,7 @@ from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
     RowClock,
-    are_in_minutes,
+    coordinate_readers,
     has_decimal_commas,
     is_date,
     is_midnight,
@@ -180,10 +180,10 @@ class FirstRows:
         """
         Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
         """
-        minutes = are_in_minutes(*map(self.texts, places))
+        readers = coordinate_readers(*map(self.texts, places))
         return [
-            CellReader(side=side, minutes=minutes).all(self._rows.columns[place], {})
-            for place, side in zip(places, ('NS', 'EW'), strict=True)
+            read.all(self._rows.columns[place], {})
+            for read, place in zip(readers, places, strict=True)
         ]
 
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
@@ -262,23 +262,21 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
     values = values[np.isfinite(values)]
     step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
     small = len(values) > 0 and abs(values[0]) < 1e11
+    why, typed = '', shlex.quote(column.typed)
     if column.unit:
-        raise ImportDataError(
-            f'{rows.path!r}: the time {column.key!r} is said to be in '
-            f'{column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write it in one of '
-            'them, or give --rate HZ'
+        why = (
+            f'is said to be in {column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write '
+            'it in one of them, or give --rate HZ'
         )
-    if small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
-        raise ImportDataError(
-            f'{rows.path!r}: the time {column.key!r} goes by {step:.3g} from '
-            f'{values[0]:.8g}, as the days of a spreadsheet do. Save it as dates; or, if they '
-            f'are seconds, give --time {shlex.quote(column.typed)}:s'
+    elif small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
+        why = (
+            f'goes by {step:.3g} from {values[0]:.8g}, as the days of a spreadsheet do. Save it '
+            f'as dates; or, if they are seconds, give --time {typed}:s'
         )
-    if small and step >= 10.0:
-        raise ImportDataError(
-            f'{rows.path!r}: the unit of the time {column.key!r} is not known; '
-            f'its steps are {step:g}. Give --time {shlex.quote(column.typed)}:ms, or :s'
-        )
+    elif small and step >= 10.0:
+        why = f'has no known unit; its steps are {step:g}. Give --time {typed}:ms, or :s'
+    if why:
+        raise ImportDataError(f'{rows.path!r}: the time {column.key!r} {why}')
     if small:
         notes.append(f'The time {column.key!r} states no unit and is taken as s.')
     return TimeColumn((column.key,), NANOSECONDS['s'])
@@ -417,8 +415,8 @@ class _Guesser:
         typed = ','.join(f'{each.typed}:{unit}' for each, unit in zip(columns, units, strict=True))
         if len(set(units)) == 1:  # given once it holds for all
             typed = typed.replace(f':{units[0]},', ',')
-        stated = any(each.unit for each in columns)
-        speeds = '--speed-unit kn or m/s, or ' if 'kn' in units and not stated else ''
+        bare = {unit for each, unit in zip(columns, units, strict=True) if not each.unit}
+        speeds = '--speed-unit kn or m/s, or ' if bare & SPEED_UNITS.keys() else ''
         self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
     def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
@@ -466,11 +464,16 @@ class _Guesser:
             columns = self._all(likely)
             if not columns:
                 continue
-            units = [self._unit(each, likely[role]) for each, role in zip(columns, likely)]
+            units = [
+                self._unit(each, likely[role]) for each, role in zip(columns, likely, strict=True)
+            ]
             try:
                 self._take(name, columns, units)
             except ImportDataError:  # of none, or of another quantity
-                asked = [u if u in _ANGLES else unit for u, unit in zip(units, likely.values())]
+                asked = [
+                    u if u and unit == 'deg' else unit
+                    for u, unit in zip(units, likely.values(), strict=True)
+                ]
                 self._ask(name, columns, asked)
 
     def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
@@ -507,23 +510,25 @@ class _Guesser:
         keys = ', '.join(repr(each.key) for each in columns)
         parts = [self._rows.values(each.place) for each in columns]
         values = np.hypot(*parts) if parts[1:] else parts[0]
-        units = {self._unit(each, likely) for each in columns}
-        unit = units.pop() if len(units) == 1 else ''
-        stated = any(each.unit for each in columns)
-        if stated and unit not in SPEED_UNITS:
+        said = {each.unit for each in columns if each.unit} or {self._speed_unit} - {''}
+        if len(said) > 1 or not said <= SPEED_UNITS.keys():
             self._ask(name, columns, [likely] * len(columns))
             return False
+        unit = ''.join(said)
         seen = '' if self._track is None else unit_of(values, self._track, unit)
         if unit and seen and seen != unit:
             why = f'is said to be in {unit}, and agrees with the positions in {seen}'
             self._ask(name, columns, [unit] * len(columns), why=why, other=seen)
             return False
+        if len({bool(each.unit) for each in columns}) > 1:  # one of both is said, and no more
+            unit = ''
         if not (unit or seen):
             self._ask(name, columns, [likely] * len(columns))
             return False
         if not unit:
             self.found.notes.append(
-                f'{keys} states no unit; it agrees with the way between the positions in {seen}.'
+                f'{keys}: no unit is stated; in {seen} it agrees with the way between the '
+                'positions.'
             )
         self._take(name, columns, [unit or seen] * len(columns))
         if self._track is None:  # the other speed is compared with this one
@@ -550,7 +555,7 @@ class _Guesser:
     def _unit(self, column: NamedColumn, likely: str) -> str:
         """Return the unit that is stated, given, or shown by the values; '' for none."""
         if column.unit:
-            return column.unit
+            return '' if likely == 'deg' and column.unit not in _ANGLES else column.unit
         if likely in SPEED_UNITS:
             return self._speed_unit
         return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''

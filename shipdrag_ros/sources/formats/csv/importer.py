@@ -30,8 +30,8 @@ from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
     RowClock,
-    are_in_minutes,
     combined,
+    coordinate_readers,
     has_decimal_commas,
     zone_of,
 )
@@ -335,18 +335,12 @@ def _readers(
     """Return what reads the cells of each column, as they are written in the first rows."""
     written = [cells for cells in sample.columns if not isinstance(cells, np.ndarray)]
     comma = has_decimal_commas(chain.from_iterable(written))
-    found = []
-    for columns, here in zip(inputs, places, strict=True):
-        readers = [CellReader(comma=comma)] * len(here)
-        if columns.channel.kind is Channel.POSITION_GEODETIC:
-            cells = [sample.texts(place) for place in here]
-            minutes = are_in_minutes(*cells)
-            readers = [
-                CellReader(comma=not minutes and has_decimal_commas(each), side=s, minutes=minutes)
-                for each, s in zip(cells, ('NS', 'EW'), strict=True)
-            ]
-        found.append(readers)
-    return found
+    return [
+        coordinate_readers(*map(sample.texts, here))
+        if columns.channel.kind is Channel.POSITION_GEODETIC
+        else [CellReader(comma=comma)] * len(here)
+        for columns, here in zip(inputs, places, strict=True)
+    ]
 
 
 def _score(head: Head) -> float:
