@@ -118,6 +118,7 @@ def unit_of(values: Float64, track_m_s: Float64, stated: str = '') -> str:
 
 
 _SAMPLE_ROWS = 20_000
+_FEW_ROWS = 1000  # that show whether positions may be degrees
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,8 @@ class FirstRows:
     Parameters
     ----------
     table
+    most
+        How many.
 
     Attributes
     ----------
@@ -150,12 +153,12 @@ class FirstRows:
         Columns by what their names say they are, in their order.
     """
 
-    def __init__(self, table: LogTable) -> None:
+    def __init__(self, table: LogTable, most: int = _SAMPLE_ROWS) -> None:
         self.table = table
         self.path = str(table.path)
         self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
-        self._rows = table.first_rows(_SAMPLE_ROWS)
+        self._rows = table.first_rows(most)
         for place, name in enumerate(self.header):
             role, unit = role_and_unit(*table.about(place))
             key = name if self.header.count(name) == 1 else str(place + 1)
@@ -582,7 +585,7 @@ def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
     """
     if mapped.stated or mapped.channel.kind is not Channel.POSITION:
         return mapped
-    rows, places = FirstRows(table), [table.column(name) for name in mapped.names]
+    rows, places = FirstRows(table, _FEW_ROWS), [table.column(name) for name in mapped.names]
     said = [role_and_unit(*table.about(place)) for place in places]
     roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
     units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
