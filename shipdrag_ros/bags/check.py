@@ -11,16 +11,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import (
+    Attachment,
     AttachmentIndex,
     Channel,
     ChunkIndex,
+    DataEnd,
     Footer,
+    Header,
+    Metadata,
     MetadataIndex,
     Schema,
     Statistics,
@@ -41,22 +46,27 @@ from shipdrag_ros.bags.records import (
     Place,
     attachment_agrees,
     checksum,
+    place_at,
     read,
     unpack,
     walk,
 )
 from shipdrag_ros.bags.recover import opened
+from shipdrag_ros.bags.writer import chunk_index, index_of, statistics
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Int64
 
 _NO_ENTRIES = np.empty((0, 2), np.int64)
-_INDEXED = {
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.METADATA_INDEX: MetadataIndex,
+_DECLARED = (Schema, Channel)
+# of which the summary says all
+_LISTED = {
+    Schema: 'schema',
+    Channel: 'channel',
+    ChunkIndex: 'chunk_index',
+    AttachmentIndex: 'attachment_index',
+    MetadataIndex: 'metadata_index',
+    Statistics: 'statistics',
 }
 
 
@@ -140,10 +150,10 @@ class _Facts:
         self.records = 0
         self._data = data
         self._damages = damages
-        self._expected: dict[type, dict[int, Any]] = {kind: {} for kind in _INDEXED.values()}
-        self._first_ns: int | None = None
-        self._last_ns = 0
+        # what the summary should say, by kind and number or place; None where it is not known
+        self._expected: dict[tuple[type, int], Any] = {}
         self._summary: list[tuple[Place, Any]] = []
+        self._times_ns: tuple[int, ...] = ()  # first and last
         self._ended = 0
         self._chunk: ChunkIndex | None = None  # whose message indexes may follow
         self._entries: dict[int, Int64] = {}  # of it: log times [ns] and offsets, by channel
@@ -176,56 +186,50 @@ class _Facts:
         if place.opcode == Opcode.MESSAGE:
             channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
             self._count(channel, 1, offset)
-            self._span(log_ns, log_ns)
+            self._span(log_ns)
             return
         if place.opcode == Opcode.MESSAGE_INDEX:
             self._message_index(place)
             return
         record = read(data, place)
-        length = place.end - place.offset
-        match place.opcode:
-            case _ if record is None:
+        match record:
+            case None:
                 self._damages.add(offset, place.name, DamageKind.CONTENT)
-            case Opcode.SCHEMA | Opcode.CHANNEL if not self._ended:
+            case Schema() | Channel() if not self._ended:
                 self._declaration(record, place, offset)
-            case Opcode.ATTACHMENT:
-                if not attachment_agrees(data, place):
-                    self._damages.add(offset, 'attachment', DamageKind.CHECKSUM)
-                times = record.log_time, record.create_time
-                self._expected[AttachmentIndex][offset] = AttachmentIndex(
-                    offset, length, *times, len(record.data), record.name, record.media_type
-                )
-            case Opcode.METADATA:
-                self._expected[MetadataIndex][offset] = MetadataIndex(offset, length, record.name)
-            case Opcode.DATA_END:
+            case Attachment() | Metadata():
+                if isinstance(record, Attachment) and not attachment_agrees(data, place):
+                    self._damages.add(offset, place.name, DamageKind.CHECKSUM)
+                index = index_of(record, offset, place.end - place.offset)
+                self._expected[type(index), offset] = index
+            case DataEnd():
                 self._once(place, place.name)
                 self._ended = self._ended or place.end
                 if record.data_section_crc not in (0, checksum(data, 0, offset)):
-                    self._damages.add(offset, 'data_end', DamageKind.CHECKSUM)
-            case Opcode.HEADER:
+                    self._damages.add(offset, place.name, DamageKind.CHECKSUM)
+            case Header():
                 self._once(place, place.name)
             case _:
                 self._summary.append((place, record))
 
     def _declaration(self, record: Schema | Channel, place: Place, offset: int) -> None:
-        known = self._expected[type(record)]
-        if known.setdefault(record.id, record) != record:
+        if self._expected.setdefault((type(record), record.id), record) != record:
             self._damages.add(offset, place.name, DamageKind.DISAGREES, f'number {record.id}')
-        if isinstance(record, Channel) and record.schema_id not in (0, *self._expected[Schema]):
-            self._refers(offset, place.name, f'schema {record.schema_id}')
+        if isinstance(record, Channel) and record.schema_id:
+            self._refers(offset, place.name, Schema, record.schema_id)
 
     def _count(self, channel: int, messages: int, offset: int) -> None:
         self.counts[channel] += messages
-        if channel not in self._expected[Channel]:
-            self._refers(offset, 'message', f'channel {channel}')
+        self._refers(offset, 'message', Channel, channel)
 
-    def _span(self, first_ns: int, last_ns: int) -> None:
-        self._first_ns = first_ns if self._first_ns is None else min(first_ns, self._first_ns)
-        self._last_ns = max(last_ns, self._last_ns)
+    def _span(self, *times_ns: int) -> None:
+        times_ns = *self._times_ns, *times_ns
+        self._times_ns = min(times_ns), max(times_ns)
 
-    def _refers(self, offset: int, record: str, target: str) -> None:
+    def _refers(self, offset: int, record: str, kind: type, number: int) -> None:
         """Say once what is not there; a thousand messages may refer to it."""
-        if target not in self._said:
+        target = f'{kind.__name__.lower()} {number}'
+        if (kind, number) not in self._expected and target not in self._said:
             self._said.add(target)
             self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
 
@@ -235,22 +239,21 @@ class _Facts:
         self._said.add(f'{place.name} {key}')
 
     def _open_chunk(self, place: Place) -> None:
-        unpacked = unpack(self._data, place)
-        damage = unpacked.damage
-        if damage is not None and damage is not place.damage:
-            self._damages.add(place.offset, 'chunk', damage)
-        records = unpacked.records if damage is None else b''
+        records, damage, *_ = unpack(self._data, place)
+        if damage is not None:
+            records = b''
+            if damage is not place.damage:
+                self._damages.add(place.offset, 'chunk', damage)
         messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
-        kinds = np.frombuffer(records, np.uint8)[others]
-        if notes or not np.isin(kinds, list(IN_CHUNK)).all():
-            for inner in walk(records, 0, len(records), IN_CHUNK):
-                if inner.damage is not None:
-                    where = f'at byte {inner.offset} of the unpacked chunk'
-                    self._damages.add(place.offset, inner.name, inner.damage, where)
-        for at in others[np.isin(kinds, list(IN_CHUNK))].tolist():
-            start = at + HEAD.size
-            end = start + HEAD.unpack_from(records, at)[1]
-            self._record(records, Place(records[at], at, start, end), place.offset)
+        inside = [place_at(records, at) for at in others.tolist()]
+        if notes or any(each.opcode not in IN_CHUNK for each in inside):
+            for each in walk(records, 0, len(records), IN_CHUNK):
+                if each.damage is not None:
+                    where = f'at byte {each.offset} of the unpacked chunk'
+                    self._damages.add(place.offset, each.name, each.damage, where)
+        for each in inside:
+            if each.opcode in IN_CHUNK:
+                self._record(records, each, place.offset)
         offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
         entries = np.column_stack((messages.log_ns, offsets))
         self._entries = {
@@ -263,28 +266,19 @@ class _Facts:
 
     def _index_chunk(self, place: Place, log_ns: Int64, *, sound: bool) -> None:
         """Make the index that the chunk should have; None where it is damaged itself."""
-        self._expected[ChunkIndex][place.offset] = None
+        self._expected[ChunkIndex, place.offset] = None
         if not sound:
             return
         chunk = read(self._data, place)
-        span = (int(log_ns.min()), int(log_ns.max())) if len(log_ns) else (0, 0)
         stated = chunk.message_start_time, chunk.message_end_time
         if len(log_ns):
+            span = int(log_ns.min()), int(log_ns.max())
             self._span(*span)
             if stated != span:
                 text = f'times {stated}, in it are {span}'
                 self._damages.add(place.offset, 'chunk', DamageKind.DISAGREES, text)
-        self._chunk = self._expected[ChunkIndex][place.offset] = ChunkIndex(
-            chunk_length=place.end - place.offset,
-            chunk_start_offset=place.offset,
-            compression=chunk.compression,
-            compressed_size=len(chunk.data),
-            message_end_time=stated[1],
-            message_index_length=0,
-            message_index_offsets={},
-            message_start_time=stated[0],
-            uncompressed_size=chunk.uncompressed_size,
-        )
+        self._chunk = chunk_index(chunk, place.offset, place.end - place.offset)
+        self._expected[ChunkIndex, place.offset] = self._chunk
 
     def _message_index(self, place: Place) -> None:
         if self._chunk is None:
@@ -313,88 +307,69 @@ class _Facts:
 
     def compare(self) -> None:
         """Compare the summary with what is there."""
+        add = self._damages.add
         if not self._ended:
-            self._damages.add(len(self._data), 'data_end', DamageKind.MISSING)
-        place, footer = next(
-            (it for it in self._summary if isinstance(it[1], Footer)), (None, None)
-        )
-        if place is None or footer is None:
-            self._damages.add(len(self._data), 'footer', DamageKind.MISSING)
+            add(len(self._data), 'data_end', DamageKind.MISSING)
+        footers = [(place, it) for place, it in self._summary if isinstance(it, Footer)]
+        if not footers:
+            add(len(self._data), 'footer', DamageKind.MISSING)
             return
-        if footer.summary_start == 0:
-            self._damages.add(place.offset, 'summary', DamageKind.MISSING)
+        (place, footer), start = footers[0], footers[0][1].summary_start
+        if start == 0:
+            add(place.offset, 'summary', DamageKind.MISSING)
             return
-        if footer.summary_crc not in (
-            0,
-            checksum(self._data, footer.summary_start, place.end - 4),
-        ):
-            self._damages.add(place.offset, 'summary', DamageKind.CHECKSUM)
-        if footer.summary_start != self._ended:
-            text = f'it begins at {self._ended}, not {footer.summary_start}'
-            self._damages.add(place.offset, 'summary', DamageKind.MISPLACED, text)
-        groups: dict[int, tuple[int, int]] = {}
-        stated: dict[type, set[int]] = {kind: set() for kind in self._expected}
+        if footer.summary_crc not in (0, checksum(self._data, start, place.end - 4)):
+            add(place.offset, 'summary', DamageKind.CHECKSUM)
+        if start != self._ended:
+            text = f'it begins at {self._ended}, not {start}'
+            add(place.offset, 'summary', DamageKind.MISPLACED, text)
+        stated = {(type(record), _key(record)) for _, record in self._summary}
+        self._expect_totals(stated)
         for place, record in self._summary:
-            begin, _ = groups.setdefault(place.opcode, (place.offset, 0))
-            groups[place.opcode] = begin, place.end - begin
             self._once(place, _key(record))
-            if type(record) in stated:
-                stated[type(record)].add(_key(record))
-                self._compare(place, record)
-        for place, record in self._summary:
-            if isinstance(record, Statistics):
-                self._statistics(place, record, stated)
-            elif isinstance(record, SummaryOffset) and record.group_length:
-                group = record.group_start, record.group_length
-                if groups.get(record.group_opcode) != group:
-                    self._damages.add(place.offset, place.name, DamageKind.MISPLACED)
-        self._missing(stated, said_statistics=Opcode.STATISTICS in groups)
+            self._compare(place, record)
+        kinds = {kind for kind, _ in stated}
+        for kind, name in _LISTED.items():
+            if kind in _DECLARED and kind not in kinds:
+                continue  # none at all is a choice of the writer
+            here = {key for key in self._expected.keys() - stated if key[0] is kind}
+            for _, key in sorted(here, key=itemgetter(1)):
+                text = '' if kind is Statistics else f'of {key}'
+                at = self._ended if kind in (*_DECLARED, Statistics) else key
+                add(at, name, DamageKind.MISSING, text)
+
+    def _expect_totals(self, stated: set[tuple[type, int]]) -> None:
+        """Expect what the summary says of all records, and of itself."""
+        # a topic without messages may be declared in the summary alone
+        declared = {key for key in stated if key[0] in _DECLARED}
+        kinds = Counter(kind for kind, _ in self._expected.keys() | declared)
+        self._expected[Statistics, 0] = statistics(kinds, self.counts, self._times_ns)
+        begin: dict[int, int] = {}
+        for place, _ in self._summary:
+            first = begin.setdefault(place.opcode, place.offset)
+            self._expected[SummaryOffset, place.opcode] = SummaryOffset(
+                place.opcode, first, place.end - first
+            )
 
     def _compare(self, place: Place, stated: Any) -> None:
-        known = self._expected[type(stated)]
-        # a topic without messages may be declared in the summary alone
-        actual = known.get(_key(stated), stated if isinstance(stated, Schema | Channel) else ())
-        if actual == ():
-            text = f'nothing of that kind is at byte {_key(stated)}'
-            self._damages.add(place.offset, place.name, DamageKind.MISPLACED, text)
-        elif actual not in (None, stated):  # of a damaged chunk nothing is known
+        key = type(stated), _key(stated)
+        if isinstance(stated, Footer) or (key not in self._expected and key[0] in _DECLARED):
+            return
+        actual = self._expected.get(key, ())
+        kind, text = DamageKind.DISAGREES, f'{stated}, in the data {actual}'
+        if isinstance(stated, Statistics):
+            counts = {number: n for number, n in stated.channel_message_counts.items() if n}
+            stated = replace(
+                stated, channel_message_counts=counts or actual.channel_message_counts
+            )
             text = f'{stated}, in the data {actual}'
-            self._damages.add(place.offset, place.name, DamageKind.DISAGREES, text)
-
-    def _statistics(self, place: Place, stated: Statistics, said: dict[type, set[int]]) -> None:
-        here = {kind: len(said[kind] | set(known)) for kind, known in self._expected.items()}
-        actual = Statistics(
-            attachment_count=len(self._expected[AttachmentIndex]),
-            channel_count=here[Channel],
-            channel_message_counts=dict(self.counts),
-            chunk_count=len(self._expected[ChunkIndex]),
-            message_count=self.counts.total(),
-            message_end_time=self._last_ns,
-            message_start_time=self._first_ns or 0,
-            metadata_count=len(self._expected[MetadataIndex]),
-            schema_count=here[Schema],
-        )
-        by_channel = {number: n for number, n in stated.channel_message_counts.items() if n}
-        stated = replace(
-            stated, channel_message_counts=by_channel or actual.channel_message_counts
-        )
-        if stated != actual:
-            text = f'{stated}, in the data {actual}'
-            self._damages.add(place.offset, place.name, DamageKind.DISAGREES, text)
-
-    def _missing(self, stated: dict[type, set[int]], *, said_statistics: bool) -> None:
-        if not said_statistics:
-            self._damages.add(self._ended, 'statistics', DamageKind.MISSING)
-        for opcode, kind in _INDEXED.items():
-            missing = sorted(set(self._expected[kind]) - stated[kind])
-            if kind in (Schema, Channel):
-                # none at all is a choice of the writer
-                missing, where = missing if stated[kind] else [], [self._ended] * len(missing)
-            else:
-                where = missing
-            for offset, key in zip(where, missing, strict=False):
-                text = f'of {key}'
-                self._damages.add(offset, Opcode(opcode).name.lower(), DamageKind.MISSING, text)
+        elif isinstance(stated, SummaryOffset):
+            kind, text = DamageKind.MISPLACED, ''
+            actual = actual if stated.group_length else None
+        elif actual == ():
+            kind, text = DamageKind.MISPLACED, f'nothing of that kind is at byte {key[1]}'
+        if actual not in (None, stated):  # of a damaged chunk nothing is known
+            self._damages.add(place.offset, place.name, kind, text)
 
 
 def _key(record: Any) -> int:

@@ -31,6 +31,7 @@ from shipdrag_ros.bags.records import (
     Buffer,
     Place,
     attachment_agrees,
+    place_at,
     read,
     unpack,
     walk,
@@ -283,10 +284,9 @@ def _add_chunk(data: Buffer, place: Place, contents: Contents) -> None:
         return
     contents.compressions.add(compression)
     messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
-    kinds = np.frombuffer(records, np.uint8)[others]
-    for offset in others[np.isin(kinds, _DECLARATIONS)].tolist():
-        end = offset + HEAD.size + HEAD.unpack_from(records, offset)[1]
-        contents.add(read(records, Place(records[offset], offset, offset + HEAD.size, end)))
+    for inner in (place_at(records, offset) for offset in others.tolist()):
+        if inner.opcode in _DECLARATIONS:
+            contents.add(read(records, inner))
     counts = np.bincount(messages.channel)
     channels = np.flatnonzero(counts).tolist()
     contents.counts.update({number: int(counts[number]) for number in channels})

@@ -9,32 +9,34 @@ that fails for a while loses nothing that memory can hold.
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain, count, islice, starmap
+from itertools import chain, count, islice
 from pathlib import Path
 from time import monotonic
 from uuid import uuid4
 
-from mcap import records as mcap_records
-from mcap.opcode import Opcode
+from mcap.records import DataEnd, Footer
 
-from shipdrag_ros.bags import writer
-from shipdrag_ros.bags.records import HEAD, MAGIC
+from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.recover import compact
+from shipdrag_ros.bags.writer import (
+    BagWriter,
+    Compression,
+    NameTakenError,
+    as_bytes,
+    sync_directory,
+)
 from shipdrag_ros.errors import BagError, reason_of
 from shipdrag_ros.messages import EncodedMessage
 
 DECLARE_BYTES = 1 << 20  # topics are declared anew behind so much
 
 
-class NameTakenError(BagError):
-    """A file of this name is there already."""
-
-
-class LiveFile:
+class LiveFile(BagWriter):
     """
     An MCAP file that is safe up to its last `sync`, and locked until its `release`.
 
@@ -62,40 +64,29 @@ class LiveFile:
         If it cannot be made.
     """
 
+    indexed = False
+
     def __init__(
         self, path: Path, *, recording_id: str, part: int, attachments: Mapping[str, str]
     ) -> None:
-        self.path = path
-        self.size_bytes = self.synced_bytes = self.synced_messages = 0
+        self.synced_bytes = self.synced_messages = self._messages = self._declared_at = 0
         self.first_log_ns: int | None = None
-        self._messages = 0
-        self._schemas: dict[str, mcap_records.Schema] = {}
-        self._channels: dict[tuple[str, str], mcap_records.Channel] = {}
-        self._declared_at = 0
         try:
-            # unbuffered: what could not be written must not be tried again on closing
-            self._file = open(path, 'xb', buffering=0, opener=writer.private_opener)  # noqa: SIM115
-        except FileExistsError:
-            raise NameTakenError(f'{str(path)!r} exists') from None
-        except OSError as error:
-            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
-        try:
-            self._write(
-                MAGIC
-                + writer.as_bytes(
-                    mcap_records.Header(writer.PROFILE, writer.LIBRARY),
-                    mcap_records.Metadata(writer.METADATA, writer.metadata(recording_id, part)),
-                )
-                + writer.as_bytes(*starmap(writer.attachment, attachments.items()))
+            super().__init__(
+                path,
+                compression=Compression.NONE,
+                chunk_bytes=sys.maxsize,  # `append` ends it
+                recording_id=recording_id,
+                part=part,
+                attachments=attachments,
             )
             self.sync()
-            writer.sync_directory(path.parent)
+            with self._errors_named():
+                sync_directory(path.parent)
         except BagError:
-            self.abandon()
+            if hasattr(self, '_file'):
+                self.abandon()
             raise
-        except OSError as error:
-            self.abandon()
-            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
 
     def append(self, messages: Sequence[EncodedMessage]) -> None:
         """
@@ -106,13 +97,12 @@ class LiveFile:
         BagError
             If a type is not known or the disk does not take it.
         """
-        new = [record for message in messages for record in self._declare(message)]
-        if new:
-            self._write(writer.as_bytes(*new))
+        for message in messages:
+            self.put(message)
         if self.size_bytes - self._declared_at > DECLARE_BYTES:
-            self._write(writer.as_bytes(*self._schemas.values(), *self._channels.values()))
+            self._write(as_bytes(*self._declared.values()))
             self._declared_at = self.size_bytes
-        self._write(writer.as_bytes(self._chunk(messages)))
+        self._end_chunk()
         self._messages += len(messages)
         if self.first_log_ns is None:
             self.first_log_ns = messages[0].log_ns
@@ -159,7 +149,7 @@ class LiveFile:
         BagError
             If the disk does not take it.
         """
-        self._write(writer.as_bytes(mcap_records.DataEnd(0), mcap_records.Footer(0, 0, 0)) + MAGIC)
+        self._write(as_bytes(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
         self.sync()
 
     def abandon(self) -> None:
@@ -180,40 +170,6 @@ class LiveFile:
         """
         with suppress(OSError):
             self._file.close()
-
-    def _declare(
-        self, message: EncodedMessage
-    ) -> list[mcap_records.Schema | mcap_records.Channel]:
-        """Return what must be said before this message can be understood."""
-        new: list[mcap_records.Schema | mcap_records.Channel] = []
-        key = (message.topic, message.type)
-        if key not in self._channels:
-            if message.type not in self._schemas:
-                number = len(self._schemas) + 1
-                self._schemas[message.type] = writer.schema(number, message.type)
-                new.append(self._schemas[message.type])
-            self._channels[key] = writer.channel(
-                len(self._channels) + 1, *key, schema_id=self._schemas[message.type].id
-            )
-            new.append(self._channels[key])
-        return new
-
-    def _chunk(self, messages: Sequence[EncodedMessage]) -> mcap_records.Chunk:
-        contents = (
-            writer.content_of(self._channels[each.topic, each.type].id, each) for each in messages
-        )
-        records = b''.join(HEAD.pack(Opcode.MESSAGE, len(each)) + each for each in contents)
-        times = [message.log_ns for message in messages]
-        return writer.chunk_of(records, min(times), max(times), writer.Compression.NONE)
-
-    def _write(self, data: bytes) -> None:
-        left = memoryview(data)
-        try:
-            while left:
-                left = left[self._file.write(left) :]
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
-        self.size_bytes += len(data)
 
 
 WRITE_S = 0.1  # to the system: survives the end of the process

@@ -214,6 +214,15 @@ def walk(data: Buffer, start: int, end: int, kinds: frozenset[int] = KINDS) -> I
         release(data, place.offset, at)
 
 
+def place_at(data: Buffer, offset: int) -> Place:
+    """
+    Return the place of a record that is whole.
+    """
+    opcode, length = HEAD.unpack_from(data, offset)
+    start = offset + HEAD.size
+    return Place(opcode, offset, start, start + length)
+
+
 def read(data: Buffer, place: Place) -> Any:
     """
     Return the record of `mcap.records` at a place; None where it does not fit.
@@ -420,35 +429,39 @@ class _Packed(NamedTuple):
     cut_off: bool
 
 
-def unpack(data: Buffer, place: Place) -> Unpacked:
+def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
     """
     Unpack a chunk that is whole; of another one nothing.
+
+    Parameters
+    ----------
+    data, place
+    partly
+        As much of it as can be, up to `CHUNK_LIMIT_BYTES`.
     """
     packed = _packed(data, place)
     if packed is None:
         return Unpacked(b'', DamageKind.CONTENT, False, '')
-    if packed.size > CHUNK_LIMIT_BYTES:
-        return Unpacked(b'', DamageKind.TOO_LARGE, False, packed.compression)
+    damage, records, limit = None, b'', CHUNK_LIMIT_BYTES
     try:
-        records = _decompress(packed)
+        if packed.size <= limit:
+            records = _decompress(packed)
+            damage = None if len(records) == packed.size else DamageKind.SIZE
+        else:
+            damage = DamageKind.TOO_LARGE
     except _UNPACKING_ERRORS:
         damage = DamageKind.TRUNCATED if packed.cut_off else DamageKind.COMPRESSION
+    if partly and damage is not None:
+        records = _decompress_partly(packed)
+        damage = DamageKind.TOO_LARGE if len(records) > limit else damage
+    if len(records) > limit or (not partly and damage not in (None, DamageKind.SIZE)):
         return Unpacked(b'', damage, False, packed.compression)
-    return _judged(packed, records, None if len(records) == packed.size else DamageKind.SIZE)
-
-
-def unpack_partly(data: Buffer, place: Place) -> Unpacked:
-    """
-    Unpack as much of a chunk as can be, up to `CHUNK_LIMIT_BYTES`.
-    """
-    unpacked = unpack(data, place)
-    packed = _packed(data, place)
-    if unpacked.damage in (None, DamageKind.CHECKSUM) or packed is None:
-        return unpacked
-    records = _decompress_partly(packed)
-    if len(records) > CHUNK_LIMIT_BYTES:
-        return Unpacked(b'', DamageKind.TOO_LARGE, False, packed.compression)
-    return _judged(packed, records, unpacked.damage)
+    verified = packed.checksum != 0 and crc32(records) == packed.checksum
+    if packed.cut_off:
+        damage = damage or DamageKind.TRUNCATED
+    if packed.checksum and not verified:
+        damage = damage or DamageKind.CHECKSUM
+    return Unpacked(records, damage, verified, packed.compression)
 
 
 def _packed(data: Buffer, place: Place) -> _Packed | None:
@@ -462,15 +475,6 @@ def _packed(data: Buffer, place: Place) -> _Packed | None:
     content = data[start : min(end, place.end)]
     release(data, place.offset, place.end)
     return _Packed(size, stated, data[at + 4 : name_end].decode(), content, end > place.end)
-
-
-def _judged(packed: _Packed, records: bytes, damage: DamageKind | None) -> Unpacked:
-    verified = packed.checksum != 0 and crc32(records) == packed.checksum
-    if packed.cut_off:
-        damage = damage or DamageKind.TRUNCATED
-    if packed.checksum and not verified:
-        damage = damage or DamageKind.CHECKSUM
-    return Unpacked(records, damage, verified, packed.compression)
 
 
 def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:

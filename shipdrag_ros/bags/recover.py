@@ -39,8 +39,9 @@ from shipdrag_ros.bags.records import (
     DamageList,
     Place,
     attachment_agrees,
+    place_at,
     read,
-    unpack_partly,
+    unpack,
     unpack_zstd,
     walk,
 )
@@ -266,10 +267,7 @@ class _Salvaged:
         if key in self._written:
             return
         self._written.add(key)
-        if isinstance(record, Attachment):
-            self.writer.add_attachment(record)
-        else:
-            self.writer.add_metadata(record.name, record.metadata)
+        self.writer.add(record)
 
     def publish(self) -> None:
         """Give the file its name."""
@@ -350,7 +348,7 @@ class _Salvage:
                 self.bytes_lost += place.end - place.offset
 
     def _chunk(self, data: Buffer, chunk: Place) -> None:
-        records, damage, verified, _ = unpack_partly(data, chunk)
+        records, damage, verified, _ = unpack(data, chunk, partly=True)
         if damage not in (None, chunk.damage):
             self.damages.add(chunk.offset, 'chunk', damage)
         sound = verified or (damage is None and chunk.damage is None)
@@ -358,7 +356,7 @@ class _Salvage:
         messages, others, notes = indexed
         if sound and not notes:
             for at in others.tolist():
-                place = _place_at(records, at)
+                place = place_at(records, at)
                 self._record(records, place, chunk.offset, sound=True, verified=verified)
             as_it_is = verified and damage is None and not self._bag.message_compression
             if as_it_is and self._copy(data, chunk, records, indexed):
@@ -387,7 +385,7 @@ class _Salvage:
         small = not record.compression and len(record.data) < CHUNK_RANGE[0]
         if small or not numbers or not declared.keys() >= set(numbers):
             return False
-        inside = [read(records, _place_at(records, at)) for at in others.tolist()]
+        inside = [read(records, place_at(records, at)) for at in others.tolist()]
         for number in {*numbers, *(it.id for it in inside if isinstance(it, Channel))}:
             if self._sound.number(number, self._declared) != number:
                 return False
@@ -450,12 +448,6 @@ class _Salvage:
         number = bag.numbers.get(channel) or bag.number(channel, self._declared)
         bag.writer.add_content(number, content, log_ns=log_ns)
         bag.messages += 1
-
-
-def _place_at(records: bytes, at: int) -> Place:
-    """Return the place of a whole record in an unpacked chunk."""
-    start = at + HEAD.size
-    return Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
 
 
 SUFFIX = '.compacting'

@@ -3,8 +3,7 @@
 Writing MCAP files that any tool for ROS 2 reads.
 
 Profile `ros2`, full message definitions, log time = time of arrival,
-publish time = stamp. What a file says about its topics and itself stands here once, because
-a file is written in two ways: while it grows, and whole.
+publish time = stamp.
 """
 
 from __future__ import annotations
@@ -12,13 +11,13 @@ from __future__ import annotations
 import os
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from enum import Enum
 from fcntl import LOCK_EX, LOCK_NB, flock
-from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 from uuid import uuid4
 
@@ -26,9 +25,22 @@ import lz4.frame
 import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
-from mcap import records as mcap_records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 from numpy.typing import NDArray
 
 from shipdrag_ros import __version__
@@ -58,53 +70,12 @@ _LATCHED_QOS = """\
 _LATCHED = {(topic.name, topic.type) for topic in OUTPUT_TOPICS if topic.latched}
 
 
-def metadata(recording_id: str, part: int) -> dict[str, str]:
-    """
-    Return which part of which recording a file is.
-    """
-    return {'version': __version__, 'recording_id': recording_id, 'part': str(part)}
-
-
-def attachment(name: str, text: str) -> mcap_records.Attachment:
+def attachment(name: str, text: str) -> Attachment:
     """
     Return the record of an attached text.
     """
     kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
-    return mcap_records.Attachment(
-        create_time=0, log_time=0, name=name, media_type=kind, data=text.encode()
-    )
-
-
-def schema(number: int, type_name: str) -> mcap_records.Schema:
-    """
-    Return the schema record of a type.
-
-    Raises
-    ------
-    BagError
-        If the definition of the type is not known.
-    """
-    if not types.is_known(type_name):
-        raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
-    text = types.definition(type_name).encode()
-    return mcap_records.Schema(id=number, name=type_name, encoding='ros2msg', data=text)
-
-
-def channel(number: int, topic: str, type_name: str, *, schema_id: int) -> mcap_records.Channel:
-    """
-    Return the channel record of a topic.
-    """
-    latched = (topic.rpartition('/')[2], type_name) in _LATCHED
-    return mcap_records.Channel(
-        id=number,
-        topic=topic,
-        message_encoding='cdr',
-        schema_id=schema_id,
-        metadata={
-            'offered_qos_profiles': _LATCHED_QOS if latched else '',
-            'topic_type_hash': types.type_hash(type_name),
-        },
-    )
+    return Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
 
 
 def as_bytes(*records: Any) -> bytes:
@@ -163,30 +134,6 @@ _PACKERS: dict[Compression, Callable[[bytes], bytes]] = {
 }
 
 
-def chunk_of(
-    records: bytes, first_ns: int, last_ns: int, compression: Compression
-) -> mcap_records.Chunk:
-    """
-    Return the record of a chunk.
-
-    Parameters
-    ----------
-    records
-        Of messages, as they stand in it.
-    first_ns, last_ns
-        Least and largest log time of these [ns since the epoch].
-    compression
-    """
-    return mcap_records.Chunk(
-        compression=compression.value,
-        data=_PACKERS[compression](records),
-        message_end_time=last_ns,
-        message_start_time=first_ns,
-        uncompressed_crc=crc32(records),
-        uncompressed_size=len(records),
-    )
-
-
 def content_of(number: int, message: EncodedMessage) -> bytes:
     """
     Return the content of the record of a message, by the number of its channel.
@@ -196,9 +143,68 @@ def content_of(number: int, message: EncodedMessage) -> bytes:
     return MESSAGE_HEAD.pack(number, 0, message.log_ns, publish_ns) + message.payload
 
 
+def index_of(
+    record: Attachment | Metadata, at: int, length: int
+) -> AttachmentIndex | MetadataIndex:
+    """
+    Return what an index says of a record at a place [bytes].
+    """
+    if isinstance(record, Metadata):
+        return MetadataIndex(at, length, record.name)
+    times, about = (record.log_time, record.create_time), (record.name, record.media_type)
+    return AttachmentIndex(at, length, *times, len(record.data), *about)
+
+
+def chunk_index(chunk: Chunk, at: int, length: int) -> ChunkIndex:
+    """
+    Return what an index says of a chunk at a place [bytes], but for its message indexes.
+    """
+    return ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=at,
+        compression=chunk.compression,
+        compressed_size=len(chunk.data),
+        message_end_time=chunk.message_end_time,
+        message_index_length=0,
+        message_index_offsets={},
+        message_start_time=chunk.message_start_time,
+        uncompressed_size=chunk.uncompressed_size,
+    )
+
+
+def statistics(kinds: Counter[type], counts: Counter[int], times_ns: Sequence[int]) -> Statistics:
+    """
+    Return what a summary says of a file.
+
+    Parameters
+    ----------
+    kinds
+        Declarations and indexes by their type.
+    counts
+        Messages by channel.
+    times_ns
+        Log times, the first and the last among them [ns].
+    """
+    return Statistics(
+        attachment_count=kinds[AttachmentIndex],
+        channel_count=kinds[Channel],
+        channel_message_counts=dict(counts),
+        chunk_count=kinds[ChunkIndex],
+        message_count=counts.total(),
+        message_end_time=max(times_ns, default=0),
+        message_start_time=min(times_ns, default=0),
+        metadata_count=kinds[MetadataIndex],
+        schema_count=kinds[Schema],
+    )
+
+
+class NameTakenError(BagError):
+    """A file of this name is there already."""
+
+
 class RecordWriter:
     """
-    Writes an MCAP file with an index; a context manager.
+    Writes an MCAP file; a context manager.
 
     Parameters
     ----------
@@ -212,11 +218,21 @@ class RecordWriter:
         Size of each chunk before it is packed [bytes]; 0: a 64th of all so far, within
         `CHUNK_RANGE`, so that a damage costs little and a long bag is read quickly.
 
+    Attributes
+    ----------
+    size_bytes
+        Written so far.
+
     Raises
     ------
+    NameTakenError
+        If the file exists.
     BagError
-        If the file exists or cannot be made.
+        If it cannot be made.
     """
+
+    indexed = True
+    """Whether each chunk is listed, for an index at the end; not of a file that grows."""
 
     def __init__(
         self,
@@ -233,24 +249,27 @@ class RecordWriter:
         self._chunk = bytearray()
         self._times = 0, 0  # first and last of the chunk [ns]
         self._entries: dict[int, list[int]] = {}  # of its index: time and offset, by channel
-        self._declared: dict[bytes, mcap_records.Schema | mcap_records.Channel] = {}
-        self._indexes: list[
-            mcap_records.ChunkIndex | mcap_records.AttachmentIndex | mcap_records.MetadataIndex
-        ] = []
+        self._declared: dict[bytes, Schema | Channel] = {}
+        self._indexes: list[ChunkIndex | AttachmentIndex | MetadataIndex] = []
         self._counts: Counter[int] = Counter()
-        self._unpacked = self._at = 0
+        self._times_ns: list[int] = []
+        self._unpacked = self.size_bytes = 0
         try:
-            self._file = open(self.path, 'xb', opener=private_opener)  # noqa: SIM115
+            # of one that grows, what could not be written must not be tried again on closing
+            buffering = -1 if self.indexed else 0
+            self._file = open(path, 'xb', buffering, opener=private_opener)  # noqa: SIM115
         except FileExistsError:
-            raise BagError(f'{str(path)!r} exists; choose another name or remove it') from None
+            raise NameTakenError(
+                f'{str(path)!r} exists; choose another name or remove it'
+            ) from None
         except OSError as error:
             raise BagError(
                 f'{str(path)!r} cannot be made: {error.strerror}; '
                 'give a name in a folder that is there and may be written'
             ) from error
-        self._write(MAGIC + as_bytes(mcap_records.Header(profile, LIBRARY)))
+        self._write(MAGIC + as_bytes(Header(profile, LIBRARY)))
 
-    def declare(self, channel: mcap_records.Channel, schema: mcap_records.Schema | None) -> int:
+    def declare(self, channel: Channel, schema: Schema | None) -> int:
         """
         Write a channel and its schema, unless they are there; return its number.
 
@@ -262,13 +281,13 @@ class RecordWriter:
         number = 0 if schema is None else self._number(schema)
         return self._number(replace(channel, schema_id=number))
 
-    def says(self, record: mcap_records.Schema | mcap_records.Channel) -> bool:
+    def says(self, record: Schema | Channel) -> bool:
         """
         Say whether exactly this was declared, with its number.
         """
         return self._declared.get(as_bytes(replace(record, id=0))) == record
 
-    def _number(self, record: mcap_records.Schema | mcap_records.Channel) -> int:
+    def _number(self, record: Schema | Channel) -> int:
         """Keep the number of a record where it is free, and give it another where not."""
         key = as_bytes(replace(record, id=0))
         if key not in self._declared:
@@ -304,24 +323,13 @@ class RecordWriter:
         if len(chunk) >= self._room:
             self._end_chunk()
 
-    def add_attachment(self, attached: mcap_records.Attachment) -> None:
+    def add(self, record: Attachment | Metadata) -> None:
         """
-        Write an attachment, before the first message if it is to survive a crash.
+        Write an attachment or metadata, before the first message if it is to survive a crash.
         """
-        about = attached.name, attached.media_type
-        times, record = (attached.log_time, attached.create_time), as_bytes(attached)
-        self._indexes.append(
-            mcap_records.AttachmentIndex(self._at, len(record), *times, len(attached.data), *about)
-        )
-        self._write(record)
-
-    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """
-        Write metadata.
-        """
-        record = as_bytes(mcap_records.Metadata(name, dict(values)))
-        self._indexes.append(mcap_records.MetadataIndex(self._at, len(record), name))
-        self._write(record)
+        written = as_bytes(record)
+        self._indexes.append(index_of(record, self.size_bytes, len(written)))
+        self._write(written)
 
     def close(self) -> None:
         """
@@ -336,11 +344,13 @@ class RecordWriter:
             return
         try:
             self._end_chunk()
-            self._write(as_bytes(mcap_records.DataEnd(0)))
-            summary = as_bytes(*self._declared.values(), *self._indexes, self._statistics())
-            start = self._at
+            self._write(as_bytes(DataEnd(0)))
+            listed = *self._declared.values(), *self._indexes
+            kinds = Counter(map(type, listed))
+            summary = as_bytes(*listed, statistics(kinds, self._counts, self._times_ns))
+            start = self.size_bytes
             # its checksum covers the footer too, up to itself
-            covered = summary + as_bytes(mcap_records.Footer(start, 0, 0))[:-4]
+            covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
             self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
             with self._errors_named():
                 self._file.flush()
@@ -352,15 +362,21 @@ class RecordWriter:
     def _end_chunk(self) -> None:
         if not self._chunk:
             return
-        chunk = chunk_of(bytes(self._chunk), *self._times, self._compression)
+        records, (first_ns, last_ns) = bytes(self._chunk), self._times
+        chunk = Chunk(
+            compression=self._compression.value,
+            data=_PACKERS[self._compression](records),
+            message_end_time=last_ns,
+            message_start_time=first_ns,
+            uncompressed_crc=crc32(records),
+            uncompressed_size=len(records),
+        )
         entries = {number: np.array(each, '<u8') for number, each in self._entries.items()}
         self._chunk.clear()
         self._entries.clear()
         self.add_chunk(chunk, entries)
 
-    def add_chunk(
-        self, chunk: mcap_records.Chunk, entries: Mapping[int, NDArray[np.uint64]]
-    ) -> None:
+    def add_chunk(self, chunk: Chunk, entries: Mapping[int, NDArray[np.uint64]]) -> None:
         """
         Write a chunk as it is, behind what was added before.
 
@@ -372,51 +388,30 @@ class RecordWriter:
             Log time [ns] and offset of each message in it, in turn, by channel.
         """
         self._end_chunk()
-        at, record = self._at, as_bytes(chunk)
+        at, record = self.size_bytes, as_bytes(chunk)
         self._write(record)
-        offsets = {}
+        if not self.indexed:
+            return
+        index = chunk_index(chunk, at, len(record))
         for number, each in entries.items():
-            offsets[number] = self._at
+            index.message_index_offsets[number] = self.size_bytes
             listed = each.tobytes()
             head = HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(listed))
             self._write(head + struct.pack('<HI', number, len(listed)) + listed)
             self._counts[number] += each.size // 2
-        self._indexes.append(
-            mcap_records.ChunkIndex(
-                chunk_length=len(record),
-                chunk_start_offset=at,
-                compression=chunk.compression,
-                compressed_size=len(chunk.data),
-                message_end_time=chunk.message_end_time,
-                message_index_length=self._at - at - len(record),
-                message_index_offsets=offsets,
-                message_start_time=chunk.message_start_time,
-                uncompressed_size=chunk.uncompressed_size,
-            )
-        )
+        index.message_index_length = self.size_bytes - at - len(record)
+        self._indexes.append(index)
+        self._times_ns += chunk.message_start_time, chunk.message_end_time
         self._unpacked += chunk.uncompressed_size
         least, most = CHUNK_RANGE
         self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
 
-    def _statistics(self) -> mcap_records.Statistics:
-        kinds = Counter(map(type, chain(self._declared.values(), self._indexes)))
-        chunks = [it for it in self._indexes if isinstance(it, mcap_records.ChunkIndex)]
-        return mcap_records.Statistics(
-            attachment_count=kinds[mcap_records.AttachmentIndex],
-            channel_count=kinds[mcap_records.Channel],
-            channel_message_counts=dict(self._counts),
-            chunk_count=kinds[mcap_records.ChunkIndex],
-            message_count=self._counts.total(),
-            message_end_time=max((it.message_end_time for it in chunks), default=0),
-            message_start_time=min((it.message_start_time for it in chunks), default=0),
-            metadata_count=kinds[mcap_records.MetadataIndex],
-            schema_count=kinds[mcap_records.Schema],
-        )
-
     def _write(self, data: bytes) -> None:
+        left = memoryview(data)
         with self._errors_named():
-            self._file.write(data)
-        self._at += len(data)
+            while left:
+                left = left[self._file.write(left) :]
+        self.size_bytes += len(data)
 
     @contextmanager
     def _errors_named(self) -> Iterator[None]:
@@ -443,6 +438,8 @@ class BagWriter(RecordWriter):
     recording_id, part
         Files of one recording carry the same id and are numbered from 0; by
         default the file is a recording of its own.
+    attachments
+        Text by name.
     """
 
     def __init__(
@@ -451,18 +448,22 @@ class BagWriter(RecordWriter):
         *,
         compression: Compression = Compression.ZSTD,
         chunk_bytes: int = 0,
-        recording_id: str | None = None,
+        recording_id: str = '',
         part: int = 0,
+        attachments: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         super().__init__(path, compression=compression, chunk_bytes=chunk_bytes)
         self._channels: dict[tuple[str, str], int] = {}
-        self.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
+        about = {'version': __version__, 'recording_id': recording_id or uuid4().hex}
+        self.add(Metadata(METADATA, {**about, 'part': str(part)}))
+        for name, text in attachments.items():
+            self.attach(name, text)
 
     def attach(self, name: str, text: str) -> None:
         """
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
-        self.add_attachment(attachment(name, text))
+        self.add(attachment(name, text))
 
     def register(self, topic: str, type_name: str) -> None:
         """
@@ -520,9 +521,22 @@ class BagWriter(RecordWriter):
 
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)
-        if key not in self._channels:
-            described = schema(0, type_name)
-            self._channels[key] = self.declare(
-                channel(0, topic, type_name, schema_id=0), described
-            )
+        if key in self._channels:
+            return self._channels[key]
+        if not types.is_known(type_name):
+            raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
+        latched = (topic.rpartition('/')[2], type_name) in _LATCHED
+        channel = Channel(
+            id=0,
+            topic=topic,
+            message_encoding='cdr',
+            schema_id=0,
+            metadata={
+                'offered_qos_profiles': _LATCHED_QOS if latched else '',
+                'topic_type_hash': types.type_hash(type_name),
+            },
+        )
+        text = types.definition(type_name).encode()
+        schema = Schema(id=0, name=type_name, encoding='ros2msg', data=text)
+        self._channels[key] = self.declare(channel, schema)
         return self._channels[key]

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -87,7 +88,9 @@ class CoastdownNode(LifecycleNode):
     """
 
     def __init__(self, *, context: Context, arguments: Sequence[str] = ()) -> None:
-        super().__init__(NAME, context=context)
+        super().__init__(
+            NAME, context=context, automatically_declare_parameters_from_overrides=True
+        )
         check_sections(arguments, self)
         self._node_parameters = NodeParameters(self)
         self._failure: ShipdragError | None = None
@@ -113,6 +116,16 @@ class CoastdownNode(LifecycleNode):
         self.create_timer(LOOK_S, self._look, clock=steady)
         add_services(self, lambda: self._session)
         guard_services(self.services, self._service_change_state, self.get_logger().warning)
+
+    def declare_parameters(
+        self, namespace: str, parameters: list[Any], ignore_override: bool = False
+    ) -> Any:
+        """
+        Declare as rclpy does, and values without a type too, as `[]` is, for us to refuse.
+        """
+        for _, value, descriptor in parameters:
+            descriptor.dynamic_typing |= value is None
+        return super().declare_parameters(namespace, parameters, ignore_override)
 
     def start(self) -> None:
         """

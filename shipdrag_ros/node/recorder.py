@@ -346,17 +346,13 @@ class Recorder:
         """
         Take a message as received, on a topic of the namespace.
         """
-        named = message._replace(topic=f'{self._namespace}/{message.topic}')
-        self._ring.add(named)
-        if self._recording is not None:
-            self._recording.put(named)
+        self._keep(message._replace(topic=f'{self._namespace}/{message.topic}'))
 
     def request(self, message: OutputMessage, receive_ns: int) -> None:
         """
-        Take a message of the node that a replay obeys, as it does an input.
+        Take a message of the node that a replay obeys, as it does an input; it makes a file too.
         """
-        self._ring.add(_caused(message, receive_ns))
-        self.output(message, receive_ns)
+        self._keep(_caused(message, receive_ns))
 
     def output(self, message: OutputMessage, receive_ns: int) -> None:
         """
@@ -364,6 +360,11 @@ class Recorder:
         """
         if self._recording is not None:
             self._recording.put(_caused(message, receive_ns), begins=False)
+
+    def _keep(self, message: EncodedMessage) -> None:
+        self._ring.add(message)
+        if self._recording is not None:
+            self._recording.put(message)
 
     def removed(self) -> list[Removed]:
         """

@@ -308,7 +308,8 @@ class NodeParameters:
     Parameters
     ----------
     node
-        Whose overrides are read, so that unknown names and values without a type are seen.
+        Made with `automatically_declare_parameters_from_overrides`, so that unknown names and
+        values without a type are seen.
 
     Raises
     ------
@@ -319,12 +320,14 @@ class NodeParameters:
     def __init__(self, node: Node) -> None:
         self._node = node
         self.fixed = False
-        given = {
-            name: parameter.value
-            for name, parameter in node._parameter_overrides.items()
-            if name not in ROS_OWN and not name.startswith('qos_overrides.')
-        }
+        given = {name: each.value for name, each in node.get_parameters_by_prefix('').items()}
+        own = {name: given.pop(name) for name in ROS_OWN}
+        if bad := [f'{name}: {own[name]!r}' for name in own if not isinstance(own[name], bool)]:
+            raise ParameterError(SUBJECT, [f'{each}, expected true or false' for each in bad])
+        given = {name: given[name] for name in given if not name.startswith('qos_overrides.')}
         values = NodeSettings.from_mapping(given, subject=SUBJECT).to_mapping()
+        for name in given:
+            node.undeclare_parameter(name)
         for name, value in values.items():
             node.declare_parameter(name, value, _descriptor(name), ignore_override=True)
         node.add_on_set_parameters_callback(self._on_set)

@@ -242,6 +242,13 @@ class LogTable:
             f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
         )
 
+    def about(self, place: int) -> tuple[str, str]:
+        """
+        Return the name of a column and the unit in the line below it; '' where none is there.
+        """
+        name, below = ([*(each or ())][place : place + 1] for each in (self.header, self.units))
+        return ''.join(name), ''.join(below)
+
     def rows(self, progress: PartDone | None = None, *, most: int = ROWS) -> Iterator[TableRows]:
         """
         Yield the rows below the header, some at a time; lines without any cell are skipped.

@@ -56,7 +56,7 @@ def test_a_parameter_that_is_gone_is_left_out_of_a_bag_and_an_error_in_a_file(
         for name, text in run.attachments.items():
             gone = 'wake_s: 3.0\nestimator: warped\n' if name == 'parameters.yaml' else ''
             kept = [it for it in text.splitlines() if not gone or not it.startswith('estimator')]
-            bag.add_attachment(attachment(name, '\n'.join([*kept, gone])))
+            bag.add(attachment(name, '\n'.join([*kept, gone])))
         with (FOLDER / 'recorded_by_0.1.0.mcap').open('rb') as file:
             for schema, channel, message in make_reader(file).iter_messages():
                 number, times = (

@@ -52,6 +52,9 @@ def attachments(bag: Path) -> dict[str, str]:
         ('depth.type', 'std_msgs/msg/Float64', 'expected one of sensor_msgs/msg/Range'),
         ('ship_file', '', 'expected the path of a ship file'),
         ('forecast_speeds', [], 'forecast_speeds: None, expected a list'),
+        ('windows_s', [], 'windows_s: unknown key'),
+        ('use_sim_time', [], 'use_sim_time: None, expected true or false'),
+        ('use_sim_time', 3, 'use_sim_time: 3, expected true or false'),
     ],
 )
 def test_bad_parameters_are_user_errors(

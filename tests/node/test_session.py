@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from shipdrag_ros.bags import StopMark, open_runs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.messages import EventKind, OutputMessage, Source, encode, read_event
 from shipdrag_ros.node import session
@@ -128,6 +129,14 @@ def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk:
     (bag,) = desk.bags()
     kinds = [read_event(row.payload).kind for row in bag if row.topic == f'{NODE}/events']
     assert kinds == [EventKind.ENGINE_STOPPED] * 2
+
+
+def test_a_stop_that_is_told_before_any_input_makes_a_file(desk: Desk) -> None:
+    desk.session.engine_stopped(START_NS)
+    (bag,) = desk.bags()
+    assert [(row.topic, row.log_ns) for row in bag] == [(f'{NODE}/events', START_NS)]
+    (run,) = open_runs([desk.directory])
+    assert [type(each) for each in run.inputs()] == [StopMark]
 
 
 def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:

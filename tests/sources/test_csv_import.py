@@ -66,6 +66,61 @@ def samples(path: Path) -> Block:
     return concatenate([item for item in run.inputs() if isinstance(item, Block)])
 
 
+_PAIR = '{}\n' + ''.join(f'{t},{54.1 + 1e-5 * t:.5f},{7.9 + 1e-5 * t:.5f}\n' for t in range(9))
+
+
+@pytest.mark.parametrize(
+    ('header', 'mapped'),
+    [
+        ('t,lat,lon', 'position=lat,lon'),
+        ('t,Latitude (deg),Longitude (deg)', 'position=Latitude (deg),Longitude (deg)'),
+        ('t,fix_a [deg],fix_b [deg]', 'position=fix_a [deg],fix_b [deg]'),
+        ('t,a,b', 'position=a,b:deg'),
+    ],
+)
+def test_a_position_in_degrees_is_one_without_a_unit_too(
+    import_text: Import, header: str, mapped: str
+) -> None:
+    _, block = import_text(_PAIR.format(header), mapped, time='t')
+    assert set(block.channel) == {Channel.POSITION_GEODETIC}
+    assert block.value[0].tolist() == [54.1, 7.9]
+
+
+@pytest.mark.parametrize('header', ['t,a,b', 't,lon,lat', 't,lat,b', 't,lat [deg],lon [m]'])
+def test_values_that_may_be_degrees_are_asked_about(import_text: Import, header: str) -> None:
+    given = ','.join(header.split(',')[1:])
+    with pytest.raises(ImportDataError, match=r'may be degrees; give .*:deg'):
+        import_text(_PAIR.format(header), f'position={given}', time='t')
+
+
+@pytest.mark.parametrize(
+    ('header', 'given', 'first'),
+    [
+        ('t,a,b', 'a,b:m', [54.1, 7.9]),
+        ('t,x,y', 'x,y', [54.1, 7.9]),
+        ('t,a_m,b_m', 'a_m,b_m', [54.1, 7.9]),
+        ('t,a_km,b_km', 'a_km,b_km', [54100.0, 7900.0]),
+    ],
+)
+def test_metres_stay_metres(
+    import_text: Import, header: str, given: str, first: list[float]
+) -> None:
+    _, block = import_text(_PAIR.format(header), f'position={given}', time='t')
+    assert set(block.channel) == {Channel.POSITION}
+    np.testing.assert_allclose(block.value[0], first)
+    far, block = import_text('t,a,b\n0,100,500000\n1,101,500000', 'position=a,b', time='t')
+    assert far.written == {'position': 2}
+    assert set(block.channel) == {Channel.POSITION}
+
+
+@pytest.mark.parametrize('header', ['t,ve [m/s],vn [kn]', 't,ve [m/s],vn'])
+def test_components_of_which_not_both_state_one_unit_are_asked_about(
+    import_text: Import, header: str
+) -> None:
+    with pytest.raises(ImportDataError, match=r'unit not known; .*--map'):
+        import_text(f'{header}\n' + ''.join(f'{t},3,4\n' for t in range(20)), speed_unit='kn')
+
+
 def test_further_instruments_come_in_as_the_first(import_text: Import) -> None:
     maps = (
         'speed_through_water=a',

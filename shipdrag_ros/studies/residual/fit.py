@@ -461,12 +461,14 @@ def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
         return fit_form(FORMS[form], hulls, values)
     if form != AUTO:
         raise DataError('form', [f'{form!r}, expected one of {", ".join((*FORMS, AUTO))}'])
-    fits = [
-        fit_form(each, hulls, values)
-        for each in FORMS.values()
-        if hulls.lcb is not None or not each.needs_lcb
-    ]
-    return min(fits, key=lambda found: (found.left_out, found.fit.variance))
+    untried = [each for each in FORMS.values() if each.needs_lcb and hulls.lcb is None]
+    fits = [fit_form(each, hulls, values) for each in FORMS.values() if each not in untried]
+    best = min(fits, key=lambda found: (found.left_out, found.fit.variance))
+    why = (
+        f'The form of {each.name.capitalize()} was not tried: it needs the column lcb.'
+        for each in untried
+    )
+    return replace(best, notes=(*best.notes, *why))
 
 
 def leave_hulls_out(

@@ -172,7 +172,11 @@ def test_without_lcb_sakhnovsky_is_not_tried(fleet: Fleet, resistance: Resistanc
     hulls = fleet(30, 14)
     value = resistance(hulls)
     bare = replace(hulls, lcb=None)
-    assert fit_residual(bare, value, form='auto').form.name == 'sirotina'
+    found = fit_residual(bare, value, form='auto')
+    assert found.form.name == 'sirotina'
+    assert found.notes[-1] == 'The form of Sakhnovsky was not tried: it needs the column lcb.'
+    assert not fit_residual(bare, value, form='sirotina').notes  # nobody asked for it
+    assert 'not tried' not in ' '.join(fit_residual(hulls, value, form='auto').notes)
     with pytest.raises(DataError, match='lcb: missing'):
         fit_residual(bare, value, form='sakhnovsky')
     with pytest.raises(DataError, match="'holtrop', expected one of sakhnovsky, sirotina, auto"):

@@ -154,6 +154,17 @@ def has_decimal_commas(cells: Iterable[str]) -> bool:
     return bool(commas > 1 and parted and 10 * commas >= plain and 50 * points <= commas)
 
 
+def coordinate_readers(latitudes: Sequence[str], longitudes: Sequence[str]) -> list[CellReader]:
+    """
+    Return what reads latitudes and longitudes, by how some of them are written.
+    """
+    minutes = are_in_minutes(latitudes, longitudes)
+    return [
+        CellReader(comma=not minutes and has_decimal_commas(cells), side=side, minutes=minutes)
+        for cells, side in ((latitudes, 'NS'), (longitudes, 'EW'))
+    ]
+
+
 def are_in_minutes(latitudes: Iterable[str], longitudes: Iterable[str]) -> bool:
     """
     Say whether coordinates are written as ddmm.mmmm.
@@ -394,21 +405,15 @@ def _clock_ns(text: str, whole: str) -> tuple[int, tzinfo | None]:
     if found is None:
         raise BadCell('no time of day', whole)
     hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
-    if found[5]:
-        if not 1 <= hour <= 12:
-            raise BadCell('no time of day', whole)
+    if found[5] and 1 <= hour <= 12:
         hour = hour % 12 + (12 if found[5].lower() == 'pm' else 0)
-    if hour > 23 or minute > 59 or second > 59:
+    elif found[5] or hour > 23:
         raise BadCell('no time of day', whole)
+    if minute > 59 or second > 59:
+        raise BadCell('no time of day', whole)
+    zone = zone_of(found[6] if found[6][0] in '+-' else 'UTC') if found[6] else None
     fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
-    zone = found[6]
-    if not zone:
-        known = None
-    elif zone[0] in '+-':
-        known = zone_of(zone)
-    else:
-        known = UTC
-    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns, known
+    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns, zone
 
 
 # a count of seconds below this, March 1973, is no date

@@ -80,6 +80,8 @@ class InputColumns:
         In which they stand, as `--map` takes them.
     form
         How several make one value.
+    stated
+        Whether a unit is stated; where not, they are SI.
     """
 
     channel: Channel
@@ -87,6 +89,7 @@ class InputColumns:
     factors: tuple[float, ...]
     units: tuple[str, ...] = ()
     form: Form = Form.PLAIN
+    stated: bool = True
 
     @property
     def name(self) -> str:
@@ -142,7 +145,8 @@ def parse_input(text: str) -> InputColumns:
     from ahead. A heading in `compass` is in degrees clockwise from north. A unit
     given once holds for all, `position=x,y:km` as much as `position=x:km,y`; several are
     taken as written, `position=x:km,y:m`. A position in `deg` is
-    latitude and longitude. Without a unit the values are SI, a pitch is a ratio.
+    latitude and longitude; so is one without a unit whose columns say so. Others without
+    a unit are SI, a pitch is a ratio.
     `speed_through_water_2` and the like are further instruments of a kind.
 
     Raises
@@ -214,6 +218,7 @@ def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) 
         tuple(known[unit] for unit in units),
         units,
         form,
+        stated=bool(given),
     )
 
 

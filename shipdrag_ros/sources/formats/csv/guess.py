@@ -11,7 +11,7 @@ not used.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import tzinfo
 from pathlib import Path
@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import ALL_MOTION, FURTHER, Float64
+from shipdrag_ros.samples import ALL_MOTION, FURTHER, Channel, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
     RowClock,
-    are_in_minutes,
+    coordinate_readers,
     has_decimal_commas,
     is_date,
     is_midnight,
@@ -118,6 +118,7 @@ def unit_of(values: Float64, track_m_s: Float64, stated: str = '') -> str:
 
 
 _SAMPLE_ROWS = 20_000
+_FEW_ROWS = 1000  # that show whether positions may be degrees
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,8 @@ class FirstRows:
     Parameters
     ----------
     table
+    most
+        How many.
 
     Attributes
     ----------
@@ -150,17 +153,15 @@ class FirstRows:
         Columns by what their names say they are, in their order.
     """
 
-    def __init__(self, table: LogTable) -> None:
-        assert table.header is not None
+    def __init__(self, table: LogTable, most: int = _SAMPLE_ROWS) -> None:
         self.table = table
         self.path = str(table.path)
-        self.header = table.header
+        self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
-        self._rows = table.first_rows(_SAMPLE_ROWS)
-        for place, name in enumerate(table.header):
-            below = table.units[place] if table.units and place < len(table.units) else ''
-            role, unit = role_and_unit(name, below)
-            key = name if table.header.count(name) == 1 else str(place + 1)
+        self._rows = table.first_rows(most)
+        for place, name in enumerate(self.header):
+            role, unit = role_and_unit(*table.about(place))
+            key = name if self.header.count(name) == 1 else str(place + 1)
             if role:
                 self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
 
@@ -182,10 +183,10 @@ class FirstRows:
         """
         Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
         """
-        minutes = are_in_minutes(*map(self.texts, places))
+        readers = coordinate_readers(*map(self.texts, places))
         return [
-            CellReader(side=side, minutes=minutes).all(self._rows.columns[place], {})
-            for place, side in zip(places, ('NS', 'EW'), strict=True)
+            read.all(self._rows.columns[place], {})
+            for read, place in zip(readers, places, strict=True)
         ]
 
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
@@ -228,16 +229,15 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
         If there is none.
     """
     days, times = rows.roles.get('date', []), rows.roles.get('time', [])
-    dated = [each for each in (*times, *days) if _holds_date(rows, each)]
+    dated = [each for each in (*times, *days) if _holds(rows, each, date=True)]
     if dated:
         clock = next((each for each in times if each not in dated), None)
         clocks = [parts(text)[1] for text in rows.texts(dated[0].place)]
         bare = not any(clocks[:5])
         if clock is not None and not bare:  # a spreadsheet gives a date a midnight
-            bare = _holds_time_of_day(rows, clock) and all(map(is_midnight, clocks))
-        if bare and clock is not None:
-            return TimeColumn((dated[0].key, clock.key), NANOSECONDS['s'])
-        return TimeColumn((dated[0].key,), NANOSECONDS['s'])
+            bare = _holds(rows, clock, date=False) and all(map(is_midnight, clocks))
+        names = (dated[0].key, clock.key) if bare and clock is not None else (dated[0].key,)
+        return TimeColumn(names, NANOSECONDS['s'])
     if not times:
         header = ', '.join(map(repr, rows.header))
         raise ImportDataError(
@@ -250,14 +250,10 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
     return _counted(rows, column, notes)
 
 
-def _holds_date(rows: FirstRows, column: NamedColumn) -> bool:
-    texts = [text for text in rows.texts(column.place)[:200] if text]
-    return bool(texts) and is_date(texts[0]) and bool(parts(texts[0])[0])
-
-
-def _holds_time_of_day(rows: FirstRows, column: NamedColumn) -> bool:
-    texts = [text for text in rows.texts(column.place)[:200] if text]
-    return bool(texts) and is_date(texts[0]) and not parts(texts[0])[0]
+def _holds(rows: FirstRows, column: NamedColumn, *, date: bool) -> bool:
+    """Say whether a column holds dates, or times of day alone."""
+    text = next(filter(None, rows.texts(column.place)[:200]), '')
+    return is_date(text) and bool(parts(text)[0]) is date
 
 
 def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColumn:
@@ -269,23 +265,21 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
     values = values[np.isfinite(values)]
     step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
     small = len(values) > 0 and abs(values[0]) < 1e11
+    why, typed = '', shlex.quote(column.typed)
     if column.unit:
-        raise ImportDataError(
-            f'{rows.path!r}: the time {column.key!r} is said to be in '
-            f'{column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write it in one of '
-            'them, or give --rate HZ'
+        why = (
+            f'is said to be in {column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write '
+            'it in one of them, or give --rate HZ'
         )
-    if small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
-        raise ImportDataError(
-            f'{rows.path!r}: the time {column.key!r} goes by {step:.3g} from '
-            f'{values[0]:.8g}, as the days of a spreadsheet do. Save it as dates; or, if they '
-            f'are seconds, give --time {shlex.quote(column.typed)}:s'
+    elif small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
+        why = (
+            f'goes by {step:.3g} from {values[0]:.8g}, as the days of a spreadsheet do. Save it '
+            f'as dates; or, if they are seconds, give --time {typed}:s'
         )
-    if small and step >= 10.0:
-        raise ImportDataError(
-            f'{rows.path!r}: the unit of the time {column.key!r} is not known; '
-            f'its steps are {step:g}. Give --time {shlex.quote(column.typed)}:ms, or :s'
-        )
+    elif small and step >= 10.0:
+        why = f'has no known unit; its steps are {step:g}. Give --time {typed}:ms, or :s'
+    if why:
+        raise ImportDataError(f'{rows.path!r}: the time {column.key!r} {why}')
     if small:
         notes.append(f'The time {column.key!r} states no unit and is taken as s.')
     return TimeColumn((column.key,), NANOSECONDS['s'])
@@ -316,7 +310,15 @@ PLAIN_COLUMNS = {
 
 _TURN = 6.4  # no angle in rad is larger
 _NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
-_SPEED_UNIT = 'kn'  # in what is to be typed
+_LENGTHS = frozenset(('m', 'km', 'ft', 'nmi'))
+_ANGLES = ('rad', 'deg')
+# the other inputs, and their likely units by the roles of their columns
+_OTHERS: Mapping[str, Mapping[str, str]] = {
+    'rudder': {'rudder': 'deg'},
+    'wind_apparent': {'aws': 'kn', 'awa': 'deg'},
+    'shaft': {'shaft': 'rpm'},
+    'depth': {'depth': 'm'},
+}
 
 
 @dataclass
@@ -416,7 +418,8 @@ class _Guesser:
         typed = ','.join(f'{each.typed}:{unit}' for each, unit in zip(columns, units, strict=True))
         if len(set(units)) == 1:  # given once it holds for all
             typed = typed.replace(f':{units[0]},', ',')
-        speeds = f'--speed-unit {_SPEED_UNIT} or m/s, or ' if _SPEED_UNIT in units else ''
+        bare = {unit for each, unit in zip(columns, units, strict=True) if not each.unit}
+        speeds = '--speed-unit kn or m/s, or ' if bare & SPEED_UNITS.keys() else ''
         self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
     def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
@@ -456,30 +459,33 @@ class _Guesser:
 
     def by_names(self, time: TimeColumn | None) -> None:
         self._position(self._rows.seconds(time))
-        self._speed('stw', 'speed_through_water')
-        if not self._speed('sog', 'speed_over_ground'):
-            self._components()
+        self._speed('speed_through_water', 'kn', 'stw')
+        if not self._speed('speed_over_ground', 'kn', 'sog'):
+            self._speed('speed_over_ground', 'm/s', 'east', 'north')
         self._heading()
-        self._alone('rudder', 'deg')
-        self._wind()
-        self._alone('shaft', 'rpm')
-        self._alone('depth', 'm')
+        for name, likely in _OTHERS.items():
+            columns = self._all(likely)
+            if not columns:
+                continue
+            units = [
+                self._unit(each, likely[role]) for each, role in zip(columns, likely, strict=True)
+            ]
+            try:
+                self._take(name, columns, units)
+            except ImportDataError:  # of none, or of another quantity
+                asked = [
+                    u if u and unit == 'deg' else unit
+                    for u, unit in zip(units, likely.values(), strict=True)
+                ]
+                self._ask(name, columns, asked)
 
-    def _alone(self, name: str, likely: str) -> None:
-        column = self._one(name)
-        if column is None:
-            return
-        unit = self._angle_unit(column) if name == 'rudder' else column.unit
-        try:
-            self._take(name, [column], [unit])
-        except ImportDataError:  # of none, or of another quantity
-            self._ask(name, [column], [likely])
+    def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
+        """Return the columns of some roles, none where one is missing."""
+        columns = [self._one(role) for role in roles]
+        return [] if None in columns else [each for each in columns if each is not None]
 
     def _position(self, time_s: Float64 | None) -> None:
-        latitude, longitude = self._one('lat'), self._one('lon')
-        x, y = self._one('x'), self._one('y')
-        if latitude is not None and longitude is not None:
-            both = [latitude, longitude]
+        if both := self._all(('lat', 'lon')):
             other = next((each.unit for each in both if each.unit in _NO_COORDINATES), '')
             if other:
                 keys = ', '.join(repr(each.key) for each in both)
@@ -489,65 +495,48 @@ class _Guesser:
             if time_s is not None:
                 values = self._rows.coordinates([each.place for each in both])
                 self._track = track_speed(time_s, *values)
-        elif x is not None and y is not None:
-            if x.unit != y.unit or x.unit not in ('m', 'km', 'ft', 'nmi'):
-                self._ask('position', [x, y], ['m', 'm'])
+        elif both := self._all(('x', 'y')):
+            units = {each.unit for each in both}
+            if len(units) > 1 or not units <= _LENGTHS:
+                self._ask('position', both, ['m', 'm'])
                 return
-            self._take('position', [x, y], [x.unit, y.unit])
-            if time_s is not None and x.unit == 'm':
-                self._track = plane_speed(time_s, *map(self._rows.values, (x.place, y.place)))
+            self._take('position', both, [each.unit for each in both])
+            if time_s is not None and units == {'m'}:
+                x, y = (self._rows.values(each.place) for each in both)
+                self._track = plane_speed(time_s, x, y)
 
-    def _speed(self, role: str, name: str) -> bool:
-        column = self._one(role)
-        if column is None:
+    def _speed(self, name: str, likely: str, *roles: str) -> bool:
+        """Take a speed, of one column or of two components; say whether it was."""
+        columns = self._all(roles)
+        if not columns:
             return False
-        values = self._rows.values(column.place)
-        unit = self._unit_of_speed(column)
+        keys = ', '.join(repr(each.key) for each in columns)
+        parts = [self._rows.values(each.place) for each in columns]
+        values = np.hypot(*parts) if parts[1:] else parts[0]
+        said = {each.unit for each in columns if each.unit} or {self._speed_unit} - {''}
+        if len(said) > 1 or not said <= SPEED_UNITS.keys():
+            self._ask(name, columns, [likely] * len(columns))
+            return False
+        unit = ''.join(said)
         seen = '' if self._track is None else unit_of(values, self._track, unit)
         if unit and seen and seen != unit:
             why = f'is said to be in {unit}, and agrees with the positions in {seen}'
-            self._doubt(
-                f'{column.key!r} {why}; --map '
-                f'{shlex.quote(f"{name}={column.typed}:{unit}")}, or {seen}'
-            )
+            self._ask(name, columns, [unit] * len(columns), why=why, other=seen)
             return False
-        if not (unit or seen) or (column.unit and not unit):
-            self._ask(name, [column], [_SPEED_UNIT])
+        if len({bool(each.unit) for each in columns}) > 1:  # one of both is said, and no more
+            unit = ''
+        if not (unit or seen):
+            self._ask(name, columns, [likely] * len(columns))
             return False
         if not unit:
             self.found.notes.append(
-                f'{column.key!r} states no unit; it agrees with the way between the positions in '
-                f'{seen}.'
+                f'{keys}: no unit is stated; in {seen} it agrees with the way between the '
+                'positions.'
             )
-        self._take(name, [column], [unit or seen])
+        self._take(name, columns, [unit or seen] * len(columns))
         if self._track is None:  # the other speed is compared with this one
             self._track = values * SPEED_UNITS[unit or seen]
         return True
-
-    def _unit_of_speed(self, column: NamedColumn) -> str:
-        """Return the unit that is stated or given; '' for none, or one of no speed."""
-        if column.unit:
-            return column.unit if column.unit in SPEED_UNITS else ''
-        return self._speed_unit
-
-    def _components(self) -> None:
-        east, north = self._one('east'), self._one('north')
-        if east is None or north is None:
-            return
-        unit = east.unit if east.unit == north.unit else ''
-        if not unit and self._track is not None:
-            speed = np.hypot(*map(self._rows.values, (east.place, north.place)))
-            unit = unit_of(speed, self._track)
-            if unit:
-                self.found.notes.append(
-                    f'{east.key!r}, {north.key!r} agree with the way between the positions in '
-                    f'{unit}.'
-                )
-        unit = unit or self._speed_unit
-        if unit in SPEED_UNITS:
-            self._take('speed_over_ground', [east, north], [unit, unit])
-        else:
-            self._ask('speed_over_ground', [east, north], ['m/s', 'm/s'])
 
     def _heading(self) -> None:
         column = self._one('heading')
@@ -558,7 +547,7 @@ class _Guesser:
             self.found.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
             )
-        elif self._angle_unit(column) == 'deg':
+        elif self._unit(column, 'deg') == 'deg':
             self._take('heading', [column], [COMPASS])
             self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:
@@ -566,20 +555,13 @@ class _Guesser:
             why = 'whether it is yaw or compass, or its unit, is not known'
             self._ask('heading', [column], [unit], why=why, other='rad deg compass')
 
-    def _wind(self) -> None:
-        speed, angle = self._one('aws'), self._one('awa')
-        if speed is None or angle is None:
-            return
-        unit, turn = self._unit_of_speed(speed), self._angle_unit(angle)
-        if unit and turn in ('deg', 'rad'):
-            self._take('wind_apparent', [speed, angle], [unit, turn])
-        else:
-            turn = turn if turn in ('deg', 'rad') else 'deg'
-            self._ask('wind_apparent', [speed, angle], [_SPEED_UNIT, turn])
-
-    def _angle_unit(self, column: NamedColumn) -> str:
-        """Return the unit that is stated, or that the values show; '' for neither."""
-        return column.unit or ('deg' if self._rows.largest(column.place) > _TURN else '')
+    def _unit(self, column: NamedColumn, likely: str) -> str:
+        """Return the unit that is stated, given, or shown by the values; '' for none."""
+        if column.unit:
+            return '' if likely == 'deg' and column.unit not in _ANGLES else column.unit
+        if likely in SPEED_UNITS:
+            return self._speed_unit
+        return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''
 
     def nothing(self) -> str:
         """Say that nothing that moves is known, and what to type."""
@@ -590,6 +572,36 @@ class _Guesser:
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
         )
         return f'{path!r} gives no speed and no position in a unit that is known: {why}'
+
+
+def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
+    """
+    Return given columns, those of a position without a unit in the unit that its columns say.
+
+    Raises
+    ------
+    ImportDataError
+        If they may be degrees, and do not say it.
+    """
+    if mapped.stated or mapped.channel.kind is not Channel.POSITION:
+        return mapped
+    rows, places = FirstRows(table, _FEW_ROWS), [table.column(name) for name in mapped.names]
+    said = [role_and_unit(*table.about(place)) for place in places]
+    roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
+    units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
+    if len(units) == 1:
+        return columns_of(mapped.name, mapped.names, [*units] * 2)
+    beyond = any(
+        np.any(np.isnan(degrees) & np.isfinite(rows.values(place)))
+        for place, degrees in zip(places, rows.coordinates(places), strict=True)
+    )
+    if roles == ['x', 'y'] or (beyond and not {'lat', 'lon'} & {*roles}):
+        return mapped
+    text = f'{mapped.name}={",".join(mapped.names)}'
+    raise ImportDataError(
+        f'--map {shlex.quote(text)}: these may be degrees; give {shlex.quote(f"{text}:deg")} '
+        f'for latitude and longitude, or {shlex.quote(f"{text}:m")}'
+    )
 
 
 def is_table(path: Path) -> bool:

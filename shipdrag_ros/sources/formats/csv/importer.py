@@ -30,8 +30,8 @@ from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
     RowClock,
-    are_in_minutes,
     combined,
+    coordinate_readers,
     has_decimal_commas,
     zone_of,
 )
@@ -48,6 +48,7 @@ from shipdrag_ros.sources.formats.csv.guess import (
     guess,
     guessed_time,
     is_table,
+    placed,
     with_dates,
 )
 from shipdrag_ros.sources.log import (
@@ -358,18 +359,12 @@ def _readers(
     """Return what reads the cells of each column, as they are written in the first rows."""
     written = [cells for cells in sample.columns if not isinstance(cells, np.ndarray)]
     comma = has_decimal_commas(chain.from_iterable(written))
-    found = []
-    for columns, here in zip(inputs, places, strict=True):
-        readers = [CellReader(comma=comma)] * len(here)
-        if columns.channel.kind is Channel.POSITION_GEODETIC:
-            cells = [sample.texts(place) for place in here]
-            minutes = are_in_minutes(*cells)
-            readers = [
-                CellReader(comma=not minutes and has_decimal_commas(each), side=s, minutes=minutes)
-                for each, s in zip(cells, ('NS', 'EW'), strict=True)
-            ]
-        found.append(readers)
-    return found
+    return [
+        coordinate_readers(*map(sample.texts, here))
+        if columns.channel.kind is Channel.POSITION_GEODETIC
+        else [CellReader(comma=comma)] * len(here)
+        for columns, here in zip(inputs, places, strict=True)
+    ]
 
 
 def _score(head: Head) -> float:
@@ -390,7 +385,7 @@ def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
     if not mapped:
         speed_unit = options.get('speed_unit', '')
         return guess(table, time=time, counted=counted, speed_unit=speed_unit)
-    found = Guess([parse_input(text) for text in mapped], time)
+    found = Guess([placed(table, parse_input(text)) for text in mapped], time)
     for name, count in Counter(each.name for each in found.inputs).items():
         if count > 1:
             raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
@@ -430,7 +425,8 @@ FORMAT = Format(
             'column (name, or number from 1) of an input; more than once for more inputs. '
             'position and wind_apparent take two, and a unit given once holds for both: '
             'position=x,y:km is position=x:km,y:km. A position in deg is latitude and longitude: '
-            'position=lat,lon:deg. speed_over_ground takes two where they are its components. '
+            'position=lat,lon:deg, as one without a unit whose columns have such names. '
+            'speed_over_ground takes two where they are its components. '
             'Units: speeds m/s kn km/h ft/s mph, lengths m km ft nmi, angles rad deg, of a '
             'heading also compass (deg clockwise from north), shaft rad/s rpm rev/s, pitch ratio '
             '%% rad deg (default: the first of each); wind_apparent=AWS:kn,AWA:deg is speed and '
