@@ -18,6 +18,13 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]
     return [f'| {" | ".join(map(str, line))} |' for line in lines]
 
 
+def titled(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """
+    Return the lines of a table under its title.
+    """
+    return ['', title, '', *table(columns, rows)]
+
+
 def put(page: Path, blocks: Mapping[str, str]) -> None:
     """
     Write into a page what stands between `<!-- NAME -->` and `<!-- end NAME -->`.
