@@ -272,11 +272,16 @@ def default_line(record: Record, published: Estimate, out: Path) -> list[str]:
     """
     Return what the default estimator gives beside the published problem.
     """
-    default = estimated(record, out, estimator='one', order_max=Parameters().order_max)
+    (default,) = replayed(
+        record, out, estimator='one', order_max=Parameters().order_max
+    ).coastdowns
     cells = [
         '<br>'.join([f'{each.estimator}, {limits(each)}', *(s for *_, s in figures(each, record))])
-        for each in (published, default)
+        for each in (published, default.estimate)
+        if each is not None
     ]
+    if default.estimate is None:
+        cells.append(f'none: {default.failure}')
     return [record.name, *cells]
 
 
