@@ -41,23 +41,30 @@ def titled(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]])
     return ['', title, '', *table(columns, rows)]
 
 
-def put(page: Path, blocks: Mapping[str, str]) -> None:
+def filled(text: str, blocks: Mapping[str, str]) -> str:
     """
-    Write into a page what stands between `<!-- NAME -->` and `<!-- end NAME -->`.
+    Return a page with what stands between `<!-- NAME -->` and `<!-- end NAME -->` replaced.
 
     Raises
     ------
     ValueError
         If the page lacks the markers of a block.
     """
-    text = page.read_text(encoding='utf-8')
     for name, made in blocks.items():
         begin, end = f'<!-- {name} -->\n', f'\n<!-- end {name} -->'
         before, found, rest = text.partition(begin)
         _, closed, after = rest.partition(end)
         if not (found and closed):
-            raise ValueError(f'{page}: no {begin.strip()} .. {end.strip()}')
+            raise ValueError(f'no {begin.strip()} .. {end.strip()} on the page')
         text = f'{before}{begin}{made}{end}{after}'
+    return text
+
+
+def put(page: Path, blocks: Mapping[str, str]) -> None:
+    """
+    Write blocks into a page; see `filled`.
+    """
+    text = filled(page.read_text(encoding='utf-8'), blocks)
     page.write_text(text, encoding='utf-8')
 
 
