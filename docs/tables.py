@@ -3,8 +3,7 @@
 Write tables of the docs from the code.
 
 `python docs/tables.py` rewrites what stands between the markers in docs/ros.md, docs/effects.md,
-docs/model.md, docs/results/effects.txt and regimes_numbers.txt; a test fails while the two
-differ.
+docs/results/priors.md, effects.txt and regimes_numbers.txt; a test fails while the two differ.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
 EFFECTS_MORE = DOCS / 'results' / 'effects.txt'
 REGIMES = DOCS / 'results' / 'regimes_numbers.txt'
-MODEL = DOCS / 'model.md'
+PRIORS = DOCS / 'results' / 'priors.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
     'speed_over_ground': 'radar or GNSS, `hypot(linear.x, linear.y)` [m/s], frame not trusted',
@@ -233,7 +232,7 @@ PAGES: Mapping[Path, Tables] = {
     ROS: TABLES,
     EFFECTS: {'effects': effects},
     EFFECTS_MORE: {'effect parameters': effect_parameters, 'confounders': effect_confounders},
-    MODEL: {
+    PRIORS: {
         'priors': model_priors,
         'noise priors': model_noise,
         'families': model_families,

@@ -289,9 +289,9 @@ def report(every: list[Case], problems: list[str]) -> str:
         f'{len(every)} forecasts of {n} records. Inside the band: {share:.0%} ± {2 * spread:.0%} '
         '(mean over records, ± two standard errors). '
         + ' '.join(
-            f'{words} than {rival} in {int(won)} of {n} records.'
+            f'{words} than {", ".join(RIVALS)} in '
+            f'{", ".join(f"{won:.0f}" for won in wins[key])} of {n}.'
             for key, words in (('score', 'Better score'), ('error', 'Less error'))
-            for rival, won in zip(RIVALS, wins[key], strict=True)
         ),
         '',
         f'By part of the coast that was known: {", ".join(parts)}.',

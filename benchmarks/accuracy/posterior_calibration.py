@@ -4,7 +4,7 @@ Calibration of the one posterior on rows that are drawn from its own priors.
 
     python -m benchmarks.accuracy.posterior_calibration --count 100 --seed 0
 
-A hypothesis, all unknowns and a setting of the noise are drawn from the priors of docs/model.md;
+A hypothesis, all unknowns and a setting of the noise are drawn from the priors of the model;
 rows of a log and of positions follow by the model itself. What is inferred from them is compared
 with what was drawn.
 """

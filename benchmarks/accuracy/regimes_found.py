@@ -62,6 +62,19 @@ def _sure(some: list[Row]) -> tuple[float, float, float, float]:
     return said_s / 3600.0, expected_s / said_s, true_s / said_s, idle_s / 3600.0
 
 
+def untrue(suites: dict[str, list[Row]]) -> list[list[str]]:
+    """Return by kind of case how long she is said to glide, with 0.7 or more, and does not [s]."""
+    seconds: dict[str, dict[str, float]] = defaultdict(lambda: dict.fromkeys(SUITES, 0.0))
+    for suite, rows in suites.items():
+        for row in rows:
+            seconds[row.case.kind][suite] += row.sure_s[0] - row.sure_s[2]
+    return [
+        [kind, *(f'{each:.0f}' for each in of_kind.values())]
+        for kind, of_kind in seconds.items()
+        if any(of_kind.values())
+    ]
+
+
 NAMES = (
     'found', 'from 3 min', 'long ones', 'dated within 5 s', 'within 20 s',
     'announced after, median and 90 % [s]', 'no coastdowns left as one, + an idling screw',
@@ -97,6 +110,9 @@ def main() -> None:
                     rows[row.suite].append(row)
     columns = [column(coasts[suite], none[suite]) for suite in SUITES]
     print(*table((f'seeds {seeds}', *SUITES), zip(NAMES, *columns, strict=True)), sep='\n')
+    print()
+    rows = untrue({suite: [*coasts[suite], *none[suite]] for suite in SUITES})
+    print(*table(('said to glide and does not [s]', *SUITES), rows), sep='\n')
     print()
     print(
         *table(

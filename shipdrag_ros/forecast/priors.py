@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Every prior of the forecast, as data; docs/model.md prints this table (`python docs/tables.py`).
+Every prior of the forecast, as data; docs/results/priors.md prints it (`python docs/tables.py`).
 
 Chosen on world A, cases 0 to 59, and on the measured records, as docs/forecast.md says
 (`benchmarks/accuracy/forecast_*.py`).
@@ -46,4 +46,4 @@ TABLE = (
     _families('-', 'errors of the estimate and gusts are larger by', ROUGHER),
     *(each for each in vars().copy().values() if isinstance(each, Declared)),
 )
-"""What docs/model.md prints, in its order; times of gusts, slow water and log: those of noise."""
+"""What docs/results/priors.md prints; times of gusts, slow water and log: those of noise."""

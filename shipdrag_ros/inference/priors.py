@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every prior of the noise, as data; docs/model.md prints this table (`python docs/tables.py`)."""
+"""Every prior of the noise, as data; docs/results/priors.md has it (`python docs/tables.py`)."""
 
 from __future__ import annotations
 
@@ -46,6 +46,6 @@ HOLD = Declared(
     'a ship that is slowed has more thrust: 1 to 2',
 )
 TABLE = tuple(each for each in vars().copy().values() if isinstance(each, Declared))
-"""What docs/model.md prints, in its order."""
+"""What docs/results/priors.md prints, in its order."""
 LEARNT = tuple(each for each in TABLE if each.sd)
 """Those of a setting, in its order."""

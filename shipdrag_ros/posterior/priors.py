@@ -2,7 +2,7 @@
 """
 Every prior of the model, as data.
 
-docs/model.md prints this table (`python docs/tables.py`). Those of the noise stand in
+docs/results/priors.md prints this table (`python docs/tables.py`). Those of the noise stand in
 `inference.priors`, those of an effect in `data/effects.yaml` or its module in
 `simulation.effects`, with the usual odds in `simulation.effect.Effect`.
 """
@@ -291,4 +291,4 @@ EARLIER_SIZE = Declared(
 )
 
 TABLE = tuple(each for each in vars().copy().values() if isinstance(each, Declared))
-"""What docs/model.md prints, in its order."""
+"""What docs/results/priors.md prints, in its order."""
