@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
 
 from shipdrag_ros.samples import Float64
 
@@ -18,23 +20,51 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]
     return [f'| {" | ".join(map(str, line))} |' for line in lines]
 
 
-def put(page: Path, blocks: Mapping[str, str]) -> None:
+def grid(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, width: int, left: int = 1
+) -> None:
     """
-    Write into a page what stands between `<!-- NAME -->` and `<!-- end NAME -->`.
+    Print a table in a frame; the first columns, names, are flush left.
+    """
+    found = Table(title=title)
+    for number, name in enumerate(columns):
+        found.add_column(name, justify='left' if number < left else 'right')
+    for row in rows:
+        found.add_row(*row)
+    Console(width=width).print(found)
+
+
+def titled(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
+    """
+    Return the lines of a table under its title.
+    """
+    return ['', title, '', *table(columns, rows)]
+
+
+def filled(text: str, blocks: Mapping[str, str]) -> str:
+    """
+    Return a page with what stands between `<!-- NAME -->` and `<!-- end NAME -->` replaced.
 
     Raises
     ------
     ValueError
         If the page lacks the markers of a block.
     """
-    text = page.read_text(encoding='utf-8')
     for name, made in blocks.items():
         begin, end = f'<!-- {name} -->\n', f'\n<!-- end {name} -->'
         before, found, rest = text.partition(begin)
         _, closed, after = rest.partition(end)
         if not (found and closed):
-            raise ValueError(f'{page}: no {begin.strip()} .. {end.strip()}')
+            raise ValueError(f'no {begin.strip()} .. {end.strip()} on the page')
         text = f'{before}{begin}{made}{end}{after}'
+    return text
+
+
+def put(page: Path, blocks: Mapping[str, str]) -> None:
+    """
+    Write blocks into a page; see `filled`.
+    """
+    text = filled(page.read_text(encoding='utf-8'), blocks)
     page.write_text(text, encoding='utf-8')
 
 
@@ -45,40 +75,3 @@ def write_csv(path: Path, columns: Sequence[str], rows: Float64) -> None:
     path.parent.mkdir(exist_ok=True)
     lines = [','.join(f'{value:.6g}' for value in row) for row in rows]
     path.write_text('\n'.join([','.join(columns), *lines]) + '\n', encoding='utf-8')
-
-
-def publish(page: Path, lines: Sequence[str], *, rows: int, keep: int = 0) -> None:
-    """
-    Write a page; long tables and what scripts print go into a file beside it.
-
-    Parameters
-    ----------
-    page
-        Of the docs; the file is `results/NAME.txt` there.
-    lines
-        Markdown.
-    rows
-        Longest table [rows] that stays on the page.
-    keep
-        Tables at the top that stay, however long.
-    """
-    kept: list[str] = []
-    aside: list[str] = []
-    heading, link = '', f'([table](results/{page.stem}.txt))'
-    for block in re.split(r'\n{2,}(?![^`]*\n```(?:\n|$))', '\n'.join(lines).strip()):
-        heading = block if block.startswith('#') else heading
-        keep -= block.startswith('|')
-        is_long = block.startswith('|') and block.count('\n') > rows + 1 and keep < 0
-        if block.startswith('```text') or is_long:
-            aside += ['', heading.lstrip('# '), '', block.removeprefix('```text\n').rstrip('`\n')]
-            if kept[-1].endswith('.txt))'):
-                continue
-            if kept[-1].startswith(('#', '!', '|')):
-                kept.append(link)
-            else:
-                kept[-1] += f' {link}'
-        else:
-            kept.append(block)
-    page.write_text('\n\n'.join(kept) + '\n', encoding='utf-8')
-    file = page.parent / 'results' / f'{page.stem}.txt'
-    file.write_text('\n'.join(aside).strip() + '\n', encoding='utf-8')

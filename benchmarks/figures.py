@@ -19,7 +19,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks._tables import table
+from benchmarks._tables import filled, table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, RESULTS = ROOT / 'docs' / 'figures.md', ROOT / 'docs' / 'results'
@@ -127,12 +127,6 @@ FIGURES = tuple(
         ),
     )
 )
-MORE = {
-    'accuracy_beside_peers': 'the final curve beside twelve other estimators',
-    'house': 'lines and modules of the package',
-    'real_records': 'measured records, by themselves and beside what is known of them',
-    'import': 'files of others, and damaged files of each format',
-}
 
 
 def found(figure: Figure) -> str:
@@ -153,35 +147,13 @@ def found(figure: Figure) -> str:
 
 def page() -> str:
     """
-    Return the page.
+    Return the page, with the table as the files have it.
     """
     rows = [
         (each.question, found(each), f'[{each.file}](results/{each.file}.txt)') for each in FIGURES
     ]
-    lines = [
-        '# Figures',
-        '',
-        'Each figure is taken from a result file, which begins with the command that printed it; '
-        'N and seeds are there.',
-        '`python -m benchmarks.figures` writes this page from the files, with a word of their '
-        'names it makes them again first.',
-        'Misses stand there as measured. Unless said otherwise: a 150 m cargo ship from 8.2 m/s, '
-        '1500 s, log 0.05 m/s,',
-        'position 10 m, 500 readings of each.',
-        '',
-        *table(('question', 'figure', 'file'), rows),
-        '',
-        'What is expected of r(v) was chosen in view of the cargo ship, the tanker and the yacht; '
-        'on hulls that it was not chosen on',
-        'the error is larger and the band a little narrow. Worlds A and B '
-        'share no code with the package; A was',
-        'used while the method was made, B by another author was not, but for its even half.',
-        '',
-        'More result files:',
-        '',
-        *(f'- [{name}](results/{name}.txt): {about}' for name, about in MORE.items()),
-    ]
-    return '\n'.join(lines) + '\n'
+    lines = table(('question', 'figure', 'file'), rows)
+    return filled(PAGE.read_text(encoding='utf-8'), {'figures': '\n'.join(lines)})
 
 
 def renew(file: Path, limit_s: float) -> None:

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from benchmarks.accuracy._coasts import COLOUR_S, GUST_S, Case, Coast, Hull, coasts, gust_m_s2
+from benchmarks.accuracy._coasts import SLOW_S, Case, Coast, coasts, gust_m_s2
 from shipdrag_ros.samples import Float64
 
-FAMILY = (1, 2, 3, 4)
+POWERS = np.array([1, 2, 3, 4])  # of the family that r is known to belong to
 _STEPS = 1500  # of the coastdown
 _WARM_S = 1500.0  # of the slow force before the first reading
 _BIN_S = 10.0  # of the means that stand for the steady record
@@ -25,37 +25,32 @@ _BIN_S = 10.0  # of the means that stand for the steady record
 class _Model:
     """The motion after the stop, and what a slow force does to it."""
 
-    def __init__(self, hull: Hull, case: Case, coast: Coast, powers: tuple[int, ...]) -> None:
-        self.hull, self.ship, self.powers = hull, coast.truth.ship, np.array(powers)
+    def __init__(self, case: Case, coast: Coast) -> None:
+        self.hull, self.ship = case.hull, coast.truth.ship
         speeds = coast.speeds
         columns = self.columns(speeds)
         self.coefficients = np.linalg.lstsq(columns, coast.resists(speeds), rcond=None)[0]
-        run_down = self.ship.propulsion.run_down_s if case.run_down else 0.0
-        self.time_s = np.linspace(0.0, 1.0, _STEPS + 1) ** 2 * hull.duration_s
-        self.run_down_s = run_down
+        self.time_s = np.linspace(0.0, 1.0, _STEPS + 1) ** 2 * self.hull.duration_s
 
     def columns(self, speed_m_s: Float64) -> Float64:
         """Return the powers, relative to the speed at the start."""
-        result: Float64 = (np.asarray(speed_m_s)[..., None] / self.hull.speed_m_s) ** self.powers
+        result: Float64 = (np.asarray(speed_m_s)[..., None] / self.hull.speed_m_s) ** POWERS
         return result
 
     def motion(self, coefficients: Float64, start_m_s: Float64) -> tuple[Float64, Float64]:
         """Return speed and distance at `time_s` of several motions at once, (m, k)."""
-        thrust = np.sum(coefficients * self.columns(start_m_s), axis=-1)
 
-        def slope(time_s: float, v: Float64) -> Float64:
-            left = np.exp(-time_s / self.run_down_s) if self.run_down_s else 0.0
+        def slope(v: Float64) -> Float64:
             r = np.sum(coefficients * self.columns(v), axis=-1)
-            result: Float64 = (thrust * left - r) / (1.0 + self.ship.n_r(v))
-            return result
+            return np.asarray(-r / (1.0 + self.ship.n_r(v)))
 
         v, x = start_m_s.copy(), np.zeros_like(start_m_s)
         speeds, distances = [v], [x]
-        for t, h in zip(self.time_s, np.diff(self.time_s)):
-            a = slope(t, v)
-            b = slope(t + h / 2.0, v + h / 2.0 * a)
-            c = slope(t + h / 2.0, v + h / 2.0 * b)
-            d = slope(t + h, v + h * c)
+        for h in np.diff(self.time_s):
+            a = slope(v)
+            b = slope(v + h / 2.0 * a)
+            c = slope(v + h / 2.0 * b)
+            d = slope(v + h * c)
             x = x + h * v + h**2 / 6.0 * (a + b + c)
             v = v + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
             speeds.append(v)
@@ -86,38 +81,23 @@ class _Model:
         rows = np.concatenate(
             [(1.0 - part) * each[low] + part * each[low + 1] for each in by_force]
         )
-        force = sd_m_s2**2 * np.exp(-np.abs(grid_s[:, None] - grid_s) / GUST_S)
+        force = sd_m_s2**2 * np.exp(-np.abs(grid_s[:, None] - grid_s) / SLOW_S)
         result: Float64 = rows @ force @ rows.T
         return result
 
 
-def bound(
-    hull: Hull, case: Case, n: int, powers: tuple[int, ...] = FAMILY
-) -> tuple[Float64, float]:
+def bound(case: Case) -> Float64:
     """
-    Return the least standard deviation of r at the speeds of a comparison.
+    Return the least standard deviation of r at the speeds of a comparison: (m,).
 
-    Parameters
-    ----------
-    hull, case, n
-        What is read; outliers are not counted, their readings as good as others.
-    powers
-        Of the family that r is known to belong to. Unknown are also the speed
-        and the place at the stop, the current, and, with a steady record but no
-        shaft, the time of the stop.
-
-    Returns
-    -------
-    sd_m_s2 : (m,)
-    largest_m_s2
-        r at the speed of the stop.
+    Unknown are, beside r, the speed and the place at the stop, the current, and, with a steady
+    record, the time of the stop.
     """
-    quiet = replace(case, gust_m_s=0.0)
-    (coast,) = coasts(hull, quiet, n, 1)
-    model = _Model(hull, quiet, coast, powers)
-    window = coast.window
+    hull = case.hull
+    (coast,) = coasts(replace(case, gust_m_s=0.0), 1)
+    model, window = _Model(case, coast), coast.window
     coast_s = (window.speed_through_water.time_ns - window.start_ns) * 1e-9
-    spacing = hull.duration_s / (n - 1)
+    spacing = hull.duration_s / (case.n - 1)
     size = max(1, round(_BIN_S / spacing)) if window.before is not None else 1
     steady_s = np.empty(0)
     if window.before is not None:
@@ -125,27 +105,24 @@ def bound(
         steady_s = before_s[: len(before_s) // size * size].reshape(-1, size).mean(axis=1)
     rows_s = np.concatenate([steady_s, coast_s])
     count = np.where(rows_s < 0.0, size, 1)
-    columns = _sensitivity(model, rows_s, onset=case.steady and not case.run_down)
-    m = len(rows_s)
+    columns = _sensitivity(model, rows_s, onset=case.steady)
     covariance = np.diag(np.concatenate([hull.log_sd**2 / count, hull.position_sd**2 / count]))
-    if case.colour_m_s:
-        apart = np.abs(rows_s[:, None] - rows_s)
-        covariance[:m, :m] += case.colour_m_s**2 * np.exp(-apart / COLOUR_S)
     if case.gust_m_s:
-        covariance += model.slow_force(rows_s, gust_m_s2(hull, case))
+        covariance += model.slow_force(rows_s, gust_m_s2(case))
     white = solve_triangular(np.linalg.cholesky(covariance), columns, lower=True)
     scale = np.linalg.norm(white, axis=0)
     triangle = np.linalg.qr(white / scale, mode='r')
-    k = len(powers)
+    k = len(POWERS)
     powers_of = np.zeros((len(coast.speeds), len(scale)))
     powers_of[:, :k] = model.columns(coast.speeds) / scale[:k]
-    sd = np.linalg.norm(solve_triangular(triangle.T, powers_of.T, lower=True), axis=0)
-    return sd, float(coast.resists(coast.speeds[-1:])[0])
+    return np.asarray(
+        np.linalg.norm(solve_triangular(triangle.T, powers_of.T, lower=True), axis=0)
+    )
 
 
 def _sensitivity(model: _Model, rows_s: Float64, *, onset: bool) -> Float64:
     """Return the derivative of all speeds, then all distances, by the unknowns."""
-    k = len(model.powers)
+    k = len(POWERS)
     v0 = model.hull.speed_m_s
     largest = float(np.abs(model.coefficients).max())
     steps = np.array([*np.full(k, 1e-4 * largest), 1e-4 * v0])

@@ -9,11 +9,13 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks._tables import table
+from benchmarks._tables import titled
 from benchmarks.accuracy._regressions import CUBE, CUBIC, WRONG, gauss, rms, shown
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import FORMS, Hulls, fit_form
+
+FILE = 'yacht_hydrodynamics.data'
 
 
 def yachts(path: Path, froude_max: float) -> tuple[Hulls, Float64]:
@@ -58,98 +60,45 @@ def delft(path: Path) -> tuple[list[str], Figure]:
     """
     Leave hulls out, leave Froude numbers out.
     """
-    lines = [
-        '## The Delft yacht series',
-        '',
-        '22 hulls, 14 Froude numbers from 0.125 to 0.45, R_r per weight x 1000, from 0.01 to 62.',
-        "Beyond the forms' Froude numbers and with hulls (C_B 0.34 to 0.39) that they were not",
-        f'made for, knowingly. The cubic has {len(CUBE)} terms in L/B, B/T, C_B, lcb and Fr. The',
-        'Gaussian process (scikit-learn) is of log(R_r + 0.1) about a power law in Fr,',
-        "slenderness and B/T; it has no guard and is shown by Sirotina's.",
-        '',
-        '- Over all Froude numbers the forms, parabolas in Fr, miss the steep rise by 4 whatever',
-        '  hull is asked for. No guard over shape can show that; the sd does.',
-        '- Up to Fr 0.3 what the guard passes is better than what it refuses, and the worst',
-        '  errors are among the refused.',
-        '- The cubic has 35 terms of shape for 21 hulls. All of it is refused, rightly: more',
-        '  coefficients make it worse by ten times, as the paper says.',
-        '- Froude numbers between those measured pass, those beyond do not.',
-        '- To be passed is not to be near: see the last table. The sd says how near.',
-    ]
-    cases, relative = [], []
-    for title, froude_max in (('all Fr', 1.0), ('Fr up to 0.3', 0.301)):
-        hulls, values = yachts(path, froude_max)
-        cases.append((f'hulls, {title}', hulls, values, hulls.groups()))
-    hulls, values = yachts(path, 1.0)
-    step = np.searchsorted(np.unique(hulls.Fr), hulls.Fr)
-    cases.append(('each Fr in turn, all hulls known', hulls, values, step))
-    fast = np.where(hulls.Fr > 0.38, 0, -1)
-    cases.append(('Fr above 0.38', hulls, values, fast))
-    figure = Figure()
+    lines, relative = [f'\nThe Delft yacht series; the cubic has {len(CUBE)} terms'], []
+    (every, values), (slow, of_slow) = (yachts(path, most) for most in (1.0, 0.301))
+    step = np.searchsorted(np.unique(every.Fr), every.Fr)
+    cases = (
+        ('hulls, all Fr', every, values, every.groups()),
+        ('hulls, Fr up to 0.3', slow, of_slow, slow.groups()),
+        ('each Fr in turn, all hulls known', every, values, step),
+        ('Fr above 0.38', every, values, np.where(every.Fr > 0.38, 0, -1)),
+    )
     for title, of, measured, groups in cases:
-        keep = left_out(of, measured, groups)
+        found = left_out(of, measured, groups)
         rows = []
-        for name, (error, ok, sd) in keep.items():
-            known = np.isfinite(sd) & (sd > 0.0)
-            hit = np.abs(error) < 2.0 * sd
-            both = ok & known
-            rows.append(
-                (
-                    {'process': 'Gaussian process'}.get(name, name),
-                    ok.sum(),
-                    shown(rms(error[ok]), '.3g'),
-                    shown(np.abs(error[ok]).max() if ok.any() else float('nan'), '.3g'),
-                    (~ok).sum(),
-                    shown(rms(error[~ok]), '.3g'),
-                    shown(np.abs(error[~ok]).max() if (~ok).any() else float('nan'), '.3g'),
-                    shown(100 * hit[both].mean() if both.any() else float('nan'), '.0f'),
-                )
-            )
-        lines += [
-            '',
-            f'Left out: {title}.',
-            '',
-            *table(
-                (
-                    '',
-                    'passed',
-                    'rms error',
-                    'worst',
-                    'refused',
-                    'rms error',
-                    'worst',
-                    '2 sd hold in %',
-                ),
-                rows,
-            ),
-        ]
+        for name, (error, ok, sd) in found.items():
+            size, known = np.abs(error), ok & np.isfinite(sd) & (sd > 0.0)
+            cells: list[object] = [{'process': 'Gaussian process'}.get(name, name)]
+            for which in (ok, ~ok):
+                worst = size[which].max() if which.any() else float('nan')
+                cells += [which.sum(), shown(rms(error[which]), '.3g'), shown(worst, '.3g')]
+            hit = 100 * (size < 2.0 * sd)[known].mean() if known.any() else float('nan')
+            rows.append((*cells, shown(hit, '.0f')))
+        errors = ('rms error', 'worst')
+        heads = ('', 'passed', *errors, 'refused', *errors, '2 sd hold in %')
+        lines += titled(f'Left out: {title}', heads, rows)
         if title.startswith('hulls'):
             relative += [
                 (title, name, *over(error / measured, ok, sd / measured))
-                for name, (error, ok, sd) in keep.items()
+                for name, (error, ok, sd) in found.items()
                 if name in FORMS
             ]
-        if title.startswith('hulls, Fr up'):
-            figure = delft_picture(keep)
-    lines += [
+            figure = delft_picture(found)  # of the last: Fr up to 0.3
+    heads = (
+        'left out',
         '',
-        f'More than {WRONG:.0%} off, in the first two; at the lowest Froude numbers R_r is '
-        'nearly 0.',
-        '',
-        *table(
-            (
-                'left out',
-                '',
-                'of passed ones %',
-                'of refused ones %',
-                'refused, of such %',
-                'sd of passed ones, median %',
-            ),
-            relative,
-        ),
-    ]
-    lines += ['', '![Errors of hulls left out](pictures/s4_delft.png)']
-    return lines, figure
+        'of passed ones %',
+        'of refused ones %',
+        'refused, of such %',
+        'sd of passed ones, median %',
+    )
+    return [*lines, *titled(f'More than {WRONG:.0%} off', heads, relative)], figure
 
 
 def over(error: Float64, ok: np.ndarray, sd: Float64) -> tuple[str, ...]:

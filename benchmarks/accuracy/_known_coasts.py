@@ -10,9 +10,17 @@ standard deviations. Where nothing is known of r, `known` is empty.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from benchmarks.accuracy.real_records import MODEL_SHIP, Record
+from benchmarks.accuracy.real_records import (
+    CAR_ENDS_S,
+    FERRY,
+    MODEL_SHIP,
+    Record,
+    car,
+    slow_car,
+    usv,
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,6 @@ def _at(speed_m_s: float, r_m_s2: float, two_sd_m_s2: float) -> Known:
     return Known(speed_m_s, speed_m_s, r_m_s2, two_sd_m_s2)
 
 
-_FERRY = '--time t_s --map speed_over_ground=speed_mps --map position=pos_e_m,pos_n_m'
 _MOTORS = '--map shaft=motor1_rpm,motor2_rpm,motor3_rpm,motor4_rpm:rpm'
 _BOAT = (
     '--time t --map speed_through_water=surge --map position=lat,lon:deg --map heading=yaw:deg '
@@ -75,48 +82,21 @@ _TANKER = (
     '--time t_s --map speed_through_water=u_mps --map position=x_m,y_m --map heading=psi_rad '
     '--map shaft=prop_rps:rev/s --map rudder=rudder_rad'
 )
-_USV = '--map position=x_m,y_m --map heading=yaw_rad --time t_s --where segment=coast'
-_CAR = '--time t_s --map speed_over_ground=v_mps'
-_ONE_HZ = '--rate 1 --map speed_over_ground=1:km/h'
+_SPIKES = '1 Hz, spikes of 2 to 4 m/s'
 
 
 def _usv(test: str, turn: int) -> KnownCoast:
-    record = Record(
-        f'usv_{test}',
-        'awsp_usv_coast_1hz.csv',
-        f'{_USV} --where test=Test_{test}',
-        'usv',
-        'short',
-        (1.0, 15.0),
-        (0.5, 0.8, 1.1),
-    )
+    record = replace(usv(test, 'short'), name=f'usv_{test}')
     return KnownCoast(record, (0.0, 15.0), f'coasts 13 to 15 s, the heading turns {turn} deg')
 
 
 def _car(test: str, end_s: float) -> KnownCoast:
-    record = Record(
-        f'car_{test.lower().replace("-", "_")}',
-        f'car/shotgoose_RR-Coastdown-{test}_coast_100hz.csv',
-        _CAR,
-        'car',
-        'short',
-        (0.0, end_s),
-        (4.0, 7.0, 9.0),
-    )
+    record = car(test, end_s, 'short')
     return KnownCoast(record, (0.0, end_s), 'cut to the coast by those who measured')
 
 
-def _slow_car(test: str, fact: str, known: tuple[Known, ...] = ()) -> KnownCoast:
-    record = Record(
-        f'car_{test.lower()}',
-        f'car/{test}.csv',
-        _ONE_HZ,
-        'car',
-        'short',
-        (0.0, 172.0),
-        (2.0, 4.0, 6.0),
-    )
-    return KnownCoast(record, (0.0, 172.0), fact, known)
+def _slow_car(test: str, *known: Known) -> KnownCoast:
+    return KnownCoast(slow_car(test, 'short'), (0.0, 172.0), _SPIKES, known)
 
 
 def _boat(run: str, window_s: tuple[float, float]) -> Record:
@@ -130,7 +110,7 @@ def _ferry(name: str, window_s: tuple[float, float]) -> Record:
     return Record(
         name,
         'milliampere_nlp1_t275_20hz.csv',
-        f'{_FERRY} --map heading=yaw_rad {_MOTORS}',
+        f'{FERRY.columns} --map heading=yaw_rad {_MOTORS}',
         'ferry',
         'short_compass',
         window_s,
@@ -154,27 +134,18 @@ _FERRY_KNOWN = (_at(0.116, 0.0053, 0.0009),)
 _TRUE_COAST_S = (16.2, 25.2)  # 287 to 296 s of its column of times
 COASTS = (
     KnownCoast(
-        Record(
-            'model_ship_shaft',
-            MODEL_SHIP.table,
-            f'{MODEL_SHIP.columns} --map shaft=max_abs_cmd',
-            'model_ship',
-            'short',
-            MODEL_SHIP.window_s,
-            MODEL_SHIP.speeds_m_s,
+        replace(
+            MODEL_SHIP,
+            name='model_ship_shaft',
+            columns=f'{MODEL_SHIP.columns} --map shaft=max_abs_cmd',
+            parameters='short',
         ),
         (5.0, 32.0),
         'the engine stops at 5 s; the speed goes through zero: a hidden force or current',
     ),
     KnownCoast(
-        Record(
-            'ferry_motors',
-            'milliampere_coast_t457_20hz.csv',
-            f'{_FERRY} {_MOTORS}',
-            'ferry',
-            'short',
-            (8.5, 34.8),
-            (0.12, 0.17, 0.22),
+        replace(
+            FERRY, name='ferry_motors', columns=f'{FERRY.columns} {_MOTORS}', parameters='short'
         ),
         (8.0, 34.4),
         'all motors at 0 from 8.0 s for 26.4 s; in sway, the heading turns 16 deg',
@@ -193,27 +164,23 @@ COASTS = (
         _FERRY_KNOWN,
     ),
     *(_usv(test, turn) for test, turn in (('6', 54), ('8', 39), ('10', 65))),
-    *(_car(test, s) for test, s in (('2', 15.0), ('3', 13.0), ('2WD-1', 12.3), ('4WD-1', 17.8))),
+    *(_car(test, end_s) for test, end_s in CAR_ENDS_S.items()),
     KnownCoast(
-        Record(
-            'car_whole',
-            'car/shotgoose_RR-Coastdown-1_whole_100hz.csv',
-            _CAR,
-            'car',
-            'short',
-            (9.43, 19.79),
-            (7.0,),
+        replace(
+            car('1', 0.0, 'short'),
+            name='car_whole',
+            table='car/shotgoose_RR-Coastdown-1_whole_100hz.csv',
+            window_s=(9.43, 19.79),
+            speeds_m_s=(7.0,),
         ),
         (9.43, 16.9),
         'accelerates, coasts from 9.43 s, brake 7.5 s later',
         (_at(7.0, 0.82, 0.01),),
     ),
-    _slow_car('Michelin60A', '1 Hz, spikes of 2 to 4 m/s'),
-    _slow_car('Michelin60A1', '1 Hz, spikes of 2 to 4 m/s'),
+    _slow_car('Michelin60A'),
+    _slow_car('Michelin60A1'),
     _slow_car(
-        'Michelin60B',
-        '1 Hz, spikes of 2 to 4 m/s',
-        (_at(4.0, 0.038, 0.005), _at(6.0, 0.044, 0.009), _at(7.2, 0.055, 0.04)),
+        'Michelin60B', _at(4.0, 0.038, 0.005), _at(6.0, 0.044, 0.009), _at(7.2, 0.055, 0.04)
     ),
     KnownCoast(
         _boat('222', (59.8, 95.3)),

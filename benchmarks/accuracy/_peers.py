@@ -72,27 +72,8 @@ class Samples:
 
     @property
     def step_s(self) -> float:
-        """Spacing of the samples outside gaps."""
+        """Spacing of the samples, which are even."""
         return float(np.median(np.diff(self.time_s)))
-
-    def even(self) -> tuple[Float64, Float64]:
-        """
-        Return times and speeds on an even grid, gaps bridged by lines.
-        """
-        time = self.step_s * np.arange(self._rows()[-1] + 1)
-        return time, np.interp(time, self.time_s, self.speed_m_s)
-
-    def with_gaps(self) -> Float64:
-        """
-        Return (m, 2) speed and distance on an even grid, NaN in gaps.
-        """
-        rows = self._rows()
-        result = np.full((rows[-1] + 1, 2), np.nan)
-        result[rows] = np.column_stack([self.speed_m_s, self.distance_m])
-        return result
-
-    def _rows(self) -> np.ndarray:
-        return np.rint(self.time_s / self.step_s).astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -138,8 +119,8 @@ def savitzky_golay(samples: Samples) -> Motion:
     Leaving out one sample changes its residual by 1 / (1 - h), h what the
     sample weighs in its own smoothed value.
     """
-    time, speed = samples.even()
-    n = len(time)
+    speed = samples.speed_m_s
+    n = len(speed)
     best, least = 0, np.inf
     for half in np.unique(np.geomspace(3, n // 2 - 1, 25).astype(int)):
         length = 2 * half + 1
@@ -196,7 +177,7 @@ class _ConstantAcceleration(MLEModel):
     @property
     def start_params(self) -> Float64:
         """Logarithms of the variances of speed, distance and jerk."""
-        noise = np.nanvar(np.diff(self.endog, n=2, axis=0), axis=0) / 6.0
+        noise = np.var(np.diff(self.endog, n=2, axis=0), axis=0) / 6.0
         return np.log([*noise, 1e-10])
 
     def update(self, params: Float64, **kwargs: object) -> None:
@@ -213,7 +194,9 @@ def kalman_rts(samples: Samples) -> Motion:
     """
     Smooth log and position together; variances by maximum likelihood.
     """
-    model = _ConstantAcceleration(samples.with_gaps(), samples.step_s)
+    model = _ConstantAcceleration(
+        np.column_stack([samples.speed_m_s, samples.distance_m]), samples.step_s
+    )
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
         found = model.fit(method='lbfgs', disp=0, cov_type='none', maxiter=50)
@@ -281,18 +264,17 @@ class TunedByPynumdiff:
         samples
             The record.
         acceleration_m_s2
-            The true one on the even grid, for a search against the truth; without
+            The true one at the samples, for a search against the truth; without
             it the search trades misfit for total variation, at a band limit of
             `PERIODS` periods a record.
         """
-        time, speed = samples.even()
-        n = len(time)
+        n = len(samples.time_s)
         parameters, _ = optimize(
             pynumdiff.savgoldiff,
-            speed,
+            samples.speed_m_s,
             samples.step_s,
             dxdt_truth=acceleration_m_s2,
-            bandlimit=None if acceleration_m_s2 is not None else PERIODS / time[-1],
+            bandlimit=None if acceleration_m_s2 is not None else PERIODS / samples.time_s[-1],
             search_space_updates={
                 'degree': [3, 5],
                 'window_size': [n // 16 | 1, n // 4 | 1, n // 2 | 1],
@@ -306,5 +288,5 @@ class TunedByPynumdiff:
         """
         Differentiate the speeds.
         """
-        _, speed = samples.even()
+        speed = samples.speed_m_s
         return Motion(*pynumdiff.savgoldiff(speed, samples.step_s, **asdict(self)))

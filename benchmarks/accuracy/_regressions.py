@@ -20,6 +20,7 @@ CUBE = terms_up_to(3, [3] * len(SHAPES))
 CUBIC = RegressionForm(
     'cubic',
     lambda hulls: monomials(np.column_stack([getattr(hulls, name) for name in SHAPES]), CUBE),
+    tuple(map(str, CUBE)),
     SHAPES,
 )
 Predictor = Callable[[Hulls], Float64]

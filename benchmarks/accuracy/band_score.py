@@ -14,8 +14,6 @@ world B the even ones; the others are for scoring.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
 import os
 import time
@@ -30,11 +28,11 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 
+from benchmarks import _verbs
 from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
 from benchmarks.worlds.hidden import cases as cases_a
 from benchmarks.worlds.hidden_b import cases as cases_b
 from benchmarks.worlds.hidden_b.plans import plans_of
-from shipdrag_ros import cli
 
 OWN = (
     'fouling',
@@ -158,19 +156,9 @@ def replay(
     """
     parameters = bag.parent / 'estimator.yaml'
     parameters.write_text(f'estimator: {estimator}\n', encoding='utf-8')
-    asked = ['replay', str(bag), '--ship', str(ship), '--json', '--parameters', str(parameters)]
-    if window is not None:
-        asked += ['--window', *(f'{at:.3f}' for at in window)]
-    written, said = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(said):
-        try:
-            status = cli.main(asked)
-        except SystemExit as ended:
-            status = ended.code
-    if status:
-        raise RuntimeError(f'shipdrag replay ended with {status}: {said.getvalue().strip()}')
-    found: dict[str, Any] = json.loads(written.getvalue())
-    return found
+    given = () if window is None else ('--window', *(f'{at:.3f}' for at in window))
+    more = ('--ship', str(ship), '--parameters', str(parameters), *given)
+    return _verbs.found('replay', str(bag), *more)
 
 
 def score(

@@ -18,8 +18,6 @@ that was broken off goes on where it was.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
 import os
 import time
@@ -34,12 +32,12 @@ from typing import Any
 # before numpy: the processes share the cores with each other alone
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
+from benchmarks import _verbs
 from benchmarks.worlds.hidden import cases, scoring
 from benchmarks.worlds.hidden.recording import Recording
 from benchmarks.worlds.hidden_b import cases as cases_b
 from benchmarks.worlds.hidden_b import facts as facts_b
 from benchmarks.worlds.hidden_b import plans as plans_b
-from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
@@ -117,16 +115,7 @@ def command(ship: Path, bags: list[Path], more: Sequence[str] = ()) -> Found:
     more
         Further arguments: the facts that a crew knows.
     """
-    written = io.StringIO()
-    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as said:
-        try:
-            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json', *more])
-        except SystemExit as ended:  # wrong usage
-            status = ended.code
-    if status:
-        raise RuntimeError(f'shipdrag diagnose ended with {status}: {said.getvalue()}')
-    found: Found = json.loads(written.getvalue())
-    return found
+    return _verbs.found('diagnose', *map(str, bags), '--ship', str(ship), *more)
 
 
 def diagnosis(

@@ -16,8 +16,6 @@ both write docs/results/learn_strangers.txt.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
 import os
 import time
@@ -32,11 +30,11 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 import numpy as np
 from scipy.stats import binomtest
 
+from benchmarks import _verbs
 from benchmarks.accuracy.diagnosis_score import as_block
 from benchmarks.worlds.hidden_b.cases import EPOCH_NS
 from benchmarks.worlds.strangers import world
 from benchmarks.worlds.strangers.hidden import CURVES, PLAIN, STRANGERS
-from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.term import LearntTerm
@@ -56,19 +54,6 @@ RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
 GONE = 0.9  # of the gap
 Found = dict[str, Any]
-
-
-def verb(line: Sequence[str]) -> Found:
-    """
-    Run a verb in this process and return its JSON.
-    """
-    written, said = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(said):
-        status = cli.main([*line, '--json'])
-    if status:
-        raise RuntimeError(f'shipdrag {line[0]} ended with {status}: {said.getvalue()}')
-    found: Found = json.loads(written.getvalue())
-    return found
 
 
 def write_run(case: world.Case, run: int, folder: Path) -> str:
@@ -125,11 +110,11 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
         bags = [write_run(case, run, folder) for run in list(world.LEARNT)[:runs]]
         file = folder / 'effects' / f'{NAME}.yaml'
         file.parent.mkdir()
-        alone = verb(['diagnose', bags[0]])
+        alone = _verbs.found('diagnose', bags[0])
         if show:
             _show('first run', alone)
         start = time.process_time()
-        found = verb(['learn', *bags, '-o', str(file), '--name', NAME])
+        found = _verbs.found('learn', *bags, '-o', str(file), '--name', NAME)
         result: Found = {
             'stranger': stranger,
             'ship': ship,
@@ -156,7 +141,7 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
             print(file.read_text())
             print(f'gap of a run that was kept: {result["cut"]:.0%} gone')
         bag = write_run(case, world.LATER, folder)
-        later = verb(['diagnose', bag, '--effects', str(file.parent)])
+        later = _verbs.found('diagnose', bag, '--effects', str(file.parent))
         result['later'] = [later['verdict'], [each['name'] for each in later['effects']]]
         if show:
             _show('later run', later)

@@ -14,9 +14,6 @@ Nothing is random. Takes about a minute.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
-import json
 import os
 import re
 import shlex
@@ -28,14 +25,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import _verbs
+from benchmarks._tables import put, table
 from benchmarks.accuracy._known_coasts import COASTS, Known, KnownCoast
-from benchmarks.accuracy.real_records import DATA, ROOT, run_command
+from benchmarks.accuracy.real_records import DATA, PAGE, ROOT, run_command
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import main as shipdrag
 
-PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
-SECTION = re.compile('(?<=<!-- coastdowns -->\n).*?(?=<!-- end coastdowns -->)', re.DOTALL)
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
 AGREES_SD = 2.0
 WIDEST = 1.5  # of the stated standard deviation to that of the known figure
@@ -99,27 +95,19 @@ def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool, estim
     """
     Replay by the command line and read what it says.
     """
-    result = out / f'{coast.record.name}.json'
-    result.unlink(missing_ok=True)
-    line = f'{coast.record.replay_command(window=window)} --json {result}'
-    arguments = [
-        str(out / word) if word.endswith('.mcap') else word for word in shlex.split(line)[1:]
-    ]
-    at = arguments.index('--parameters') + 1
-    stated = (ROOT / arguments[at]).read_text(encoding='utf-8')
+    words = shlex.split(coast.record.replay_command(window=window))[1:]
+    at = words.index('--parameters') + 1
+    stated = (ROOT / words[at]).read_text(encoding='utf-8')
     changed = out / f'{coast.record.name}.parameters.yaml'
     if 'estimator:' not in stated:  # where another cannot work, the record names its own
         stated += f'\nestimator: {estimator}\n'
     changed.write_text(stated, encoding='utf-8')
-    arguments[at] = str(changed)
-    said = io.StringIO()
-    to = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
-    with contextlib.chdir(ROOT), to[0], to[1]:
-        status = shipdrag(arguments)
-    if status != 0:
-        error = said.getvalue().strip().rpartition('ERROR: ')[2].replace(f'{out}/', '')
-        return Said((), (), ' '.join(error.split()), start_ns)
-    found = json.loads(result.read_text())
+    words[1], words[at] = str(out / words[1]), str(changed)
+    try:
+        found = _verbs.found(*words)
+    except RuntimeError as error:
+        said = str(error).rpartition('ERROR: ')[2].replace(f'{out}/', '')
+        return Said((), (), ' '.join(said.split()), start_ns)
     return Said(found['coastdowns'], found.get('not_coastdowns', ()), '', start_ns)
 
 
@@ -235,7 +223,7 @@ def judged_words(coast: KnownCoast, said: Said) -> str:
     return '<br>'.join(line.replace('|', '/') for line in lines)
 
 
-def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> str:
+def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> tuple[str, ...]:
     """
     Replay a record both ways and return its line of the table.
     """
@@ -249,7 +237,7 @@ def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> str:
         f'{_speed(each)}: {display.plus_minus(each.r_m_s2, each.two_sd_m_s2)}'
         for each in coast.known
     ]
-    cells = (
+    return (
         coast.record.name,
         coast.fact,
         judged_words(coast, itself),
@@ -257,23 +245,21 @@ def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> str:
         '<br>'.join(known) or '-',
         judged(coast, itself, window),
     )
-    return f'| {" | ".join(cells)} |'
 
 
-def table(data: Path, out: Path, estimator: str) -> str:
+def section(data: Path, out: Path, estimator: str) -> str:
     """
     Import and replay all records; return the table.
     """
-    lines = [f'| {" | ".join(HEAD)} |', f'| {" | ".join(["---"] * len(HEAD))} |']
+    rows = []
     for coast in COASTS:
         (out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
         run_command(coast.record.import_command(), data=data, out=out)
-        lines.append(row(coast, out, estimator))
-        print(lines[-1].replace('<br>', '\n    ').replace(' | ', '\n  '), flush=True)
-    yes = sum('| yes' in line for line in lines)
-    no = sum('| NO' in line for line in lines)
-    lines += ['', f'{yes} of {yes + no} records of which something is known are reported rightly.']
-    return '\n'.join(lines) + '\n'
+        rows.append(row(coast, out, estimator))
+        print('\n  '.join(rows[-1]).replace('<br>', '\n    '), flush=True)
+    yes, no = (sum(each[-1].startswith(word) for each in rows) for word in ('yes', 'NO'))
+    count = f'{yes} of {yes + no} records of which something is known are reported rightly.'
+    return '\n'.join([*table(HEAD, rows), '', count])
 
 
 def main() -> None:
@@ -291,11 +277,10 @@ def main() -> None:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
         return
     options.out.mkdir(parents=True, exist_ok=True)
-    found = table(Path(os.environ[DATA]), options.out.resolve(), options.estimator)
+    found = section(Path(os.environ[DATA]), options.out.resolve(), options.estimator)
     print('\n' + found)
     if options.write:
-        text = PAGE.read_text(encoding='utf-8')
-        PAGE.write_text(SECTION.sub(lambda _: found, text), encoding='utf-8')
+        put(PAGE, {'coastdowns': found})
 
 
 if __name__ == '__main__':

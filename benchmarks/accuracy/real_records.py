@@ -11,23 +11,21 @@ tables into docs/results/real_records.txt.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import os
 import shlex
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks import _verbs
 from benchmarks._tables import put, table
 from benchmarks.accuracy._second_opinion import second_opinion
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.estimation import pictures
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.result import Estimate
@@ -40,12 +38,6 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
 DATA = 'SHIPDRAG_DATA'
 SIMULATED = 'config/vitus_bering.yaml'
-
-
-RECORD_HEAD = table(
-    ('record', 'fit, order', 'valid [m/s]', 'r at m/s: ± 2 sigma (second opinion)', 'w [%]'), ()
-)
-DEFAULT_HEAD = table(('record', 'published problem', 'default'), ())
 
 
 @dataclass(frozen=True)
@@ -96,36 +88,56 @@ class Record:
         return f'shipdrag replay {self.name}.mcap --parameters {parameters}{given}'
 
 
-_MODEL = ('cse1_coast_153s_20hz.csv', '--time t_s --map speed_through_water=u_mps')
-_USV = '--map position=x_m,y_m --map heading=yaw_rad --time t_s --where segment=coast'
-_CAR = '--time t_s --map speed_over_ground=v_mps'
-_ONE_HZ = '--rate 1 --map speed_over_ground=1:km/h'
-
-
-def _usv(test: str) -> Record:
-    columns = f'{_USV} --where test={test}'
-    table = 'awsp_usv_coast_1hz.csv'
+def usv(test: str, parameters: str) -> Record:
+    """
+    Return a test of the catamaran, one position a second.
+    """
+    columns = '--map position=x_m,y_m --map heading=yaw_rad --time t_s --where segment=coast'
     return Record(
-        f'usv_{test.lower()}', table, columns, 'usv', 'few_positions', (1.0, 15.0), (0.5, 0.8, 1.1)
+        f'usv_test_{test}',
+        'awsp_usv_coast_1hz.csv',
+        f'{columns} --where test=Test_{test}',
+        'usv',
+        parameters,
+        (1.0, 15.0),
+        (0.5, 0.8, 1.1),
     )
 
 
-def _car(test: str, end_s: float) -> Record:
-    table = f'car/shotgoose_RR-Coastdown-{test}_coast_100hz.csv'
-    name = f'car_{test.lower().replace("-", "_")}'
-    return Record(name, table, _CAR, 'car', 'car_speed', (0.0, end_s), (4.0, 7.0, 9.0))
+def car(test: str, end_s: float, parameters: str) -> Record:
+    """
+    Return a test of a car at 100 Hz, cut to its coast.
+    """
+    return Record(
+        f'car_{test.lower().replace("-", "_")}',
+        f'car/shotgoose_RR-Coastdown-{test}_coast_100hz.csv',
+        '--time t_s --map speed_over_ground=v_mps',
+        'car',
+        parameters,
+        (0.0, end_s),
+        (4.0, 7.0, 9.0),
+    )
 
 
-def _slow_car(test: str) -> Record:
-    speeds = (2.0, 4.0, 6.0)
-    table, name = f'car/{test}.csv', f'car_{test.lower()}'
-    return Record(name, table, _ONE_HZ, 'car', 'car_speed', (0.0, 172.0), speeds)
+def slow_car(test: str, parameters: str) -> Record:
+    """
+    Return a test of a car at 1 Hz.
+    """
+    return Record(
+        f'car_{test.lower()}',
+        f'car/{test}.csv',
+        '--rate 1 --map speed_over_ground=1:km/h',
+        'car',
+        parameters,
+        (0.0, 172.0),
+        (2.0, 4.0, 6.0),
+    )
 
 
 MODEL_SHIP = Record(
     'model_ship',
-    _MODEL[0],
-    f'{_MODEL[1]} --map heading=psi_rad',
+    'cse1_coast_153s_20hz.csv',
+    '--time t_s --map speed_through_water=u_mps --map heading=psi_rad',
     'model_ship',
     'small_craft_speed',
     (6.0, 32.0),
@@ -146,13 +158,14 @@ FERRY = Record(
     (8.5, 34.8),
     (0.12, 0.17, 0.22),
 )
+CAR_ENDS_S = {'2': 15.0, '3': 13.0, '2WD-1': 12.3, '4WD-1': 17.8}
 RECORDS = (
     MODEL_SHIP,
     MODEL_SHIP_JOINT,
     FERRY,
-    *(_usv(test) for test in ('Test_6', 'Test_8', 'Test_10')),
-    *(_car(test, s) for test, s in (('2', 15.0), ('3', 13.0), ('2WD-1', 12.3), ('4WD-1', 17.8))),
-    *(_slow_car(test) for test in ('Michelin60A', 'Michelin60A1')),
+    *(usv(test, 'few_positions') for test in ('6', '8', '10')),
+    *(car(test, end_s, 'car_speed') for test, end_s in CAR_ENDS_S.items()),
+    *(slow_car(test, 'car_speed') for test in ('Michelin60A', 'Michelin60A1')),
 )
 
 
@@ -172,11 +185,7 @@ def run_command(line: str, *, data: Path, out: Path) -> None:
         elif word.endswith('.yaml'):
             word = str(ROOT / word)
         arguments.append(word.replace(f'${DATA}', str(data)))
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-        status = shipdrag(arguments)
-    if status != 0:
-        raise RuntimeError(f'{line}: {said.getvalue()}')
+    _verbs.run(*arguments)
 
 
 def replayed(record: Record, out: Path, *, window: bool = True, **changes: Any) -> ReplayResult:
@@ -207,91 +216,73 @@ def resistance_at(found: Estimate, speed_m_s: float) -> tuple[float, float] | No
     return r, sigma
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What one record gave, and its line of the table."""
-
-    estimate: Estimate
-    line: str
-
-
-def show(record: Record, out: Path) -> Outcome:
+def estimated(record: Record, out: Path, **changes: Any) -> Estimate:
     """
-    Print what became of one record.
+    Return the estimate in the window, with changed parameters.
     """
-    watched = replayed(record, out, window=False)
-    assert watched.run.span_ns is not None
-    start_ns = watched.run.span_ns[0]
-    onsets = [
-        f'{(each.start_ns - start_ns) * 1e-9:.0f} s, ended by {each.ended_by.value}'
-        for each in watched.coastdowns
-    ]
-    result = replayed(record, out)
-    (coastdown,) = result.coastdowns
-    found = coastdown.estimate
-    assert found is not None
-    print(f'\n== {record.name}: {result.ship.name}')
-    print('  ' + record.import_command())
-    print('  ' + record.replay_command())
+    (coastdown,) = replayed(record, out, **changes).coastdowns
+    assert coastdown.estimate is not None
+    return coastdown.estimate
+
+
+def figures(found: Estimate, record: Record) -> Iterator[tuple[float, float, str]]:
+    """
+    Yield speed, two sigma, and r with it as text, where a speed is inside.
+    """
+    for speed in record.speeds_m_s:
+        if (at := resistance_at(found, speed)) is not None:
+            yield speed, 2.0 * at[1], f'{speed:g}: {display.plus_minus(at[0], 2.0 * at[1])}'
+
+
+def limits(found: Estimate) -> str:
+    """
+    Return the valid range [m/s].
+    """
+    return '{:.2f} to {:.2f}'.format(*found.valid_curve.speed_m_s[[0, -1]])
+
+
+def show(record: Record, out: Path) -> tuple[Estimate, list[str]]:
+    """
+    Print what became of one record; return its estimate and its line of the table.
+    """
+    watched, result = (replayed(record, out, window=window) for window in (False, True))
+    onsets = ', '.join(f'ended by {each.ended_by.value}' for each in watched.coastdowns)
+    found = estimated(record, out)
+    print(f'\n== {record.name}: {result.ship.name}; onset without --window: {onsets or "none"}')
+    print(f'  {record.import_command()}\n  {record.replay_command()}')
     for name, counts in result.inputs.items():
         rejected = ', '.join(f'{n} {why}' for why, n in counts.rejected.items()) or 'none'
         print(f'  {name}: {counts.messages} messages, rejected: {rejected}')
-    print(f'  onset found without --window: {"; ".join(onsets) or "none"}')
     noise = ', '.join(f'{name} {sd:.2g}' for name, sd in found.noise_sd.items())
-    print(
-        f'  {found.estimator}, {found.duration_s:.1f} s, order {found.order}, ended by '
-        f'{coastdown.ended_by.value}; noise {noise}; w {100 * found.max_relative_sigma:.1f} %'
-    )
-    curve = found.valid_curve
-    print(
-        f'  valid {curve.speed_m_s[0]:.3f} to {curve.speed_m_s[-1]:.3f} m/s, Fr '
-        f'{curve.froude[0]:.3f} to {curve.froude[-1]:.3f} ({found.froude_max_by.value}); the '
-        f'fit ends at {found.curve.speed_m_s[-1]:.3f} m/s'
-    )
+    print(f'  {found.duration_s:.1f} s; noise {noise}; Fr_max by {found.froude_max_by.value}')
     c0, c1, c2 = second_opinion(found)
-    cells = []
-    for speed in record.speeds_m_s:
-        other = (1.0 + float(result.ship.n_r(speed))) * (c0 + c1 * speed + c2 * speed * speed)
-        at = resistance_at(found, speed)
-        if at is None:
-            print(f'  r({speed:g} m/s) is outside; second opinion {other:.4g}')
-            continue
-        shown = display.plus_minus(at[0], 2 * at[1])
-        print(f'  r({speed:g} m/s) = {shown} m/s^2 (2 sigma); second opinion {other:.4g}')
-        cells.append(f'{speed:g}: {shown} ({other:.{display.decimals_of(2 * at[1])}f})')
     print(f"  second opinion: v' = -({c0:.2g} {c1:+.2g} v {c2:+.2g} v|v|)")
-    fit = f'{found.estimator.removeprefix("s1_")}, {found.order}'
-    limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
-    share = f'{100 * found.max_relative_sigma:.0f}'
-    line = f'| {record.name} | {fit} | {limits} | {"<br>".join(cells)} | {share} |'
-    for note in estimate_words.notes(coastdown.estimate):
+    for note in estimate_words.notes(found):
         print(textwrap.fill(note, 96, initial_indent='  - ', subsequent_indent='    '))
-    return Outcome(found, line)
+    cells = []
+    for speed, band, shown in figures(found, record):
+        other = (1.0 + float(result.ship.n_r(speed))) * (c0 + c1 * speed + c2 * speed * speed)
+        cells.append(f'{shown} ({other:.{display.decimals_of(band)}f})')
+    fit = f'{found.estimator.removeprefix("s1_")}, {found.order}'
+    share = f'{100 * found.max_relative_sigma:.0f}'
+    return found, [record.name, fit, limits(found), '<br>'.join(cells), share]
 
 
-def default_line(record: Record, published: Estimate, out: Path) -> str:
+def default_line(record: Record, published: Estimate, out: Path) -> list[str]:
     """
-    Return what the default estimators give beside the published problem.
+    Return what the default estimator gives beside the published problem.
     """
-    cells = [record.name]
-    found = [
-        replayed(record, out, estimator=estimator, order_max=Parameters().order_max)
-        .coastdowns[0]
-        .estimate
-        for estimator in ('one',)
+    (default,) = replayed(
+        record, out, estimator='one', order_max=Parameters().order_max
+    ).coastdowns
+    cells = [
+        '<br>'.join([f'{each.estimator}, {limits(each)}', *(s for *_, s in figures(each, record))])
+        for each in (published, default.estimate)
+        if each is not None
     ]
-    for each in (published, *found):
-        assert each is not None
-        curve = each.valid_curve
-        at = [resistance_at(each, speed) for speed in record.speeds_m_s]
-        shown = [
-            f'{speed:g}: {display.plus_minus(r[0], 2 * r[1])}'
-            for speed, r in zip(record.speeds_m_s, at)
-            if r is not None
-        ]
-        limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
-        cells.append('<br>'.join([f'{each.estimator}, {limits}', *shown]))
-    return f'| {" | ".join(cells)} |'
+    if default.estimate is None:
+        cells.append(f'none: {default.failure}')
+    return [record.name, *cells]
 
 
 def show_model_ship_at_rest(out: Path) -> None:
@@ -300,15 +291,9 @@ def show_model_ship_at_rest(out: Path) -> None:
     """
     print('\n== model ship: r near rest, and by the number of coefficients [m/s^2, 2 sigma]')
     for changes in ({'froude_min': 0.001}, {'order_max': 5}, {'order_max': 6}):
-        (coastdown,) = replayed(MODEL_SHIP, out, **changes).coastdowns
-        found = coastdown.estimate
-        assert found is not None
+        found = estimated(MODEL_SHIP, out, **changes)
         low = float(found.valid_curve.speed_m_s[0])
-        shown = [
-            f'r({speed:.3g} m/s) = {display.plus_minus(at[0], 2 * at[1])}'
-            for speed in (low, 0.1, 0.15)
-            if (at := resistance_at(found, speed)) is not None
-        ]
+        shown = [s for *_, s in figures(found, replace(MODEL_SHIP, speeds_m_s=(low, 0.1, 0.15)))]
         print(f'  {changes}: order {found.order}, {", ".join(shown)}')
 
 
@@ -318,11 +303,8 @@ def show_ferry_path(out: Path) -> None:
     """
     print('\n== ferry: path by each problem [m]')
     for estimator in ('s1_speed', 's1_position', 's1_joint'):
-        (coastdown,) = replayed(FERRY, out, estimator=estimator).coastdowns
-        found = coastdown.estimate
-        assert found is not None
-        track = found.tracks.get('position')
-        if track is None:
+        found = estimated(FERRY, out, estimator=estimator)
+        if (track := found.tracks.get('position')) is None:
             speed = found.tracks['speed_over_ground']
             length = float(np.trapezoid(speed.fitted, (speed.time_ns - found.start_ns) * 1e-9))
         else:
@@ -331,13 +313,11 @@ def show_ferry_path(out: Path) -> None:
         print(f'  {estimator:<12} {length:.3f}; order {found.order}, noise {noise}')
 
 
-def show_repeats(found: dict[str, Outcome], names: Sequence[str], speed_m_s: float) -> None:
+def show_repeats(found: dict[str, Estimate], names: Sequence[str], speed_m_s: float) -> None:
     """
     Print how far repeated runs differ, beside what each says of itself.
     """
-    values = [
-        at for name in names if (at := resistance_at(found[name].estimate, speed_m_s)) is not None
-    ]
+    values = [at for name in names if (at := resistance_at(found[name], speed_m_s)) is not None]
     r, sigma = np.array(values).T
     print(
         f'  r({speed_m_s:g} m/s) of {", ".join(names)}: {" ".join(f"{each:.4f}" for each in r)}; '
@@ -387,24 +367,26 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob('*.mcap'):
         old.unlink()
-    found = {}
+    found, published = {}, []
     for record in RECORDS:
         run_command(record.import_command(), data=data, out=out)
         line = f'{record.replay_command()} --report {record.name}.html'
         run_command(line, data=data, out=out)
-        found[record.name] = show(record, out)
+        found[record.name], line_of_it = show(record, out)
+        published.append(line_of_it)
     show_model_ship_at_rest(out)
     show_ferry_path(out)
     print('\n== repeated runs')
     show_repeats(found, ['usv_test_6', 'usv_test_8', 'usv_test_10'], 0.8)
     show_repeats(found, ['car_2', 'car_3'], 7.0)
     show_repeats(found, ['car_michelin60a', 'car_michelin60a1'], 4.0)
-    published = [*RECORD_HEAD, *(outcome.line for outcome in found.values())]
-    default = [
-        *DEFAULT_HEAD,
-        *(default_line(record, found[record.name].estimate, out) for record in RECORDS),
-    ]
-    blocks = {'published problems': '\n'.join(published), 'defaults': '\n'.join(default)}
+    default = [default_line(record, found[record.name], out) for record in RECORDS]
+    in_brackets = 'r at m/s: ± 2 sigma (second opinion)'
+    of_published = ('record', 'fit, order', 'valid [m/s]', in_brackets, 'w [%]')
+    blocks = {
+        'published problems': '\n'.join(table(of_published, published)),
+        'defaults': '\n'.join(table(('record', 'published problem', 'default'), default)),
+    }
     print('', *blocks.values(), sep='\n')
     if options.write:
         put(PAGE, blocks)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The coastdown estimator as published (S1): its statements beside ours, and what the scripts print.
+The coastdown estimator as published (S1): its statements beside ours, its experiment, error and
+coverage of its three problems, its order rule, and the time of an estimate.
 
-Runs s1_experiment, s1_accuracy, s1_order and s1_time and prints the page; `--write` puts it into
-docs/s1_coastdown.md, its picture into docs/pictures. Two minutes.
+    python -m benchmarks.figures s1_coastdown
+
+On the cargo ship, n samples of log and position each. `--picture` draws that of
+docs/s1_coastdown.md. Two minutes.
 """
 
 from __future__ import annotations
@@ -13,48 +16,49 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
-import contextlib
-import io
 import tempfile
-from collections.abc import Callable
-from functools import partial
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from benchmarks._tables import publish, table
-from benchmarks.accuracy import s1_accuracy, s1_experiment, s1_order
+import numpy as np
+
+from benchmarks._tables import grid, table
+from benchmarks.accuracy._coasts import CARGO, Case, read, rms, voyage
 from benchmarks.accuracy.s1_experiment import (
+    LABELS,
     RUNS,
-    SEED,
     YACHT_NOISE,
     Stated,
     coastdowns,
+    draw,
     inflection,
     maxima,
+    off,
 )
-from benchmarks.speed import s1_time
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.simulation import Truth
+from shipdrag_ros.studies import order
+from shipdrag_ros.studies.order import OrderTable, fit_orders
+from shipdrag_ros.studies.orthogonal import OrthogonalBasis
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
-PAGE = DOCS / 's1_coastdown.md'
-PICTURE = 's1_experiment.png'
-
-SECTIONS = {
-    'The experiment': '`s1_experiment.py`. Orders are numbers of coefficients.',
-    'Error and coverage': '`s1_accuracy.py`.',
-    'The order rule': '`s1_order.py`. The paper compares neighbouring residual '
-    'variances by eye; ours is an F test, and a higher order must keep its gain for some steps.',
-    'Time': '`s1_time.py`.',
-}
-
-
-def printed(run: Callable[[], None]) -> str:
-    """
-    Return what a script prints.
-    """
-    kept = io.StringIO()
-    with contextlib.redirect_stdout(kept):
-        run()
-    return kept.getvalue().rstrip()
+PICTURE = Path(__file__).resolve().parents[2] / 'docs' / 'pictures' / 's1_experiment.png'
+PROBLEMS = ('s1_speed', 's1_position', 's1_joint')
+CASES = (
+    Case('base'),
+    Case('n = 100', n=100),
+    Case('n = 2000', n=2000),
+    Case('good position', hull=replace(CARGO, log_sd=0.1, position_sd=1.0)),
+    Case('thrust runs down', run_down=True),
+)
+TRUE_ORDER = 5
+SIZES = (3.0, 4.0, 6.0)  # of the last true coefficient, in its standard deviations
+RULES = tuple((p, steps) for p in (0.001, 0.01, 0.05, 0.1) for steps in (1, 2, 3))
+COUNTS = (100, 500, 2_000, 10_000, 100_000)
 
 
 def beside() -> list[str]:
@@ -62,15 +66,14 @@ def beside() -> list[str]:
     Return the statements of the paper beside what is found.
     """
     truth, yachts = coastdowns()
-    ship = truth.ship
-    of = {name: Stated.of(truth, name, 100) for name in s1_experiment.LABELS}
+    of = {name: Stated.of(truth, name, 100) for name in LABELS}
     joint, half = of['s1_joint'], Stated.of(truth, 's1_joint', 50)
-    means = ', '.join(f'{s1_experiment.LABELS[name]} {one.mean:.2f}' for name, one in of.items())
+    means = ', '.join(f'{LABELS[name]} {one.mean:.2f}' for name, one in of.items())
     found = []
     for name, yacht in yachts.items():
         tops, _ = maxima(yacht, YACHT_NOISE)
         found.append(f'{name}: significant in {len(tops)} of {RUNS} records')
-    hull: Ship = next(iter(yachts.values())).ship
+    ship, hull = truth.ship, next(iter(yachts.values())).ship
     rows = [
         (
             'n_r of the ship at rest and at 8.2 m/s',
@@ -110,53 +113,141 @@ def beside() -> list[str]:
     return table(('', 'the paper', 'here'), rows)
 
 
+def scored(found: list[Estimate], truth: Truth) -> tuple[str, str, str]:
+    """
+    Return error, error at the top, and cover over the valid ranges, in percent.
+    """
+    error, sigma = np.array([off(one.valid_curve, truth) for one in found]).transpose(1, 0, 2)
+    cover = np.mean(np.abs(error) <= 2.0 * sigma)
+    return f'{100 * rms(error):.2f}', f'{100 * rms(error[:, -1]):.1f}', f'{100 * cover:.0f}'
+
+
+def accuracy(runs: int) -> Iterator[list[str]]:
+    """
+    Yield a row for each case and problem.
+    """
+    for case in CASES:
+        truth = voyage(case)
+        windows = [read(truth, case, seed) for seed in range(runs)]
+        for problem in PROBLEMS:
+            parameters = Parameters(estimator=problem)
+            found = [estimate(window, truth.ship, parameters) for window in windows]
+            orders = Counter(one.order or 0 for one in found)
+            inflections = sum(one.froude_max_by is FroudeMax.INFLECTION for one in found)
+            yield [
+                case.name,
+                problem,
+                *scored(found, truth),
+                f'{100 * np.median([one.max_relative_sigma for one in found]):.2f}',
+                f'{np.median([one.froude_valid[1] for one in found]):.3f}',
+                f'{100 * inflections / runs:.0f}',
+                ' '.join(f'{chosen}:{count}' for chosen, count in sorted(orders.items())),
+            ]
+
+
+def polynomials(size: float, runs: int) -> list[OrderTable]:
+    """
+    Return the order tables of polynomials of `TRUE_ORDER` in unit noise, n = 100, seed 1.
+    """
+    rng = np.random.default_rng(1)
+    basis = OrthogonalBasis.on(np.linspace(-1.0, 1.0, 100), 20)
+    decay = size * 3.0 ** np.arange(TRUE_ORDER - 1, -1, -1)
+    truth = (decay / np.sqrt(basis.squared_norm[:TRUE_ORDER])) @ basis.columns[:TRUE_ORDER]
+    return [fit_orders(basis, truth + noise)[1] for noise in rng.normal(size=(runs, 100))]
+
+
+def order_rules(runs: int, coasts: int) -> Iterator[list[str]]:
+    """
+    Yield for each rule how often it chooses wrongly, and what that costs on coastdowns.
+
+    There no degree is right, and too low costs more than too high.
+    """
+    kept = order.SIGNIFICANCE, order.NEIGHBOURS
+    truth, known = voyage(CASES[0]), {size: polynomials(size, runs) for size in SIZES}
+    windows = [read(truth, CASES[0], seed) for seed in range(coasts)]
+    for p, steps in RULES:
+        order.SIGNIFICANCE, order.NEIGHBOURS = p, steps
+        chosen = [
+            np.array(
+                [t.coefficients[OrderTable(t.coefficients, t.sse, t.rows).plateau()] for t in some]
+            )
+            for some in known.values()
+        ]
+        joint = Parameters(estimator='s1_joint')
+        found = [estimate(window, truth.ship, joint) for window in windows]
+        yield [
+            f'{p:g}',
+            str(steps),
+            f'{100 * np.mean(chosen[-1] > TRUE_ORDER):.1f}',
+            *(f'{100 * np.mean(each < TRUE_ORDER):.1f}' for each in chosen),
+            *scored(found, truth),
+        ]
+    order.SIGNIFICANCE, order.NEIGHBOURS = kept
+
+
+def median_ms(window: Window, truth: Truth, problem: str, *, repeats: int) -> float:
+    """
+    Return the median processor time of one estimate, from a window to the result [ms].
+    """
+    taken = []
+    for _ in range(repeats):
+        start = time.process_time()
+        estimate(window, truth.ship, Parameters(estimator=problem))
+        taken.append(time.process_time() - start)
+    return 1e3 * float(np.median(taken))
+
+
+def times() -> Iterator[list[str]]:
+    """
+    Yield the time of one estimate by the number of samples.
+    """
+    truth, rows = voyage(CASES[0]), []
+    for n in COUNTS:
+        window = read(truth, Case(n=n), 0)
+        repeats = max(3, min(100, 200_000 // n))
+        rows.append([median_ms(window, truth, each, repeats=repeats) for each in PROBLEMS])
+        yield [str(n), *(f'{ms:.2f}' for ms in rows[-1])]
+    slopes = np.log(np.divide(rows[-1], rows[-2])) / np.log(COUNTS[-1] / COUNTS[-2])
+    yield ['last slope', *(f'{slope:.2f}' for slope in slopes)]
+
+
 def main() -> None:
     """
-    Print the page; write it if asked.
+    Print it all, and draw where that is asked for.
     """
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='docs/s1_coastdown.md, its picture')
-    write = parser.parse_args().write
+    parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
+    parser.add_argument('--polynomials', type=int, default=2000, help='for the order rule')
+    parser.add_argument('--coasts', type=int, default=100, help='for the order rule')
+    parser.add_argument('--picture', action='store_true', help=PICTURE.name)
+    options = parser.parse_args()
+    print(*beside(), '', sep='\n')
     with tempfile.TemporaryDirectory() as folder:
-        runs = (
-            partial(s1_experiment.main, ['--out', folder]),
-            partial(s1_accuracy.main, []),
-            partial(s1_order.main, []),
-            s1_time.main,
-        )
-        texts = [printed(run) for run in runs]
-        picture = (Path(folder) / PICTURE).read_bytes()
-    lines = [
-        '# The coastdown estimator as published (S1)',
-        '',
-        'Devyatisilny, Dorozhko, Grinyak: *Determination of hydrodynamic resistance from '
-        'trajectory data of inertial motion* (2003).',
-        'Written by `python -m benchmarks.accuracy.s1_coastdown --write`. '
-        'The records of the paper, sea trials of '
-        'the cargo ship "Vitus Bering" and speeds of the yacht "Rowdy", are not',
-        'printed in it. Here both are simulated: 150 m, 20 200 m³, from 8.2 m/s, 1500 s as it '
-        'says, with resistance, and noise of log (0.05 m/s) and radar (10 m), of our',
-        f'own; seed {SEED}, or {RUNS} records from seed 0.',
-        '',
-        '`estimator: s1_speed`, `s1_position` or `s1_joint` in the parameters chooses one of the '
-        'three problems of the paper, certified against exact rational arithmetic',
-        '(`tests/studies/s1/test_s1.py`).',
-        'They are kept as the reference; what is used by default, and by how much it is better: '
-        '`benchmarks/results/accuracy_beside_peers.md`.',
-        '',
-        '## The paper and what is found',
-        '',
-        *beside(),
-        '',
-        f'![Orders, r and dr/dFr, w, real error and sigma](pictures/{PICTURE})',
-    ]
-    for (heading, words), text in zip(SECTIONS.items(), texts):
-        lines += ['', f'## {heading}', '', words, '', '```text', text, '```']
-    page = '\n'.join(lines) + '\n'
-    print(page)
-    if write:
-        publish(PAGE, lines, rows=6)
-        (DOCS / 'pictures' / PICTURE).write_bytes(picture)
+        draw(PICTURE if options.picture else Path(folder) / PICTURE.name)
+    share = ('RMSE %', 'at top %', 'cover %')
+    grid(
+        f'S1 on simulated coastdowns, N = {options.runs}, seeds 0..{options.runs - 1}',
+        ['case', 'problem', *share, 'median w %', 'Fr_max', 'inflections %', 'orders chosen'],
+        accuracy(options.runs),
+        width=140,
+        left=2,
+    )
+    print(
+        'RMSE, at top: of r over the valid range, evenly in speed, and at its upper end, in % of '
+        'the true r at 8.2 m/s.\n'
+        'cover: share of the range where +-2 sigma (repeatable) holds the truth. '
+        "w: S1's max sigma_r / max r.\n"
+    )
+    grid(
+        f'Order rule: {options.polynomials} polynomials of order {TRUE_ORDER} (seed 1), '
+        f'{options.coasts} coastdowns; in use: p < {order.SIGNIFICANCE}, '
+        f'{order.NEIGHBOURS} steps',
+        ['p <', 'steps', 'too high %', *(f'too low % at {size:g} sd' for size in SIZES), *share],
+        order_rules(options.polynomials, options.coasts),
+        width=120,
+        left=2,
+    )
+    grid('ms of processor time an estimate', ['n of each input', *PROBLEMS], times(), width=80)
 
 
 if __name__ == '__main__':

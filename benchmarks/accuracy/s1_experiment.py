@@ -10,16 +10,14 @@ real error.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.accuracy._coasts import coast, errors, read
+from benchmarks.accuracy._coasts import CARGO, YACHT, Case, Hull, errors, read, rms, voyage
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.parameters import Parameters
@@ -30,7 +28,6 @@ from shipdrag_ros.simulation import Truth
 mpl.use('Agg')
 import matplotlib.pyplot as plt
 
-CONFIG = Path(__file__).parents[2] / 'config'
 SEED = 1
 RUNS = 100
 COUNTS = (100, 200, 300, 400, 500)
@@ -53,9 +50,19 @@ def solve(
     """
     Estimate by one problem from n samples of each input.
     """
-    speed_sd, position_sd = noise
-    window = read(truth, n, seed=seed, speed_sd=speed_sd, position_sd=position_sd)
+    hull = Hull('', '', np.nan, truth.scenario.duration_s, *noise)
+    window = read(truth, Case(hull=hull, n=n), seed)
     return estimate(window, truth.ship, Parameters(estimator=problem))
+
+
+def off(curve: ResistanceCurve, truth: Truth) -> tuple[Float64, Float64]:
+    """
+    Return error over the true r at the start, and sigma, evenly over a curve.
+    """
+    true = truth.specific_resistance(curve.speed_m_s)
+    error, sigma = errors(curve, lambda speed: np.interp(speed, curve.speed_m_s, true))
+    largest = float(truth.specific_resistance(truth.speed_through_water_m_s[0]))
+    return error / largest, sigma / largest
 
 
 def draw_orders(axes: list[Axes], truth: Truth) -> None:
@@ -139,24 +146,19 @@ class Stated:
         """
         largest, mean, wrong, small = [], [], [], np.zeros(0)
         for seed in range(RUNS):
-            found = solve(truth, problem, n, seed=seed, noise=noise)
-            curve = found.valid_curve
+            curve = solve(truth, problem, n, seed=seed, noise=noise).valid_curve
             w = curve.sigma_repeatable_m_s2 / curve.resistance_m_s2.max()
             largest.append(w.max())
             mean.append(np.trapezoid(w, curve.froude) / np.ptp(curve.froude))
-            wrong.append(errors(found, truth))
+            wrong.append(off(curve, truth)[0])
             if seed == SEED:
                 small = curve.froude[w < 0.01]
-        rmse, top = (
-            100.0 * float(np.sqrt(np.mean(np.square([getattr(e, name) for e in wrong]))))
-            for name in ('rmse', 'at_top')
-        )
         return cls(
             100.0 * float(np.mean(largest)),
             100.0 * float(np.mean(mean)),
             (float(small.min()), float(small.max())),
-            rmse,
-            top,
+            100.0 * rms(wrong),
+            100.0 * rms(np.array(wrong)[:, -1]),
         )
 
 
@@ -215,14 +217,14 @@ def draw_truth(axis: Axes, truth: Truth) -> None:
             wrong = curve.resistance_m_s2 - truth.specific_resistance(curve.speed_m_s)
             error.append(at(speeds, curve, wrong))
             stated.append(at(speeds, curve, curve.sigma_repeatable_m_s2))
-        rms = 100.0 * np.sqrt(np.nanmean(np.square(error), axis=0)) / largest
+        real = 100.0 * np.sqrt(np.nanmean(np.square(error), axis=0)) / largest
         bias = 100.0 * np.nanmean(error, axis=0) / largest
         sigma = 100.0 * np.sqrt(np.nanmean(np.square(stated), axis=0)) / largest
         froude = ship.froude(speeds)
-        axis.semilogy(froude, rms, colour, label=f'{LABELS[problem]}: real error')
+        axis.semilogy(froude, real, colour, label=f'{LABELS[problem]}: real error')
         axis.semilogy(froude, sigma, colour, ls='--')
         shown = [
-            f'Fr {froude[i]:.2f}: {rms[i]:.2f} (bias {bias[i]:+.2f}) against {sigma[i]:.2f}'
+            f'Fr {froude[i]:.2f}: {real[i]:.2f} (bias {bias[i]:+.2f}) against {sigma[i]:.2f}'
             for i in (5, 30, 60, 85, 97)
         ]
         print(f'  {LABELS[problem]:<9}', '; '.join(shown))
@@ -232,12 +234,12 @@ def draw_truth(axis: Axes, truth: Truth) -> None:
     axis.legend(fontsize=7)
 
 
-def draw_bands(axis: Axes, ship: Ship, truth: Truth) -> None:
+def draw_bands(axis: Axes, truth: Truth) -> None:
     """
     One joint estimate with its band, thrust ending at once and running down.
     """
     print('one joint estimate, n = 500, at the top of the valid range')
-    slow = coast(ship, speed_m_s=8.2, duration_s=1500.0, run_down=True)
+    slow = voyage(Case(run_down=True))
     for colour, name, record in (('C0', 'at once', truth), ('C3', 'runs down', slow)):
         curve = solve(record, 's1_joint', 500).valid_curve
         r, sigma = curve.resistance_m_s2, curve.sigma_repeatable_m_s2
@@ -295,22 +297,17 @@ def coastdowns() -> tuple[Truth, dict[str, Truth]]:
     """
     Return those of the cargo ship and of the yacht.
     """
-    ship, yacht = (Ship.load(CONFIG / name) for name in ('vitus_bering.yaml', 'yacht.yaml'))
-    return coast(ship, speed_m_s=8.2, duration_s=1500.0), {
-        f'yacht {knots} kn': coast(yacht, speed_m_s=knots * KNOT_M_S, duration_s=300.0)
-        for knots in (6, 5)
-    }
+    yachts = {}
+    for knots in (6, 5):
+        hull = replace(YACHT, speed_m_s=knots * KNOT_M_S, duration_s=300.0)
+        yachts[f'yacht {knots} kn'] = voyage(Case(hull=hull))
+    return voyage(Case(hull=CARGO)), yachts
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def draw(picture: Path) -> None:
     """
     Print the figures and draw the picture.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--out', type=Path, default=Path(__file__).parent / 'out')
-    out = parser.parse_args(arguments).out
-    out.mkdir(parents=True, exist_ok=True)
-
     truth, yachts = coastdowns()
     speed = truth.speed_through_water_m_s
     print(
@@ -323,11 +320,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     draw_w(axes[1, 1], truth)
     draw_truth(axes[1, 2], truth)
     print_yacht(yachts)
-
-    draw_bands(axes[1, 3], truth.ship, truth)
-    figure.savefig(out / 's1_experiment.png', dpi=60)
-    print('picture: s1_experiment.png')
-
-
-if __name__ == '__main__':
-    main()
+    draw_bands(axes[1, 3], truth)
+    figure.savefig(picture, dpi=60)

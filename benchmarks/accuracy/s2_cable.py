@@ -2,7 +2,7 @@
 """
 The towed cable of S2: the paper's figures drawn again, its numbers beside ours.
 
-`python -m benchmarks.accuracy.s2_cable` prints the page; with `--write` it goes to
+`python -m benchmarks.accuracy.s2_cable` prints the numbers; with `--write` they go into
 docs/s2_cable.md and the pictures beside it. No random numbers; some seconds.
 """
 
@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks._tables import put, table
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
 from shipdrag_ros.studies.cable.drag import (
@@ -130,10 +131,10 @@ def tangents() -> Figure:
     return figure
 
 
-PICTURES: dict[str, tuple[Callable[[], Figure], str]] = {
-    's2_coefficients.png': (coefficients, 'Coefficients of cylinders along the flow'),
-    's2_naive.png': (naive, 'C V beside C V², and its error'),
-    's2_tangents.png': (tangents, 'Tangents, and their errors'),
+PICTURES: dict[str, Callable[[], Figure]] = {
+    's2_coefficients.png': coefficients,
+    's2_naive.png': naive,
+    's2_tangents.png': tangents,
 }
 
 
@@ -163,7 +164,7 @@ def _check_best(low: float, high: float) -> None:
         assert largest(place, other * (1.0 + least)) > least
 
 
-def beside() -> str:
+def numbers() -> str:
     """
     Return the table of the paper's numbers beside ours.
     """
@@ -173,115 +174,44 @@ def beside() -> str:
         ends = np.array([SHORTEST, LONGEST])
         found = drag_coefficient(ends, surface)
         exact = (found[0] - found[1]) / (1.0 / ends[0] - 1.0 / ends[1])
-        limit = found[1] - exact / ends[1]
-        rounded = base / ends + side
+        limit = f'{found[1] - exact / ends[1]:.5f}'
         rows += [
             (f'C0 = a d/l + b, {surface}: a', f'{base:g}', f'{exact:.4f}'),
-            ('b', f'{side:g}', f'{limit:.5f}'),
-            ('C0 of an endless one', f'{LIMITS[surface]:g}, and {side:g} by (12)', f'{limit:.5f}'),
-            *(
-                (f'C0 at l/d = {at:g}', f'{one:.5f} by (12)', f'{other:.5f}')
-                for at, one, other in zip(ends, rounded, found)
-            ),
+            ('b', f'{side:g}', limit),
+            ('C0 of an endless one', f'{LIMITS[surface]:g}, and {side:g} by (12)', limit),
         ]
-    low, high = tangent_range(0.1)
-    rows += [
-        (
-            'u for 10 %, tangent',
-            '{:g} to {:g}'.format(*PUBLISHED_RANGE),
-            f'{low:.4f} to {high:.4f}',
-        ),
-        *(
-            (
-                f'error of the tangent at u = {u:g}',
-                '10 % at most',
-                f'{_percent(u, tangent_error)} %',
-            )
-            for u in PUBLISHED_RANGE
-        ),
-        (
-            'V for 10 %, C V',
-            '1 m/s alone has 0 %',
-            '{:.3f} to {:.3f} m/s'.format(*naive_range_m_s(0.1)),
-        ),
-        *(
-            (f'error of C V at {v:g} m/s', text, f'{_percent(v, naive_error)} %')
-            for v, text in (
-                (0.05, '"larger, the smaller the speed"'),
-                (0.5, ''),
-                (2.0, 'the same'),
-                (3.0, ''),
-            )
-        ),
-    ]
-    head = ('', 'paper', 'here')
-    return '\n'.join(f'| {" | ".join(cells)} |' for cells in (head, ('---',) * 3, *rows))
-
-
-def page() -> str:
-    """
-    Return the page.
-    """
+        for at, rounded, ours in zip(ends, base / ends + side, found):
+            rows.append((f'C0 at l/d = {at:g}', f'{rounded:.5f} by (12)', f'{ours:.5f}'))
     low, high = PUBLISHED_RANGE
-    _check_best(low, high)
+    ours = '{:.4f} to {:.4f}'.format(*tangent_range(0.1))
+    rows.append(('u for 10 %, tangent', f'{low:g} to {high:g}', ours))
+    for u in PUBLISHED_RANGE:
+        error = f'{_percent(u, tangent_error)} %'
+        rows.append((f'error of the tangent at u = {u:g}', '10 % at most', error))
     place, least = best_line(low, high)
-    pictures = '\n\n'.join(f'![{words}](pictures/{name})' for name, (_, words) in PICTURES.items())
-    return f"""# The towed cable of S2
-
-I. M. Akhmedov, V. A. Naumov: *Linearization of the dependence of the cable hydrodynamic drag
-force from the speed*. Written by `python -m benchmarks.accuracy.s2_cable --write`; the code is
-`shipdrag_ros/studies/cable/drag.py`, the verb `shipdrag cable`.
-
-    shipdrag cable --length 50 --diameter 0.1 --speed 3 --report cable.html
-
-## The paper's numbers beside ours
-
-{beside()}
-
-Ours come from its (10), unrounded: zeta0 = 0.99 + 0.0099 l/d smooth, 0.98 + 0.0392 l/d rough,
-C0 = 0.25 pi zeta0 d/l.
-
-## Where the paper is wrong or silent
-
-- **The range.** Its (18) is a square, -(1 - 1/u)²: 10 % holds for u from 1/(1 + s) to 1/(1 - s),
-  s = sqrt(0.1). Abstract and conclusion say {low:g} to {high:g}. The error is never above zero:
-  the tangent lies below the parabola.
-- A line within 10 % over {low:g} to {high:g} exists, but it is not the tangent at V0: the tangent
-  at {place:.4f} V0, times {1.0 + least:.4f}, errs by {100.0 * least:.1f} % at most.
-- **The conclusion on C V**, "the error is larger, the smaller the speed", holds below 1 m/s. Above
-  it the error grows with the speed, towards -100 %. That 1 m/s is an accident of the unit.
-- **The limits.** For endless cylinders its text reads 0.01 and 0.03, its (12) gives 0.008 and
-  0.031, and (10) is said not to hold there. So C0 has to be stated (`--c0`) up to
-  l/d = {SHORTEST:g}, below which (10) is not given, and should be beyond {LONGEST:g}: the verb
-  warns.
-- The density is missing in (13), which is said to be the force over l d; (16) is the force itself.
-  Figures 3 to 5 are drawn as (13) has them.
-- zeta1 is 0.98 in the text, 0.99 in (10) for a smooth cylinder: each formula is kept as it is.
-  There is no (5), and (12) is there twice.
-- Components at an angle (6) are a rotation. C_x and C_y of an inclined cable are not given, so
-  only the rotation is here.
-
-## Its figures, drawn again
-
-The measured points of figure 2 are lost in the copy at hand. C0 of figures 3 to 5 is not stated;
-0.02 is taken.
-
-{pictures}
-"""
+    line = f'{place:.4f} V0, times {1.0 + least:.4f}: {100.0 * least:.1f} %'
+    rows.append((f'least error of a line over {low:g} to {high:g}, tangent at', '', line))
+    ours = '{:.3f} to {:.3f} m/s'.format(*naive_range_m_s(0.1))
+    rows.append(('V for 10 %, C V', '1 m/s alone has 0 %', ours))
+    said = {0.05: '"larger, the smaller the speed"', 2.0: 'the same'}
+    for v in (0.05, 0.5, 2.0, 3.0):
+        error = f'{_percent(v, naive_error)} %'
+        rows.append((f'error of C V at {v:g} m/s', said.get(v, ''), error))
+    _check_best(low, high)
+    return '\n'.join(table(('', 'paper', 'here'), rows))
 
 
 def main() -> None:
     """
-    Print the page; write it and its pictures if asked.
+    Print the numbers; write them and the pictures into the docs if asked.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--write', action='store_true', help='docs/s2_cable.md and its pictures')
     options = parser.parse_args()
-    text = page()
-    print(text, end='')
+    print(numbers())
     if options.write:
-        (DOCS / 's2_cable.md').write_text(text, encoding='utf-8')
-        for name, (draw, _) in PICTURES.items():
+        put(DOCS / 's2_cable.md', {'numbers': numbers()})
+        for name, draw in PICTURES.items():
             with mpl.rc_context(STYLE):
                 save(draw(), DOCS / 'pictures' / name)
 

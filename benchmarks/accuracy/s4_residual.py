@@ -5,7 +5,9 @@ S4: how regressions of residual resistance fail, and what the guard makes of it.
 River ships as the paper describes them, with a known control curve; the power of
 the guard over simulated data sets; and, with SHIPDRAG_DATA, the Delft yacht
 series with hulls and Froude numbers left out. A Gaussian process with a physical
-mean stands beside the forms. `--write` makes docs/s4_residual.md and its pictures.
+mean stands beside the forms. `--pictures` draws those of docs/s4_residual.md.
+
+    python -m benchmarks.figures s4_residual    # needs `make peers`
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for threads
@@ -21,16 +24,15 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks._tables import publish, table, write_csv
+from benchmarks._tables import titled, write_csv
+from benchmarks.accuracy._delft import FILE as DELFT
 from benchmarks.accuracy._delft import delft
 from benchmarks.accuracy._regressions import WRONG, Predictor, gauss, rms, shown
 from benchmarks.accuracy._river_ships import (
-    FROUDE,
     LINES,
     NAMES,
     NOISE,
     PROTOTYPE,
-    SPEEDS,
     asked,
     control,
     models,
@@ -41,7 +43,6 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import FORMS, Hulls, ResidualFit, fit_form
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / 'docs' / 's4_residual.md'
 PICTURES = ROOT / 'docs' / 'pictures'
 TABLE = ROOT / 'docs' / 'data' / 'river_ships.csv'  # tests to try the verb on
 SEED = 4
@@ -49,6 +50,11 @@ ASKED = 30  # hulls asked for in each data set
 PROCESSES = 50  # sets to which a Gaussian process is fitted too: it takes its time
 PAPER = {'sirotina': 0.006, 'sakhnovsky': 0.017}
 FLEETS = (9, 16, 25, 40)
+WORDS = {  # of a rule's reasons
+    'range or convex hull': 'outside',
+    'leverage': 'leverage',
+    'trend against physics': 'against physics',
+}
 
 
 # the paper's experiment
@@ -83,7 +89,7 @@ def foretellers(found: dict[str, ResidualFit]) -> dict[str, Predictor]:
     return {name: bound(fit) for name, fit in found.items()}
 
 
-def nine_ships(runs: int) -> tuple[list[str], Figure]:
+def nine_ships(runs: int) -> Iterator[str]:
     """
     The sweeps of the paper's figures 1 and 2, over many sets of nine ships.
     """
@@ -115,71 +121,31 @@ def nine_ships(runs: int) -> tuple[list[str], Figure]:
             for ratio, at in SWEEPS.values():
                 ships = sweep(ratio, at, 0.15)
                 passed += sum(each.inside for fit in fits.values() for each in fit.predict(ships))
-    text = [
-        '## Nine river ships',
-        '',
-        'The paper fits nine models of a textbook, whose tests it does not print. Ours: the',
-        f'prototype (L/B {PROTOTYPE[0]:g}, B/T {PROTOTYPE[1]:g}, C_B {PROTOTYPE[2]:g}) and eight '
-        f'others, each at {SPEEDS} speeds of its own,',
-        f'Fr {FROUDE[0]:g} to {FROUDE[1]:g}; 10³ c_R by the formulas for the diagrams of '
-        f'Guldhammer and Harvald, {LINES:.0%} of',
-        f"each hull's own and {NOISE:.0%} of each test. {runs} such sets (seed {SEED}; the "
-        f'Gaussian process on {min(runs, PROCESSES)} of them).',
-        '',
-        *table(
-            ('form', 'F, the paper', 'F, ours, median', 'rank', 'condition'),
-            [
-                (
-                    name,
-                    PAPER[name],
-                    f'{np.median(criteria[name]):.4f}',
-                    f'{fit.fit.rank} of 15',
-                    f'{fit.fit.condition:.0e}',
-                )
-                for name, fit in fits.items()
-            ],
-        ),
-        '',
-        'F is no evidence: nine hulls cannot separate the terms of shape (rank), so the fit',
-        'meets every hull and its trend between them is arbitrary. Sweeps of L/B and B/T about',
-        'the prototype at Fr 0.15, as in the figures of the paper; error of 10³ c_R (control:',
-        '1.1 to 1.4), root mean square, median of the sets and what one in ten exceeds:',
-        '',
-        *table(
-            ('varied', '', *SPANS, 'trend reversed at the prototype'),
-            [
-                (
-                    varied,
-                    name,
-                    *(
-                        '{:.2f}, {:.2f}'.format(
-                            *np.quantile(errors[varied, name, span], [0.5, 0.9])
-                        )
-                        for span in SPANS
-                    ),
-                    f'{100 * count / len(errors[varied, name, SPANS[0]]):.0f} %',
-                )
-                for (varied, name), count in wrong.items()
-            ],
-        ),
-        '',
-        'The Gaussian process, about a power law in Fr, slenderness and B/T with the right signs,',
-        'is three to nine times nearer beyond, with half the reversed trends or fewer: physics in',
-        'the model, not more terms, is what few hulls can carry.',
-        '',
-        'As in the paper the curves meet at the prototype and part from there, and its',
-        'conclusion holds: not where shape is varied. The guard refuses every ship of these',
-        'sweeps but the prototype itself, which the second one meets',
-        f'({passed} passed, of two forms in {min(runs, PROCESSES)} sets): "the data determine 14 '
-        'of 15 combinations of coefficients,',
-        'and this hull needs another".',
-        '',
-        '![c_R of the prototype with L/B and B/T varied](pictures/s4_sweeps.png)',
-        '',
-        'One set of nine. "Sirotina, another" is the same form with the same F to the last',
-        'digit: its coefficients differ along what the data leave open.',
-    ]
-    return text, sweep_picture()
+    yield from titled(
+        f'Nine river ships, {runs} sets, the Gaussian process on {min(runs, PROCESSES)} of them',
+        ('form', 'F, the paper', 'F, ours, median', 'rank', 'condition'),
+        [
+            (
+                name,
+                PAPER[name],
+                f'{np.median(criteria[name]):.4f}',
+                f'{fit.fit.rank} of 15',
+                f'{fit.fit.condition:.0e}',
+            )
+            for name, fit in fits.items()
+        ],
+    )
+    rows = []
+    for (varied, name), count in wrong.items():
+        of = [errors[varied, name, span] for span in SPANS]
+        cells = ['{:.2f}, {:.2f}'.format(*np.quantile(each, [0.5, 0.9])) for each in of]
+        rows.append((varied, name, *cells, f'{100 * count / len(of[0]):.0f} %'))
+    yield from titled(
+        'Error of 10^3 c_R in the sweeps, rms: median of the sets, and what one in ten exceeds',
+        ('varied', '', *SPANS, 'trend reversed at the prototype'),
+        rows,
+    )
+    yield f'{passed} ships of the sweeps passed the guard'
 
 
 def sweep_picture() -> Figure:
@@ -220,7 +186,7 @@ def open_part(found: ResidualFit, ships: Hulls) -> Float64:
 # the power of the guard
 
 
-def guard(runs: int) -> list[str]:
+def guard(runs: int) -> Iterator[str]:
     """
     Over simulated data sets: what is refused, and what passes.
     """
@@ -260,46 +226,29 @@ def guard(runs: int) -> list[str]:
                     shown(100 * hit[ok].mean() if ok.any() else float('nan'), '.0f'),
                 )
             )
-    return [
-        '## Power of the guard',
-        '',
-        f'{runs} data sets of each kind, {ASKED} hulls asked for in each, up to a quarter of the '
-        'range beyond it',
-        f'(seed {SEED} with the number of hulls). Bad: more than {WRONG:.0%} off the control.',
-        '',
-        *table(
-            (
-                'form',
-                'hulls',
-                'bad %',
-                '**bad refused %**',
-                'good passed %',
-                'passed',
-                'error of passed %',
-                'of refused %',
-                '2 sd hold a new test %',
-            ),
-            rows,
+    yield from titled(
+        f'Power of the guard, {runs} data sets of each kind, {ASKED} hulls in each',
+        (
+            'form',
+            'hulls',
+            'bad %',
+            '**bad refused %**',
+            'good passed %',
+            'passed',
+            'error of passed %',
+            'of refused %',
+            '2 sd hold a new test %',
         ),
-        '',
-        'The guard is strict: of many hulls most of what it refuses would have been good, and the',
-        'data could not have shown. The convex hull of a few dozen points in four or five ratios',
-        'is small: few of the hulls asked for lie in it.',
-        '',
-        'Each rule alone, Sirotina, 16 hulls; share in % that it refuses:',
-        '',
-        *table(
-            ('rule', 'of bad ones', 'of good ones'),
-            [
-                (
-                    rule,
-                    f'{100 * rules[rule, True] / totals[True]:.1f}',
-                    f'{100 * rules[rule, False] / totals[False]:.1f}',
-                )
-                for rule in ('range or convex hull', 'leverage', 'trend against physics')
-            ],
-        ),
-    ]
+        rows,
+    )
+    yield from titled(
+        'Each rule alone, Sirotina, 16 hulls; share in % that it refuses',
+        ('rule', 'of bad ones', 'of good ones'),
+        [
+            (rule, *(f'{100 * rules[rule, bad] / totals[bad]:.1f}' for bad in (True, False)))
+            for rule in WORDS
+        ],
+    )
 
 
 def _count(
@@ -309,72 +258,33 @@ def _count(
     bad: np.ndarray,
 ) -> None:
     """Count which rules speak, of bad and of good predictions."""
-    words = {
-        'range or convex hull': ('outside',),
-        'leverage': ('leverage',),
-        'trend against physics': ('against physics',),
-    }
     for given, is_bad in zip(reasons, bad.tolist()):
         totals[is_bad] += 1
-        for rule, (word,) in words.items():
+        for rule, word in WORDS.items():
             rules[rule, is_bad] += any(word in reason for reason in given)
 
 
 def main() -> None:
     """
-    Print the page.
+    Print the tables, and draw where that is asked for.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--runs', type=int, default=500, help='data sets of each kind')
-    parser.add_argument('--write', action='store_true', help='the page and its pictures')
+    parser.add_argument('--pictures', action='store_true', help='those of the page, and its data')
     options = parser.parse_args()
-    folder = os.environ.get('SHIPDRAG_DATA')
-    if folder is None and options.write:
-        parser.error('--write needs SHIPDRAG_DATA, the folder of yacht_hydrodynamics.data')
-    of_nine, sweeps = nine_ships(options.runs)
-    lines = [
-        '# Regressions of residual resistance (S4)',
-        '',
-        'Platov, Vasilieva: *The use of regression for calculating the resistance of inland',
-        'ships*. Written by `python -m benchmarks.accuracy.s4_residual --write` (`make peers`',
-        'installs',
-        'scikit-learn).',
-        '',
-        '    shipdrag residual docs/data/river_ships.csv --form auto --target c_R '
-        '--predict NEW.csv --report residual.html',
-        '    shipdrag residual docs/data/river_ships.csv --form sirotina --target c_R '
-        '--ship ship.yaml --write with_c_R.yaml',
-        '',
-        'The guard refuses a prediction, and says why:',
-        '',
-        '- **open**: it depends on combinations of coefficients that the data do not determine;',
-        '- **outside** the range of a ratio, or the convex hull of the data in L/B, B/T, C_B, Fr',
-        '  (and lcb where the form has it);',
-        '- **leverage** beyond the largest of the data: hidden extrapolation (Montgomery, Peck,',
-        '  Vining, *Introduction to Linear Regression Analysis*);',
-        '- **against physics**: below 0, or a trend that is wrong by more than 2 sd. Expected,',
-        '  after the diagrams of Guldhammer and Harvald, *Ship Resistance* (1974): resistance',
-        '  rises with Fr up to the first hump (0.3), falls with L/B at the same B/T and C_B, and',
-        '  rises with B/T at the same slenderness and C_B. Slenderness moves with L/B.',
-        '',
-        'The sd is that of a new test, widened by how far hulls that are left out miss theirs.',
-        'A ship file gets the fitted c_R as wave resistance only over the Froude numbers at which',
-        'the guard passes her, with the largest relative sd among them.',
-        '',
-        *of_nine,
-        '',
-        *guard(options.runs),
-    ]
+    print(*nine_ships(options.runs), *guard(options.runs), sep='\n')
+    if (folder := os.environ.get('SHIPDRAG_DATA')) is None:
+        print(f'skipped: {DELFT}, as SHIPDRAG_DATA is not set')
+    else:
+        of_delft, errors = delft(Path(folder) / DELFT)
+        print(*of_delft, sep='\n')
+    if not options.pictures:
+        return
+    hulls, values = models(FLEETS[-1], np.random.default_rng(SEED))
+    places = [getattr(hulls, name) for name in NAMES]
+    write_csv(TABLE, (*NAMES, 'c_R'), np.column_stack([*places, 1e-3 * values]))
+    save(sweep_picture(), PICTURES / 's4_sweeps.png')
     if folder is not None:
-        of_delft, errors = delft(Path(folder) / 'yacht_hydrodynamics.data')
-        lines += ['', *of_delft]
-    print('\n'.join(lines))
-    if options.write:
-        publish(PAGE, lines, rows=3)
-        hulls, values = models(FLEETS[-1], np.random.default_rng(SEED))
-        places = [getattr(hulls, name) for name in NAMES]
-        write_csv(TABLE, (*NAMES, 'c_R'), np.column_stack([*places, 1e-3 * values]))
-        save(sweeps, PICTURES / 's4_sweeps.png')
         save(errors, PICTURES / 's4_delft.png')
 
 

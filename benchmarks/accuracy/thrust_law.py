@@ -17,13 +17,21 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from benchmarks.accuracy._coasts import CARGO, COURSE_RAD, STEADY_S, TANKER, YACHT, Hull
+from benchmarks._tables import grid
+from benchmarks.accuracy._coasts import (
+    CARGO,
+    COURSE_RAD,
+    STEADY_S,
+    TANKER,
+    YACHT,
+    Hull,
+    errors,
+    rms,
+)
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
@@ -218,32 +226,39 @@ def score(hull: Hull, law: Law, case: Case, n: int, runs: int) -> Score:
     """Estimate many coastdowns and compare."""
     ship = ship_of(hull, case)
     largest = float(true_r(hull, law, np.array(hull.speed_m_s)))
-    errors, covered, sigmas, took = [], [], [], []
+    found, covered, sigmas, took = [], [], [], []
     for seed in range(runs):
         window = record(hull, law, case, n, seed)
         begin = time.perf_counter()
         try:
-            estimate = estimate_final(window, ship, Parameters())
+            curve = estimate_final(window, ship, Parameters()).valid_curve
         except EstimationError:
             continue
-        curve = estimate.valid_curve
         took.append(time.perf_counter() - begin)
-        speeds = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], 200)
-        error = np.interp(speeds, curve.speed_m_s, curve.resistance_m_s2)
-        error -= true_r(hull, law, speeds)
-        sigma = np.interp(speeds, curve.speed_m_s, curve.sigma_repeatable_m_s2)
-        errors.append(error / largest)
+        error, sigma = errors(curve, partial(true_r, hull, law))
+        found.append(error / largest)
         covered.append(np.abs(error) <= 2.0 * sigma)
         sigmas.append(sigma / largest)
-    error = np.array(errors)
-    return Score(
-        float(np.sqrt(np.mean(error**2))),
-        float(np.sqrt(np.mean(error[:, -1] ** 2))),
-        float(np.mean(covered)),
-        float(np.sqrt(np.mean(np.array(sigmas) ** 2))),
-        float(np.median(took)),
-        runs - len(took),
-    )
+    top = rms(np.array(found)[:, -1])
+    cover = float(np.mean(covered))
+    return Score(rms(found), top, cover, rms(sigmas), float(np.median(took)), runs - len(took))
+
+
+def row(hull: Hull, case: Case, n: int, runs: int) -> list[str]:
+    """Return what is given, a cell for each law, and all of them together."""
+    found = [score(hull, law, case, n, runs) for law in LAWS]
+    whole, cover = rms([each.rmse for each in found]), np.mean([each.covered for each in found])
+    return [
+        case.name,
+        *(
+            f'{100 * each.rmse:.2f} / {100 * each.at_top:.1f} / {100 * each.covered:.0f}'
+            for each in found
+        ),
+        f'{100 * whole:.2f} / {100 * cover:.0f}',
+        f'{100 * rms([each.sigma for each in found]):.2f}',
+        f'{1e3 * np.median([each.took_s for each in found]):.1f}',
+        f'{sum(each.failed for each in found)}',
+    ]
 
 
 def main() -> None:
@@ -255,30 +270,13 @@ def main() -> None:
     parser.add_argument('-n', type=int, default=500, help='samples of log and position each')
     options = parser.parse_args()
     for hull in (CARGO, TANKER, YACHT):
-        table = Table(
-            title=f'{hull.name}: shaft runs down in {RUN_DOWN_S[hull.name]:g} s; n = {options.n}, '
-            f'N = {options.runs}, seeds 0..{options.runs - 1}; RMSE / at top / cover %'
+        grid(
+            f'{hull.name}: shaft runs down in {RUN_DOWN_S[hull.name]:g} s; n = {options.n}, '
+            f'N = {options.runs}, seeds 0..{options.runs - 1}; RMSE / at top / cover %',
+            ['given', *(law.name for law in LAWS), 'all', 'sigma', 'ms', 'failed'],
+            [row(hull, case, options.n, options.runs) for case in CASES],
+            width=190,
         )
-        table.add_column('given')
-        for law in LAWS:
-            table.add_column(law.name, justify='right')
-        for heading in ('all', 'sigma', 'ms', 'failed'):
-            table.add_column(heading, justify='right')
-        for case in CASES:
-            found = [score(hull, law, case, options.n, options.runs) for law in LAWS]
-            table.add_row(
-                case.name,
-                *(
-                    f'{100 * each.rmse:.2f} / {100 * each.at_top:.1f} / {100 * each.covered:.0f}'
-                    for each in found
-                ),
-                f'{100 * np.sqrt(np.mean([each.rmse**2 for each in found])):.2f} / '
-                f'{100 * np.mean([each.covered for each in found]):.0f}',
-                f'{100 * np.sqrt(np.mean([each.sigma**2 for each in found])):.2f}',
-                f'{1e3 * np.median([each.took_s for each in found]):.1f}',
-                f'{sum(each.failed for each in found)}',
-            )
-        Console(width=190).print(table)
     print(
         'RMSE over the valid range, evenly in speed, in % of the largest r; sigma: the stated '
         'one, rms.\ncover: share of the range where +-2 sigma (repeatable) holds the truth.'

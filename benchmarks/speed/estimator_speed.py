@@ -17,13 +17,13 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from benchmarks.accuracy._coasts import CARGO, Case, coasts
+from benchmarks._tables import grid
+from benchmarks.accuracy._coasts import Case, coasts
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.distance import refit
 from shipdrag_ros.parameters import Parameters
@@ -86,7 +86,7 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
     """
     Return calls that estimate r(v) from n samples of log and position.
     """
-    plain, steady = (next(coasts(CARGO, case, n, 1)) for case in (PLAIN, STEADY))
+    plain, steady = (next(coasts(replace(case, n=n), 1)) for case in (PLAIN, STEADY))
 
     def of(estimator: str, method: Callable[..., object], window: Window) -> Callable[[], object]:
         return partial(method, window, plain.truth.ship, Parameters(estimator=estimator))
@@ -106,7 +106,7 @@ def peers(n: int) -> dict[str, Callable[[], object]]:
     """
     from benchmarks.accuracy import _peers
 
-    (coast,) = coasts(CARGO, PLAIN, n, 1)
+    (coast,) = coasts(replace(PLAIN, n=n), 1)
     samples = _peers.Samples.of(coast.window)
     tuned = _peers.TunedByPynumdiff.on(samples)
     return {
@@ -144,15 +144,13 @@ def main() -> None:
         calls = {**one_input(n), **whole(n), **(peers(n) if with_peers else {})}
         for name, call in calls.items():
             times.setdefault(name, []).append(best_us(call))
-    table = Table(title=f'process time, best of up to {ROUNDS} rounds')
-    table.add_column('n of each input')
-    for heading in (*map(str, COUNTS), f'slope from {SLOPE_FROM}'):
-        table.add_column(heading, justify='right')
-    tail = COUNTS.index(SLOPE_FROM)
-    for name, row in times.items():
-        slope, _ = np.polyfit(np.log(COUNTS[tail:]), np.log(row[tail:]), 1)
-        table.add_row(name, *map(shown, row), f'{slope:.2f}')
-    Console(width=120).print(table)
+    tail, rows = COUNTS.index(SLOPE_FROM), []
+    for name, took in times.items():
+        slope, _ = np.polyfit(np.log(COUNTS[tail:]), np.log(took[tail:]), 1)
+        rows.append((name, *map(shown, took), f'{slope:.2f}'))
+    title = f'process time, best of up to {ROUNDS} rounds'
+    heads = ('n of each input', *map(str, COUNTS), f'slope from {SLOPE_FROM}')
+    grid(title, heads, rows, width=120)
 
 
 if __name__ == '__main__':

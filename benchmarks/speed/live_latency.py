@@ -26,33 +26,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from geometry_msgs.msg import TwistWithCovarianceStamped
 
-from benchmarks.speed._onboard import SHIP_FILE, Onboard, onboard
+from benchmarks.speed._onboard import PARAMETERS, SEED, late_ms, onboard, record
 from benchmarks.speed.live_page import read
-from shipdrag_ros.samples import Block, Channel
-from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
-SEED = 1
 RATE_HZ = 10.0
-LEAD_IN_S = 150.0
-CONFIRMED_S = 120.0  # played fast, after the stop
 LIVE_S = 700.0  # at most
 SETTLE_S = 3.0
 CATCH_UP_S = 120.0
-PARAMETERS = {'update_s': 1.0, 'steady_s': 60.0, 'slope_window_s': 30.0}
 
 Span = tuple[float, float]
 """Begin and end [s, steady clock]."""
-
-
-def record() -> Block:
-    """Speed and position of a coastdown."""
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=CONFIRMED_S + LIVE_S)
-    channels = (Channel.SPEED_THROUGH_WATER, Channel.POSITION)
-    sensors = [each for each in standard_sensors(rate_hz=RATE_HZ) if each.channel in channels]
-    return sense(simulate(Ship.load(SHIP_FILE), scenario), sensors, seed=SEED)
 
 
 @contextmanager
@@ -106,62 +90,35 @@ def take_turns(
         ended.set()
 
 
-def play(node: Onboard, block: Block, ended: threading.Event) -> tuple[list[float], list[int]]:
-    """Publish each sample at its own time until all turns are over; times and stamps."""
-    offsets_s = ((block.receive_ns - block.receive_ns[0]) * 1e-9).tolist()
-    stamps_ns, times = block.stamp_ns.tolist(), []
-    start, clock_s = time.monotonic(), -1.0
-    for i, offset_s in enumerate(offsets_s):
-        if ended.is_set():
-            return times, stamps_ns
-        node.spin_for(start + offset_s - time.monotonic())
-        if offset_s >= clock_s + 1.0:
-            clock_s = np.floor(offset_s)
-            node.player.set_clock(int(block.receive_ns[0]) + int((clock_s + 1.0) * 1e9))
-        times.append(time.monotonic())
-        node.player.publish(block[i : i + 1])
-    raise SystemExit(f'the record of {LIVE_S:g} s ended before the turns: fewer --pairs')
-
-
 def measure(pairs: int, viewers: int, seconds: float) -> dict[bool, np.ndarray]:
     """Return latencies [ms] with nobody and with viewers."""
-    block = record()
-    fast = (block.receive_ns - block.receive_ns[0]) < (LEAD_IN_S + CONFIRMED_S) * 1e9
-    heard: list[tuple[float, int]] = []
-
-    def hear(message: TwistWithCovarianceStamped) -> None:
-        stamp = message.header.stamp
-        heard.append((time.monotonic(), stamp.sec * 10**9 + stamp.nanosec))
-
+    fast, live = record(RATE_HZ, LIVE_S)
     spans: dict[bool, list[Span]] = {False: [], True: []}
     with onboard(**PARAMETERS) as node:
-        node.peer.create_subscription(
-            TwistWithCovarianceStamped, '/coastdown_node/speed', hear, 1000
-        )
-        node.player.connect(block, timeout_s=60.0)
-        node.player.play(block[fast], speed=20.0)
-        last_ns = int(block.stamp_ns[fast][-1])
+        received = node.subscribe()
+        node.player.connect(fast, timeout_s=60.0)
+        node.player.play(fast, speed=20.0)
+        last_ns = int(fast.stamp_ns[-1])
         end_s = time.monotonic() + CATCH_UP_S
-        while not heard or heard[-1][1] < last_ns - 2 * 10**9:  # what was played fast is behind
+        while not received or received[-1][1] < last_ns - 2 * 10**9:  # played fast, and behind
             assert time.monotonic() < end_s, 'the node does not catch up: a busy machine?'
             node.spin_for(0.5)
         node.spin_for(SETTLE_S)
-        heard.clear()
+        received.clear()
         ended = threading.Event()
         turns = threading.Thread(
             target=take_turns, args=(spans, pairs, viewers, seconds, ended), daemon=True
         )
         turns.start()
-        times, stamps_ns = play(node, block[~fast], ended)
+        sent_s = node.play(live, ended.is_set)
+        if not ended.is_set():
+            raise SystemExit(f'the record of {LIVE_S:g} s ended before the turns: fewer --pairs')
         turns.join()
-    found: dict[bool, list[float]] = {False: [], True: []}
-    for when, stamp_ns in heard:
-        # an estimate of all samples up to a stamp is due at the first one after it
-        i = int(np.searchsorted(stamps_ns, stamp_ns, side='right'))
-        for looked, of_it in spans.items():
-            if i < len(times) and any(begin <= times[i] < end for begin, end in of_it):
-                found[looked].append(1e3 * (when - times[i]))
-    return {looked: np.array(late) for looked, late in found.items()}
+    late = late_ms(received, sent_s, live.stamp_ns)
+    return {
+        looked: np.array([ms for at, ms in late if any(begin <= at < end for begin, end in of_it)])
+        for looked, of_it in spans.items()
+    }
 
 
 def main() -> None:
@@ -179,7 +136,7 @@ def main() -> None:
     print(f'{"who looks on":>24} {"estimates":>10} {"median ms":>10} {"p99 ms":>10}')
     for looked, name in ((False, 'nobody'), (True, f'a page, {options.viewers} viewers')):
         if not len(late[looked]):
-            raise SystemExit('no estimate was heard: is this machine too busy for the node?')
+            raise SystemExit('no estimate was received: is this machine too busy for the node?')
         median, high = np.percentile(late[looked], [50, 99])
         print(f'{name:>24} {len(late[looked]):10d} {median:10.2f} {high:10.2f}')
     more = np.median(late[True]) - np.median(late[False])

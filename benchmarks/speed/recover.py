@@ -24,12 +24,13 @@ import random
 import resource
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from io import BytesIO
+from mmap import mmap
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -42,7 +43,7 @@ from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.records import MAGIC, Place, unpack, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode, types
+from shipdrag_ros.messages import EncodedMessage, encode, types
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 SEED = 1
@@ -80,15 +81,14 @@ class Sound(NamedTuple):
     spans: tuple[tuple[int, int, frozenset[int]], ...]
 
 
-def write(options: dict[str, Any]) -> Sound:
-    """Write a bag with the reference writer."""
-    file = BytesIO()
+def reference(file: IO[bytes], messages: Iterable[EncodedMessage], **options: Any) -> None:
+    """Write messages with the reference writer, numbered."""
     writer = Writer(file, **options)
     writer.start('ros2')
     writer.add_attachment(0, 0, 'ship.yaml', 'application/yaml', b'name: x\n' * 50)
     writer.add_metadata('notes', {'weather': 'calm'})
     channels: dict[str, int] = {}
-    for number, each in enumerate(encode(record(MESSAGES))):
+    for number, each in enumerate(messages):
         if each.topic not in channels:
             text = types.definition(each.type).encode()
             schema = writer.register_schema(each.type, 'ros2msg', text)
@@ -97,6 +97,20 @@ def write(options: dict[str, Any]) -> Sound:
             channels[each.topic], each.log_ns, each.payload, each.publish_ns, number
         )
     writer.finish()
+
+
+def finished(path: Path, messages: Iterable[EncodedMessage]) -> None:
+    """Write messages as a recording that has ended."""
+    with BagWriter(path) as bag:
+        for each in messages:
+            times = {'log_ns': each.log_ns, 'publish_ns': each.publish_ns}
+            bag.write(each.topic, each.type, each.payload, **times)
+
+
+def write(options: dict[str, Any]) -> Sound:
+    """Write a bag with the reference writer."""
+    file = BytesIO()
+    reference(file, encode(record(MESSAGES)), **options)
     content = file.getvalue()
     spans = []
     for place in walk(content, len(MAGIC), len(content) - len(MAGIC)):
@@ -135,45 +149,35 @@ class Damaged(NamedTuple):
     end: int
 
 
-def _cut(content: bytes, at: int, rng: random.Random) -> Damaged:
-    return Damaged(content[:at], at, len(content))
+def damaged(kind: str, content: bytes, at: int, rng: random.Random) -> Damaged:
+    """Damage a bag at a place."""
+    if kind.startswith('a sector'):
+        at -= at % SECTOR_BYTES
+    end = at + {'cut off': len(content), 'a bit flipped': 1}.get(kind, SECTOR_BYTES)
+    if kind == 'up to 2000 bytes lost':
+        end = at + rng.randrange(1, 2000)
+    end = min(end, len(content))
+    by = b''
+    if kind == 'a bit flipped':
+        by = bytes([content[at] ^ 1 << rng.randrange(8)])
+    elif kind == 'a sector of zeros':
+        by = bytes(end - at)
+    elif kind == 'a sector of chance':
+        by = rng.randbytes(end - at)
+    elif kind == 'up to 200 bytes inserted':
+        # between two bytes: the record around that place is hit
+        end, by = at, rng.randbytes(rng.randrange(1, 200))
+    return Damaged(content[:at] + by + content[end:], at, end)
 
 
-def _bit(content: bytes, at: int, rng: random.Random) -> Damaged:
-    flipped = bytes([content[at] ^ 1 << rng.randrange(8)])
-    return Damaged(content[:at] + flipped + content[at + 1 :], at, at + 1)
-
-
-def _sector(content: bytes, at: int, rng: random.Random) -> Damaged:
-    at -= at % SECTOR_BYTES
-    end = min(at + SECTOR_BYTES, len(content))
-    return Damaged(content[:at] + bytes(end - at) + content[end:], at, end)
-
-
-def _random_sector(content: bytes, at: int, rng: random.Random) -> Damaged:
-    at -= at % SECTOR_BYTES
-    end = min(at + SECTOR_BYTES, len(content))
-    return Damaged(content[:at] + rng.randbytes(end - at) + content[end:], at, end)
-
-
-def _lost(content: bytes, at: int, rng: random.Random) -> Damaged:
-    end = min(at + rng.randrange(1, 2000), len(content))
-    return Damaged(content[:at] + content[end:], at, end)
-
-
-def _inserted(content: bytes, at: int, rng: random.Random) -> Damaged:
-    # between two bytes: the record around that place is hit
-    return Damaged(content[:at] + rng.randbytes(rng.randrange(1, 200)) + content[at:], at, at)
-
-
-DAMAGES: dict[str, Callable[[bytes, int, random.Random], Damaged]] = {
-    'cut off': _cut,
-    'a bit flipped': _bit,
-    'a sector of zeros': _sector,
-    'a sector of chance': _random_sector,
-    'up to 2000 bytes lost': _lost,
-    'up to 200 bytes inserted': _inserted,
-}
+DAMAGES = (
+    'cut off',
+    'a bit flipped',
+    'a sector of zeros',
+    'a sector of chance',
+    'up to 2000 bytes lost',
+    'up to 200 bytes inserted',
+)
 
 
 @dataclass
@@ -182,17 +186,17 @@ class Tally:
 
     counts: Counter[str] = field(default_factory=Counter)
 
-    def add(self, sound: Sound, damaged: Damaged, folder: Path) -> None:
+    def add(self, sound: Sound, hurt: Damaged, folder: Path) -> None:
         """Recover a bag, check what comes out and count it."""
         hit = {
             number
             for start, end, inside in sound.spans
-            if start < damaged.end and damaged.start < end
+            if start < hurt.end and hurt.start < end
             for number in inside
         }
         whole = {message for message in sound.messages if message[0] not in hit}
         source = folder / 'damaged.mcap'
-        source.write_bytes(damaged.content)
+        source.write_bytes(hurt.content)
         saved, quarantined = self._recover(source, folder)
         self.counts += Counter(
             {
@@ -243,15 +247,15 @@ def salvage(per_cell: int, folder: Path) -> None:
     rng = random.Random(SEED)
     bags = {name: write(options) for name, options in WRITERS.items()}
     rows: dict[str, Tally] = {name: Tally() for name in (*DAMAGES, *WRITERS, 'all')}
-    for damage, make in DAMAGES.items():
+    for damage in DAMAGES:
         for name, sound in bags.items():
             for _ in range(per_cell):
                 at = rng.randrange(len(MAGIC), len(sound.content))
-                damaged = make(sound.content, at, rng)
-                if damaged.content == sound.content:
+                hurt = damaged(damage, sound.content, at, rng)
+                if hurt.content == sound.content:
                     continue
                 tally = Tally()
-                tally.add(sound, damaged, folder)
+                tally.add(sound, hurt, folder)
                 for key in (damage, name, 'all'):
                     rows[key].counts += tally.counts
     columns = ('damages', 'found', 'whole', 'in sound', 'in quarantine', 'partly', 'false')
@@ -270,15 +274,7 @@ def cost(sizes: tuple[int, ...], folder: Path) -> None:
     bytes_of = []
     for n in sizes:
         path = folder / f'{n}.mcap'
-        with BagWriter(path) as bag:
-            for each in encode(record(n)):
-                bag.write(
-                    each.topic,
-                    each.type,
-                    each.payload,
-                    log_ns=each.log_ns,
-                    publish_ns=each.publish_ns,
-                )
+        finished(path, encode(record(n)))
         bytes_of.append(path.stat().st_size)
         uses: dict[str, Callable[[Path], Any]] = {'read': _read, 'check': _check, 'recover': _save}
         for name, use in uses.items():
@@ -297,27 +293,17 @@ def cost(sizes: tuple[int, ...], folder: Path) -> None:
 
 def kinds(n: int, folder: Path) -> None:
     """Print the time of checking and recovering in that of reading, by how a file was written."""
-    finished, killed, loose = (folder / f'{kind}.mcap' for kind in ('finished', 'killed', 'loose'))
+    ended, killed, loose = (folder / f'{kind}.mcap' for kind in ('finished', 'killed', 'loose'))
     messages = list(encode(record(n)))
-    with BagWriter(finished) as bag, loose.open('wb') as file:
-        writer = Writer(file, use_chunking=False)
-        writer.start('ros2')
-        channels: dict[str, int] = {}
-        for each in messages:
-            if each.topic not in channels:
-                text = types.definition(each.type).encode()
-                schema = writer.register_schema(each.type, 'ros2msg', text)
-                channels[each.topic] = writer.register_channel(each.topic, 'cdr', schema)
-            times = {'log_ns': each.log_ns, 'publish_ns': each.publish_ns}
-            bag.write(each.topic, each.type, each.payload, **times)
-            writer.add_message(channels[each.topic], each.log_ns, each.payload, each.publish_ns)
-        writer.finish()
+    finished(ended, messages)
+    with loose.open('wb') as file:
+        reference(file, messages, use_chunking=False)
     growing = LiveFile(killed, recording_id='', part=0, attachments={})
     for at in range(0, n, 3):
         growing.append(messages[at : at + 3])
     growing.sync()
     print(f'\n{"of reading":12}{"read [s]":>12}{"check":>12}{"recover":>12}')
-    for path in (finished, killed, loose):
+    for path in (ended, killed, loose):
         read, *others = (
             min(_measured(use, path)[0] for _ in range(3)) for use in (_read, _look, _save)
         )
@@ -333,18 +319,12 @@ def memory(sizes_mb: tuple[int, ...], folder: Path) -> None:
         path = folder / f'{size_mb}_mb.mcap'
         with BagWriter(path) as bag:
             for number in range(size_mb * 10**6 // PAYLOAD_BYTES):
-                log_ns = START_NS + number * 10**6
-                payload = rng.randbytes(PAYLOAD_BYTES)
-                bag.write(
-                    '/cloud', 'std_msgs/msg/String', payload, log_ns=log_ns, publish_ns=log_ns
-                )
+                payload, ns = rng.randbytes(PAYLOAD_BYTES), START_NS + number * 10**6
+                bag.write('/cloud', 'std_msgs/msg/String', payload, log_ns=ns, publish_ns=ns)
         for state in ('sound', 'damaged'):
             if state == 'damaged':
-                with path.open('r+b') as file:
-                    file.seek(size_mb * 10**6 // 2)
-                    byte = file.read(1)[0]
-                    file.seek(-1, 1)
-                    file.write(bytes([byte ^ 1]))
+                with path.open('r+b') as file, mmap(file.fileno(), 0) as content:
+                    content[size_mb * 10**6 // 2] ^= 1
             for name, use in (('check', _look), ('recover', _save)):
                 rows.setdefault(f'{name}, {state}', []).append(_measured(use, path)[1])
         path.unlink()

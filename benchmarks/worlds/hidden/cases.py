@@ -218,26 +218,6 @@ def observe(number: int, *, added: tuple[str, ...] = ()) -> Observation:
     )
 
 
-def observe_hiding(number: int, kinds: tuple[type[Effect], ...]) -> Observation:
-    """
-    Return what would be seen of a case, were other effects hidden in it.
-    """
-    case = _case(number, kinds)
-    condition = _plans()[number].condition
-    inputs = {*MOTION, *(CONTEXT if condition.context else ())}
-    ordered = tuple(name for name in INPUTS if name in inputs)
-    return Observation(
-        case.hull.ship_file(), tuple(_run(number, case, k, ordered) for k in range(condition.runs))
-    )
-
-
-def hiding(number: int, kinds: tuple[type[Effect], ...]) -> tuple[Effect, ...]:
-    """
-    Return what is hidden in a case where `observe_hiding` hides others.
-    """
-    return _case(number, kinds).effects
-
-
 def known(number: int) -> Known:
     """
     Return what the oracle alone knows.
@@ -304,7 +284,7 @@ def true_r(number: int, speed_m_s: Array, run: int = 0) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _case(number: int, kinds: tuple[type[Effect], ...] | None = None) -> _Case:
+def _case(number: int) -> _Case:
     plan = _plans()[number]
     rng = _stream(number, 0)
     hull = draw_hull(rng)
@@ -325,8 +305,7 @@ def _case(number: int, kinds: tuple[type[Effect], ...] | None = None) -> _Case:
         n_r=hull.n_r_sd * rng.standard_normal(),
         run_down_s=hull.run_down_sd * rng.standard_normal(),
     )
-    hidden = plan.kinds if kinds is None else kinds
-    effects = tuple(kind.draw(voyages[0].leg, rng) for kind in hidden)
+    effects = tuple(kind.draw(voyages[0].leg, rng) for kind in plan.kinds)
     return _Case(hull, draw_noise(rng), world, effects, tuple(voyages))
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks.accuracy import diagnosis_score as score
 from benchmarks.worlds.hidden import cases, scoring
+from shipdrag_ros import cli
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.samples import Channel, concatenate
 
@@ -199,7 +200,7 @@ def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
         print(json.dumps(_found('none')))
         return 0
 
-    monkeypatch.setattr(score.cli, 'main', fake)
+    monkeypatch.setattr(cli, 'main', fake)
     row = score.answer('command', 'bags', 0)
     assert row['found']['verdict'] == 'none'
     assert given[0][0] == 'diagnose'
