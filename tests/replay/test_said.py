@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -14,6 +15,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import ReplayResult, replay, why_no_coastdown
+from shipdrag_ros.replay.words import ended
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from tests.runs import write_run
@@ -80,10 +82,13 @@ def test_nothing_is_made_of_a_gap(tmp_path: Path, voyage, ship: Ship) -> None:
     assert 'nothing was read' in cut.text
 
 
-def test_thrust_after_a_glide_is_no_reduced_power(tmp_path: Path, ship: Ship) -> None:
+def test_thrust_after_a_glide_is_no_reduced_power_and_no_certainty(
+    tmp_path: Path, ship: Ship
+) -> None:
     speed = np.full(2700, 6.0)
     for k in range(901, len(speed)):
         speed[k] = speed[k - 1] - 2.4e-4 * speed[k - 1] ** 2
     result = replayed(tmp_path, log(np.round(speed / 0.0514444) * 0.0514444), ship)
-    assert result.coastdowns
+    (coastdown,) = result.coastdowns
+    assert re.search(r'drove the ship again \(P 0\.\d+\)', ended(coastdown))
     assert [each.reason for each in result.not_coastdowns] == [Dismissal.THRUST]
