@@ -63,7 +63,7 @@ class SmoothedGlide(NamedTuple):
     after: int
 
 
-class Slowing(NamedTuple):
+class LostSpeed(NamedTuple):
     """
     What slowed her where she did not glide.
 
@@ -275,7 +275,7 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     ]
 
 
-def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> Slowing | None:
+def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSpeed | None:
     """
     Return in what, no glide, she lost most of her speed from a bin to the slowest.
 
@@ -296,4 +296,4 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> Slowin
     share, part = (found.weight * shared)[one], found.part(one)
     share /= share.sum()
     again = float(share[part.again].sum()) > _LIKELY
-    return Slowing(codes[best], median(part.begin_s, share), again, losses[best])
+    return LostSpeed(codes[best], median(part.begin_s, share), again, losses[best])
