@@ -114,7 +114,7 @@ class Monitor:
         self._regimes: RegimeFilter | None = None  # while awake
         # until when glides, whole ones, and what was none were told
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
-        self._goes_on = True  # what was told of a glide may not be all of it
+        self._ended_by: EndedBy | None = None  # what was told of a glide may not be all of it
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -362,7 +362,8 @@ class Monitor:
 
     def _decide(self, regimes: RegimeFilter, number: int) -> list[Event]:
         announce, again, over = (float(each) for each in numbers.ANNOUNCE)
-        slow = regimes.slow < self._tuning.speed_min
+        slow_s = regimes.slow_since(self._tuning.speed_min)
+        slow = slow_s is not None
         if self._running is not None:
             # a glide that is born since is not the one that was announced
             same = regimes.gliding_since(self._running.onset.detected_ns / SECOND_NS)
@@ -370,7 +371,7 @@ class Monitor:
             if glides and not slow and not regimes.full:
                 return []
             why = EndedBy.SPEED if slow else EndedBy.RESET if regimes.full else None
-            events = self._end_glide(regimes, number, why)
+            events = self._end_glide(regimes, number, why, _ns(slow_s))
             return events + (self._rest(regimes, number) if slow else [])
         if slow and not regimes.caught_up:  # long ago: she has sailed since
             return []
@@ -394,7 +395,7 @@ class Monitor:
         dated: Dated,
         regimes: RegimeFilter,
         number: int,
-        otherwise: EndedBy = EndedBy.SPEED,
+        otherwise: EndedBy = EndedBy.ENGINE,
         last_ns: int | None = None,
     ) -> list[Event]:
         """Report a glide that was never announced."""
@@ -406,12 +407,12 @@ class Monitor:
         for each in regimes.glides():
             if each.begin_s >= since_s:
                 found.append(each)
-            elif (
-                self._goes_on
-                and each.ended_by is None
-                and each.end_s >= since_s + numbers.SHORTEST_S
-            ):
-                found.append(each.since(since_s))
+            elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
+                rest = each.since(since_s)
+                if self._ended_by in (EndedBy.DATA_STOP, EndedBy.SILENCE):
+                    rest = each.since(regimes.read_after(since_s), since_s)
+                if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
+                    found.append(rest)
         return found
 
     def _begin(self, dated: Dated, number: int) -> Onset:
@@ -465,8 +466,10 @@ class Monitor:
         assert self._running is not None
         events = self._running.end(dated, ended_by, regimes.regimes(), self._final_estimator)
         self._running, self._reported_s = None, dated.end_s
+        self._ended_by = dated.ended_by or ended_by
         # noise of the speed begins no other glide of a ship that was too slow
-        self._goes_on = dated.ended_by is not None or ended_by is not EndedBy.SPEED
+        if self._ended_by is EndedBy.SPEED:
+            self._reported_s = max(dated.end_s, float(regimes.taken_s))
         self._memory.watch.update_ns[0] = ALWAYS
         return events
 
@@ -479,7 +482,9 @@ class Monitor:
     ) -> list[Event]:
         """Report what was never announced, say what it was if nothing, and sleep."""
         since_s, dated = max(self._reported_s, self._dismissed_s), self._unreported(regimes)
-        otherwise = ended_by or EndedBy.SPEED
+        slow_s, otherwise = regimes.slow_since(self._tuning.speed_min), ended_by or EndedBy.ENGINE
+        if ended_by is None and slow_s is not None:
+            otherwise, last_ns = EndedBy.SPEED, _ns(slow_s)
         events = [
             event
             for one in dated
@@ -488,7 +493,8 @@ class Monitor:
         if not dated:
             was = regimes.dismissal(since_s)
             if was is not None:
-                if ended_by is not None and not regimes.even:
+                known = regimes.even or was.reason is Dismissal.LEAD_IN
+                if ended_by is not None and not known:
                     was = cut_short(was, ended_by, regimes.gliding)
                 events += self._dismissals.take(was)
             self._dismissed_s = regimes.taken_s  # the next bank is not asked about it again
@@ -572,6 +578,10 @@ class Monitor:
         watch.update_ns[0] = ALWAYS
         watch.armed[0] = 0
         self._running = self._regimes = None
+
+
+def _ns(second: float | None) -> int | None:
+    return None if second is None else round(second * SECOND_NS)
 
 
 def cut_short(was: NotCoastdown, ended_by: EndedBy, gliding: float) -> NotCoastdown:

@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.display import duration
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.replay.coasts import accepted_samples
 from shipdrag_ros.replay.playback import ReplayResult
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, Block, Channel, Float64
 
-_BIN_S = 10.0
-_GLIDE_S = 600.0  # within which a ship that glides has slowed
+_BINS = 6  # of a slope window, which is shorter for small craft
+_GLIDE_WINDOWS = 10.0  # of them; within it a ship that glides has slowed
 _SLOWED = 0.1  # of the speed; what falls less is the sea
 _STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
 _STILL_READINGS = 60  # ... so often, is none
@@ -24,7 +25,7 @@ _LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
 
 class _SpeedLoss(NamedTuple):
-    """The largest loss of speed within `_GLIDE_S`."""
+    """The largest loss of speed within `_GLIDE_WINDOWS`."""
 
     start_s: float
     end_s: float
@@ -69,7 +70,9 @@ def _why(result: ReplayResult) -> str:
     block, _ = accepted_samples(result.run, result.ship)
     if not len(block):
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
-    name, fall = _largest_fall(block, [each for each in ALL_MOTION if each not in result.left_out])
+    names = [each for each in ALL_MOTION if each not in result.left_out]
+    window_s = result.parameters.slope_window_s
+    name, fall = _largest_fall(block, names, window_s)
     if not name:
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
     if fall is None:
@@ -77,13 +80,13 @@ def _why(result: ReplayResult) -> str:
     if fall.lost < _SLOWED:
         return (
             f'by {name} nothing slowed: the speed never fell by more than {fall.lost:.0%} within '
-            f'{_GLIDE_S / 60.0:.0f} min'
+            f'{duration(_GLIDE_WINDOWS * window_s)}'
         )
     fell = (
         f'the speed by {name} fell most from {fall.from_m_s:.2f} to {fall.to_m_s:.2f} m/s, at '
         f'{fall.start_s:.0f} to {fall.end_s:.0f} s of the record'
     )
-    least_s = _LEAD_WINDOWS * result.parameters.slope_window_s
+    least_s = _LEAD_WINDOWS * window_s
     if fall.start_s < least_s:
         return (
             f'{fell}, with only {fall.start_s:.0f} s before it where at least {least_s:.0f} s of '
@@ -134,7 +137,9 @@ def _dismissed(result: ReplayResult) -> str:
     return '; '.join(parts)
 
 
-def _largest_fall(block: Block, names: Iterable[str]) -> tuple[str, _SpeedLoss | None]:
+def _largest_fall(
+    block: Block, names: Iterable[str], window_s: float
+) -> tuple[str, _SpeedLoss | None]:
     """Return by which input, and the largest fall of its speed; '' where there is no input."""
     try:
         window = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
@@ -145,13 +150,14 @@ def _largest_fall(block: Block, names: Iterable[str]) -> tuple[str, _SpeedLoss |
         if not len(series):
             continue
         time_s = (series.time_ns - window.start_ns) * 1e-9
-        return name, _fall(*_binned(np.asarray(time_s, np.float64), series.value))
+        bins = _binned(np.asarray(time_s, np.float64), series.value, window_s / _BINS)
+        return name, _fall(*bins, _GLIDE_WINDOWS * window_s)
     return '', None
 
 
-def _binned(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
+def _binned(time_s: Float64, value: Float64, bin_s: float) -> tuple[Float64, Float64]:
     """Return times and speeds in bins, of speeds or of places; medians bear bad readings."""
-    number = (time_s // _BIN_S).astype(np.int64)
+    number = (time_s // bin_s).astype(np.int64)
     edges = np.flatnonzero(np.diff(number)) + 1
     times = np.array([part.mean() for part in np.split(time_s, edges)])
     medians = np.array([np.median(part, axis=0) for part in np.split(value, edges)])
@@ -161,7 +167,7 @@ def _binned(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
     return 0.5 * (times[1:] + times[:-1]), gone / np.diff(times)
 
 
-def _fall(time_s: Float64, speed_m_s: Float64) -> _SpeedLoss | None:
+def _fall(time_s: Float64, speed_m_s: Float64, within_s: float) -> _SpeedLoss | None:
     """Return the largest fall, of medians over three bins; None where the bins are few."""
     if len(speed_m_s) < 4:
         return None
@@ -169,7 +175,7 @@ def _fall(time_s: Float64, speed_m_s: Float64) -> _SpeedLoss | None:
     time_s = time_s[1:-1]
     best: _SpeedLoss | None = None
     for first, fast in enumerate(smooth):
-        last = first + int(np.searchsorted(time_s[first:], time_s[first] + _GLIDE_S, side='right'))
+        last = first + int(np.searchsorted(time_s[first:], time_s[first] + within_s, side='right'))
         slow = first + int(np.argmin(smooth[first:last]))
         if fast <= 0.0:
             continue

@@ -128,7 +128,7 @@ class ReplayResult:
             text = (
                 f'the ship was never seen to sail ahead steadily, faster than {slowest:.2g} m/s, '
                 f'for longer than {self.steady_lead_s:.0f} s; an onset can be found after '
-                f'{needed_s:.0f} s of it'
+                f'{needed_s:.0f} s of it; if she glides in it, say where with --window START END'
             )
             found.append(NotCoastdown(*self.run.span_ns, Dismissal.LEAD_IN, text))
         return tuple(sorted(found, key=lambda one: one.start_ns))

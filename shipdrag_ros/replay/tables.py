@@ -37,7 +37,7 @@ def facts(coastdown: EndedCoastdown) -> Table:
     rows: list[tuple[str, ...]] = [
         ('start', display.utc(coastdown.start_ns)),
         ('duration', display.duration(seconds)),
-        ('ended because', ENDED_BY[coastdown.ended_by]),
+        ('ended because', words.ended(coastdown)),
     ]
     if coastdown.onset_detected_ns is not None:
         # from where it seemed to begin, which may have been cut since

@@ -11,7 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from shipdrag_ros import __version__
-from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NotCoastdown, Regimes, Reset
+from shipdrag_ros.coastdown.events import (
+    ENDED_BY,
+    EndedBy,
+    EndedCoastdown,
+    Event,
+    NotCoastdown,
+    Regimes,
+    Reset,
+)
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.messages import Unreadable
@@ -25,6 +33,8 @@ _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
+_BY_REGIME = (EndedBy.ENGINE, EndedBy.BRAKE, EndedBy.TURN)
+_SOON = 12  # bins after an end, which is dated to some of them
 _UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
 _SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
@@ -53,6 +63,18 @@ def explained(regimes: Regimes) -> str:
     Say how well the model of what she did explains the record, beside those it was learnt on.
     """
     return f'as well as {regimes.explained:.0%} of those that it was learnt on'
+
+
+def ended(coastdown: EndedCoastdown) -> str:
+    """
+    Say what ended a coastdown; how likely she glided no more, where the regimes alone tell.
+    """
+    text, regimes = ENDED_BY[coastdown.ended_by], coastdown.regimes
+    if regimes is None or coastdown.ended_by not in _BY_REGIME:
+        return text
+    gliding = regimes.probability['run_down'] + regimes.probability['gliding']
+    after = gliding[regimes.time_ns > coastdown.end_ns][:_SOON]
+    return f'{text} (P {1.0 - float(after.min()):.2f})' if len(after) else text
 
 
 def recorded_sentence(recorded: Recorded) -> str:

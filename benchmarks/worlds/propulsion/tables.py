@@ -30,8 +30,8 @@ def stops_tables(rows: list[Row]) -> list[str]:
     lines += _by('way to stop', some, lambda row: row.case.kind, _share)
     lines += ['', 'by length of the glide:', '', *_by('length', glides, _length, _share)]
     lines += ['', 'What the others lack, from 3 min / long:', '', *_why(some)]
-    lines += ['', *_fewer(long, 'long'), '', *_fewer(some, 'from 3 min')]
-    lines += ['', *_fewer(glides, 'from half a minute')]
+    lines += ['', *fewer(long, 'long'), '', *fewer(some, 'from 3 min')]
+    lines += ['', *fewer(glides, 'from half a minute')]
     lines += ['', 'Dating, long ones that are reported:', '', *_dating(long)]
     lines += ['', 'Dating, from 3 min:', '', *_dating(some)]
     lines += ['', 'r, long ones that are found: against hull, mean wind and propeller:', '']
@@ -147,8 +147,10 @@ def _why(rows: list[Row]) -> list[str]:
     return _table(['', *SUITES], lines)
 
 
-def _fewer(rows: list[Row], which: str) -> list[str]:
-    """Paired: what an input more brings and costs."""
+def fewer(rows: list[Row], which: str) -> list[str]:
+    """
+    Return what an input more brings and costs, paired: cases found by one set of inputs alone.
+    """
     found = {(row.case, row.suite): row.found for row in rows}
     cases = dict.fromkeys(row.case for row in rows)
     cells = []
@@ -156,8 +158,10 @@ def _fewer(rows: list[Row], which: str) -> list[str]:
         both = [(found[case, less], found[case, more]) for case in cases]
         gained = sum(b and not a for a, b in both)
         lost = sum(a and not b for a, b in both)
-        cells.append([f'{less} -> {more}', gained, lost, len(both)])
-    return _table([f'an input more, {which}', 'gained', 'lost', 'of'], cells)
+        error = float(np.sqrt(lost * (1.0 - lost / len(both))))
+        cells.append([f'{less} -> {more}', gained, f'{lost} ± {error:.1f}', len(both)])
+    columns = [f'an input more, {which}', 'gained', 'lost, ± standard error', 'of']
+    return _table(columns, cells)
 
 
 def _dating(rows: list[Row]) -> list[str]:

@@ -63,6 +63,28 @@ class SmoothedGlide(NamedTuple):
     after: int
 
 
+class LostSpeed(NamedTuple):
+    """
+    What slowed her where she did not glide.
+
+    Attributes
+    ----------
+    what
+        The regime in which she lost most of her speed.
+    begin_s
+        Median of when it began [s of the bank].
+    again
+        Whether she has probably glided before.
+    lost_m_s : (bins,)
+        Speed that she lost in it, from the first bin looked at to the slowest [m/s].
+    """
+
+    what: int
+    begin_s: float
+    again: bool
+    lost_m_s: Float64
+
+
 class Spans(NamedTuple):
     """
     Every regime of every history, (n,) each.
@@ -253,9 +275,9 @@ def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float
     ]
 
 
-def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | None:
+def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSpeed | None:
     """
-    Return the regime, no glide, in which she lost most of her speed from a bin to the slowest.
+    Return in what, no glide, she lost most of her speed from a bin to the slowest.
 
     None where she lost none.
     """
@@ -263,9 +285,15 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> int | 
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
     losses = [
-        float(
-            probability_of(found.part(found.what == code), len(speed), step_s)[first:last] @ lost
-        )
+        probability_of(found.part(found.what == code), len(speed), step_s)[first:last] * lost
         for code in codes
     ]
-    return codes[int(np.argmax(losses))] if max(losses) > 0.0 else None
+    best = int(np.argmax([loss.sum() for loss in losses]))
+    if not losses[best].sum() > 0.0:
+        return None
+    shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
+    one = (found.what == codes[best]) & (shared > 0.0)
+    share, part = (found.weight * shared)[one], found.part(one)
+    share /= share.sum()
+    again = float(share[part.again].sum()) > _LIKELY
+    return LostSpeed(codes[best], median(part.begin_s, share), again, losses[best])

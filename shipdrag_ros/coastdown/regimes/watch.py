@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, newest_bin
-from shipdrag_ros.coastdown.events import Dismissal, EndedBy, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.events import BY_SPEED, Dismissal, EndedBy, NotCoastdown, Regimes
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import (
     FIT,
@@ -40,6 +40,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDE_TURN,
     GROUND,
     LEVEL,
+    LN_U,
     LOG,
     LOW,
     TURN,
@@ -73,6 +74,12 @@ _WHY = {
     TURN: (Dismissal.TURN, 'she turned under power'),
     GLIDE_TURN: (Dismissal.TURN, 'she turned'),
 }
+_AGAIN = Dismissal.THRUST, 'she slowed less than water alone slows her, as if driven again'
+_REVERSED = Dismissal.ASTERN, 'a propeller was reversed'
+_UNSEEN = (
+    Dismissal.LEAD_IN,
+    'no steady sailing is seen before it, so nothing shows what slowed her',
+)
 
 
 class Dated(NamedTuple):
@@ -91,6 +98,8 @@ class Dated(NamedTuple):
         the glide.
     ended_by
         What followed; None where she glides on.
+    unread_s
+        From when on nothing was read until it begins; NaN where it does not follow a gap.
     """
 
     stop_s: float
@@ -100,26 +109,37 @@ class Dated(NamedTuple):
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
+    unread_s: float = math.nan
 
-    def since(self, begin_s: float) -> Dated:
+    def since(self, begin_s: float, unread_s: float = math.nan) -> Dated:
         """
-        Return the part of it after its begin.
+        Return the part of it after its begin, or after a gap.
         """
         return self._replace(
-            stop_s=begin_s, start_s=begin_s, begin_s=begin_s, begin_sd_s=0.0, ran_down=False
+            stop_s=begin_s,
+            start_s=begin_s,
+            begin_s=begin_s,
+            begin_sd_s=0.0,
+            ran_down=False,
+            unread_s=unread_s,
         )
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
-        """The run-down before it, if it was a long one."""
-        if not self.ran_down:
+        """The gap before it, or its run-down if that was a long one."""
+        if not math.isnan(self.unread_s):
+            first_s, reason = self.unread_s, Dismissal.GAP
+            text = 'nothing was read in it, so what she did is not known'
+        elif self.ran_down:
+            first_s, reason = self.stop_s, Dismissal.THRUST
+            text = (
+                f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
+                f'end of that, ± {self.begin_sd_s:.0f} s'
+            )
+        else:
             return ()
-        text = (
-            f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the end '
-            f'of that, ± {self.begin_sd_s:.0f} s'
-        )
-        first_ns, last_ns = round(self.stop_s * SECOND_NS), round(self.begin_s * SECOND_NS)
-        return (NotCoastdown(first_ns, last_ns, Dismissal.THRUST, text),)
+        first_ns, last_ns = round(first_s * SECOND_NS), round(self.begin_s * SECOND_NS)
+        return (NotCoastdown(first_ns, last_ns, reason, text),)
 
 
 class RegimeFilter:
@@ -147,7 +167,7 @@ class RegimeFilter:
         self._woken = first
         self._out: list[Float64] = []
         self._low: list[float] = []
-        self._read = 0  # readings of motion
+        self._read: list[int] = []  # readings of motion in each bin
         self._even_s = 0.0
 
     @classmethod
@@ -182,11 +202,12 @@ class RegimeFilter:
             told_s, self._first = self.told_s, self._next
             self.tell(told_s)
             if self._bank.histories.clock[0] > 0:
-                self._bank, self._out, self._low = Bank.fresh(), [], []
+                self._bank, self._out, self._low, self._read = Bank.fresh(), [], [], []
             return True
         self._out.append(self._bank.out.copy())
         self._low.append(float(self._bank.said[LOW]))
-        self._read += int(np.count_nonzero(~np.isnan(self._bank.said[[LOG, GROUND, ADVANCE]])))
+        motion = self._bank.said[[LOG, GROUND, ADVANCE]]
+        self._read.append(int(np.count_nonzero(~np.isnan(motion))))
         even = self._bank.out[P_EVEN] > _EVEN
         self._even_s = self._even_s + self._width if even else 0.0
         return True
@@ -243,10 +264,35 @@ class RegimeFilter:
         before = self._zero_s + all_.at[each, last] <= second
         return float(np.exp(all_.number[:used, WEIGHT])[glides & before].sum())
 
-    @property
-    def slow(self) -> float:
-        """Mean speed now [m/s]; infinite before the first."""
-        return float(self._bank.out[SPEED]) if self._out else math.inf
+    def slow_since(self, speed_m_s: float) -> float | None:
+        """
+        Return since when she is below a speed [s since the epoch]; None where she may not be.
+
+        It has to be as sure as the end of a glide, of which nothing is taken back either.
+        """
+        if not self._out or float(self._bank.out[SPEED]) >= speed_m_s:
+            return None
+        all_ = self._bank.histories
+        used = int(all_.used[0])
+        over = all_.mean[:used, LN_U] - math.log(speed_m_s)
+        over /= np.sqrt(2.0 * all_.spread[:used, LN_U, LN_U])
+        weights = np.exp(all_.number[:used, WEIGHT]).tolist()
+        faster = sum(
+            0.5 * weight * math.erfc(-each)
+            for weight, each in zip(weights, over.tolist(), strict=True)
+        )
+        if faster > n.ANNOUNCE[1]:
+            return None
+        slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0
+        return float(self._zero_s + (len(slow) - int(slow.sum()) + 1) * self._width)
+
+    def read_after(self, second: float) -> float:
+        """
+        Return the begin of the first bin after a second in which motion was read [s].
+        """
+        since = max(math.ceil((second - self._zero_s) / self._width), 0)
+        gap = np.cumsum(self._read[since:]) == 0
+        return float(self._zero_s + (since + int(gap.sum())) * self._width)
 
     @property
     def even(self) -> bool:
@@ -326,12 +372,15 @@ class RegimeFilter:
         if not len(doubted) or table[doubted, SPEED].argmin() == 0:
             return None
         first, last = int(doubted[0]), int(doubted[-1]) + 1
-        regime = slowed_by(self._spans, table[:, SPEED], first, self._width)
-        if regime is None:
+        by = slowed_by(self._spans, table[:, SPEED], first, self._width)
+        if by is None:
             return None
-        reason, text = _WHY[regime]
-        if any(low < _ASTERN for low in self._low[first:last]):
-            reason, text = Dismissal.ASTERN, 'a propeller was reversed'
+        reason, text = _AGAIN if by.what == LEVEL and by.again else _WHY[by.what]
+        astern = np.array(self._low[first : first + len(by.lost_m_s)]) < _ASTERN
+        if by.lost_m_s[astern].sum() > 0.5 * by.lost_m_s.sum():
+            reason, text = _REVERSED
+        elif reason in BY_SPEED and by.begin_s < _BINS_OF_WINDOW * self._width:
+            reason, text = _UNSEEN
         most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
         start_ns, end_ns = (
             round((self._zero_s + k * self._width) * SECOND_NS) for k in (first, last)
@@ -356,6 +405,6 @@ class RegimeFilter:
         middle_s = self._zero_s + (np.arange(len(self._out)) + 0.5) * self._width
         probability = smoothed(self._spans, len(self._out), self._setting.step_s)
         time_ns = np.round(middle_s * SECOND_NS).astype(np.int64)
-        excess = sum(float(out[FIT]) for out in self._out) / max(self._read, 1)
+        excess = sum(float(out[FIT]) for out in self._out) / max(sum(self._read), 1)
         explained = float(np.interp(excess, n.EXPLAINED, n.EXPLAINED_SHARE))
         return Regimes(time_ns, self._speed, probability, excess, explained)
