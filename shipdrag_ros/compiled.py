@@ -193,8 +193,10 @@ def _numba_lock() -> Any:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.extending import typeof_impl
 
-    # also where something else has imported numba before
+    # also where something else has imported numba before, which then took this machine's features
     config.CPU_NAME = os.environ.setdefault('NUMBA_CPU_NAME', PROCESSOR)
+    if config.CPU_NAME == PROCESSOR:
+        config.CPU_FEATURES = os.environ.get('NUMBA_CPU_FEATURES', '')
 
     class Notice(event.Listener):  # type: ignore[misc]
         def on_start(self, event: object) -> None:
@@ -211,6 +213,18 @@ def _numba_lock() -> Any:
         return typeof_impl(value.compile_now(), context)
 
     return global_compiler_lock
+
+
+@cache
+def _say_if_other(features: str) -> None:
+    """Warn where numba was used before, and so compiles for a processor of its own choice."""
+    from numba.core import config
+
+    if config.CPU_FEATURES not in (None, features):
+        _log.warning(
+            'numba has compiled code for this processor alone before: the last digits may differ '
+            'from those of other processes; use shipdrag_ros before other code of numba'
+        )
 
 
 def _dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
@@ -250,7 +264,9 @@ class _Cache:
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         arguments = [str(each) for each in _arguments(signature)]
-        return self._folder / f'{self._name}.{_short(repr((arguments, codegen.magic_tuple())))}'
+        made_for = codegen.magic_tuple()
+        _say_if_other(made_for[2])
+        return self._folder / f'{self._name}.{_short(repr((arguments, made_for)))}'
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a type of arguments, None if nothing."""

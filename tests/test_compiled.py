@@ -229,9 +229,16 @@ def test_the_machine_code_is_for_any_processor_of_its_kind(toy: Path, tmp_path: 
     for before in ('', 'import numba; '):
         settings = {'SHIPDRAG_CACHE_DIR': str(tmp_path / f'c{len(before)}')}
         show = 'from numba.core.registry import cpu_target as t; '
-        show += 'print(t.target_context.codegen().magic_tuple()[1])'
+        show += 'print(t.target_context.codegen().magic_tuple()[1:])'
         found, _ = run(toy, f'{before}{CALL}; {show}', **settings)
-        assert found.split('\n') == ['4.0', 'generic']
+        assert found.split('\n') == ['4.0', "('generic', '')"]
+
+
+def test_numba_that_compiled_before_is_said(toy: Path, tmp_path: Path) -> None:
+    before = 'import numba; numba.njit(lambda: 1)(); '
+    found, said = run(toy, f'{before}{CALL}', SHIPDRAG_CACHE_DIR=str(tmp_path))
+    assert found == '4.0'
+    assert said.count('the last digits may differ') == 1
 
 
 def test_two_threads_at_once_may_need_the_compiler_first(toy: Path) -> None:
