@@ -435,16 +435,24 @@ class Monitor:
     ) -> list[Event]:
         """End the coastdown that runs, as the histories have it now, and tell any after it."""
         assert self._running is not None
-        start_ns = self._running.onset.start_ns
-        dated = [each for each in self._unreported(regimes) if each.end_s > start_ns / SECOND_NS]
-        if dated:
-            otherwise, more = ended_by or EndedBy.ENGINE, dated[1:]
+        onset = self._running.onset
+        more = [e for e in self._unreported(regimes) if e.end_s > onset.start_ns / SECOND_NS]
+        # one that began since is not the one that was announced
+        if more and more[0].stop_s < onset.detected_ns / SECOND_NS:
+            first, more = more[0], more[1:]
             # only the last of them goes on at the last sample
-            events = self._end(dated[0], regimes, ended_by, None if more else last_ns)
-            for one in more:
-                last = last_ns if one is more[-1] else None
-                events += self._all_of(one, regimes, number, otherwise, last)
-            return events
+            events = self._end(first, regimes, ended_by, None if more else last_ns)
+        else:
+            events = self._withdraw(regimes, ended_by)
+        for one in more:
+            last, otherwise = last_ns if one is more[-1] else None, ended_by or EndedBy.ENGINE
+            events += self._all_of(one, regimes, number, otherwise, last)
+        return events
+
+    def _withdraw(self, regimes: RegimeFilter, ended_by: EndedBy | None) -> list[Event]:
+        """Say that the coastdown that runs was none."""
+        assert self._running is not None
+        start_ns = self._running.onset.start_ns
         end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
         self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS

@@ -66,6 +66,16 @@ def test_less_power_is_no_coastdown_and_is_named(ship, record, sensors, seed) ->
     assert {each.reason for each in of(NotCoastdown, events)} == {Dismissal.SETTLED}
 
 
+def test_a_glide_that_begins_later_is_not_the_one_announced(ship, record) -> None:
+    orders = (EngineOrder(0.0, shaft=0.4, thrust=0.16), EngineOrder(360.0, shaft=0.0, thrust=0.0))
+    log = replace(LOG, sd=0.05, coloured=None)
+    block = record(sensors=(log,), seed=1, orders=orders, duration_s=860.0)
+    told = of(EndedCoastdown, events_of(ship, block))
+    assert all(each.start_ns < each.onset_detected_ns for each in told)
+    (ended,) = [each for each in told if not each.withdrawn]
+    assert abs(ended.start_ns - START_NS - 1260 * S) < 20 * S
+
+
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
     orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.3, thrust=0.07))
     block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
