@@ -240,10 +240,10 @@ def _result(
     low = max(last, float(ship.speed(parameters.froude_min)))
     high = float(found.mean[k + motion.SPEED])
     if not high > low * 1.02:
+        too_slow = f'; {low:.4g} m/s is that of froude_min' if low > last else ''
         raise EstimationError(
-            f'the fitted speed falls from {high:.4g} to {low:.4g} m/s only, above froude_min '
-            f'{parameters.froude_min:g}: give a window that lies in a coastdown, or a smaller '
-            'froude_min'
+            f'the fitted speed goes from {high:.4g} to {last:.4g} m/s{too_slow}: give a window '
+            f'that lies in a coastdown{", or a smaller froude_min" if too_slow else ""}'
         )
     grid = np.linspace(low, high, _CURVE_POINTS)
     part = read(found, grid, calm=False)
