@@ -283,17 +283,16 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSp
     """
     last = first + int(np.argmin(speed[first:])) + 1
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
+    shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
     codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
+    parts = [(found.what == code) & (shared > 0.0) for code in codes]
     losses = [
-        probability_of(found.part(found.what == code), len(speed), step_s)[first:last] * lost
-        for code in codes
+        probability_of(found.part(part), len(speed), step_s)[first:last] * lost for part in parts
     ]
     best = int(np.argmax([loss.sum() for loss in losses]))
     if not losses[best].sum() > 0.0:
         return None
-    shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
-    one = (found.what == codes[best]) & (shared > 0.0)
-    share, part = (found.weight * shared)[one], found.part(one)
+    share, part = (found.weight * shared)[parts[best]], found.part(parts[best])
     share /= share.sum()
     again = float(share[part.again].sum()) > _LIKELY
     return LostSpeed(codes[best], median(part.begin_s, share), again, losses[best])
