@@ -13,7 +13,8 @@ from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, No
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS
-from shipdrag_ros.coastdown.regimes.state import ADVANCE, N_FIX, SAID, BankSetting
+from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by
+from shipdrag_ros.coastdown.regimes.state import ADVANCE, BRAKE, N_FIX, SAID, BankSetting
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
@@ -213,3 +214,14 @@ def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:
     monitor.engine_stopped(START_NS + 900 * S)
     events += [*monitor.update(block[at:]), *monitor.finish()]
     assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+
+
+def test_regimes_that_are_long_over_took_no_speed() -> None:
+    """What their weights leave behind by rounding is no regime."""
+    weight = np.full(11, 0.1)
+    end_s = np.linspace(5.0, 105.0, 11)
+    before = np.zeros(11)
+    code = np.full(11, BRAKE)
+    spans = Spans(code, before, before, end_s, end_s, weight, code, before > 0.0)
+    assert probability_of(spans, 40, 5.0)[25:].max() > 0.0
+    assert slowed_by(spans, np.linspace(5.0, 3.0, 40), 25, 5.0) is None
