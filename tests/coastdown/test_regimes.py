@@ -67,6 +67,18 @@ def test_less_power_is_no_coastdown_and_is_named(ship, record, sensors, seed) ->
     assert {each.reason for each in of(NotCoastdown, events)} == {Dismissal.SETTLED}
 
 
+@pytest.mark.parametrize('sensors', [(LOG,), (LOG, SHAFT)])
+@pytest.mark.parametrize('minutes', [15, 25])
+def test_power_that_is_taken_off_evenly_is_no_coastdown(ship, record, sensors, minutes) -> None:
+    end_s = 60.0 * minutes
+    shafts = [(at_s, 1.0 - 0.6 * at_s / end_s) for at_s in np.arange(0.0, end_s + 1.0, 10.0)]
+    orders = tuple(EngineOrder(at_s, shaft=part, thrust=part**2) for at_s, part in shafts)
+    block = record(sensors=sensors, seed=2, orders=orders, duration_s=end_s + 900.0)
+    events = events_of(ship, block)
+    assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+    assert {each.reason for each in of(NotCoastdown, events)} <= {Dismissal.SETTLED}
+
+
 def test_a_glide_that_begins_later_is_not_the_one_announced(ship, record) -> None:
     orders = (EngineOrder(0.0, shaft=0.4, thrust=0.16), EngineOrder(360.0, shaft=0.0, thrust=0.0))
     log = replace(LOG, sd=0.05, coloured=None)

@@ -32,11 +32,13 @@ from shipdrag_ros.coastdown.regimes.state import (
     CURRENT,
     DRIVEN,
     EXCESS,
+    FADING,
     GLIDE,
     GLIDED,
     GONE,
     GROUND,
     HIGH,
+    KIND,
     LAG,
     LEVEL,
     LIAR,
@@ -221,7 +223,7 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
-def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
+def _pushes_or_not(bank: Histories, i: int, setting: BankSetting, now_s: float) -> None:
     """
     Write down when the screw of a lower level ceases to push, and when it pushes again.
 
@@ -236,7 +238,9 @@ def _pushes_or_not(bank: Histories, i: int, now_s: float) -> None:
         return
     if pushed and bank.ramp[i, last] == 0.0:  # by the level as it is known now, not yet
         w[COUNT] = last
-    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * f[RAMP_S] / n.LEVEL_RAMP_S[0]:
+    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * (
+        setting.pace if w[KIND] == FADING else f[RAMP_S] / n.LEVEL_RAMP_S[0]
+    ):
         bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
         w[GLIDED] = 1
     elif not pushed:
@@ -263,7 +267,7 @@ def _sum_up(bank: Bank, setting: BankSetting) -> None:
                 out[P_GLIDING] += share
             else:
                 out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
-                if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                if w[KIND] != FADING and now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
                     out[P_EVEN] += share
         elif regime == GLIDE:
             running = now_s - f[SINCE] < f[RAMP_S]
@@ -321,7 +325,7 @@ def step(bank: Bank, setting: BankSetting) -> float:
         way = abs(advance) if astern else advance
         slowing = predict(all_, i, setting, used, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
-        _pushes_or_not(all_, i, all_.clock[0] * setting.step_s)
+        _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
     shown = thin(all_, setting)
     _sum_up(bank, setting)
     if not claimed:

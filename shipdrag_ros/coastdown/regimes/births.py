@@ -19,12 +19,14 @@ from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     COUNT,
     DRIVEN,
+    FADING,
     FIRST_A,
     FREE,
     GLIDE,
     GLIDE_KIND,
     GLIDE_TURN,
     GLIDED,
+    GOVERNED,
     GUST,
     GUST_A,
     HELD,
@@ -171,6 +173,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
     already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
+    before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
     odds = len(n.ODD) if any_ and bank.whole[i, GLIDED] == 0 else 1  # later she is known
     for each in range(downs * odds):
         k, odd = each % downs, each // downs
@@ -184,7 +187,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             if idles:  # it is the same glide
                 bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
-            bank.number[j, BEFORE] = x[OPEN]
+            bank.number[j, BEFORE] = before
             if any_:
                 bank.number[j, BEFORE] = x[LN_U]
                 x[LN_A] += n.ODD[odd]
@@ -224,6 +227,40 @@ def _any_power(bank: Histories, i: int, setting: BankSetting, now_s: float, chan
                 amid(bank, j, setting, kind)
 
 
+@compiled(inline=True, uncounted=True)
+def _is_fade(bank: Histories, i: int) -> bool:
+    return bool(bank.whole[i, REGIME] == LEVEL and bank.whole[i, KIND] == FADING)
+
+
+@compiled(uncounted=True)
+def _fades(
+    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, base: float
+) -> None:
+    """Let the engine give evenly less: the rate is what is left open."""
+    for k in range(len(n.FADES)):
+        j = _born(bank, i, now_s, chance / len(n.FADES), LEVEL, 600.0 * setting.pace)
+        if j >= 0:
+            bank.whole[j, KIND] = FADING
+            bank.number[j, RAMP_FROM], bank.number[j, REVS] = base, np.nan
+            free(bank, j, OPEN, math.log(n.FADES[k]), n.FADES_SD**2)
+
+
+@compiled(uncounted=True)
+def _fade_ends(bank: Histories, i: int, now_s: float, chance: float) -> None:
+    """Let an engine that gave less and less stay where it is."""
+    target, by_open = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)
+    j = _born(bank, i, now_s, chance, LEVEL, 1.0)
+    if j >= 0:
+        bank.whole[j, KIND] = GOVERNED
+        if bank.what[j, bank.whole[j, COUNT] - 2] == GLIDE:  # nothing pushed: it is the same glide
+            bank.whole[j, COUNT] -= 1
+        bank.number[j, RAMP_FROM] = bank.mean[j, OPEN] = target
+        for k in range(STATES):
+            bank.spread[j, OPEN, k] *= by_open
+        for k in range(STATES):
+            bank.spread[j, k, OPEN] *= by_open
+
+
 @compiled(uncounted=True)
 def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """
@@ -241,7 +278,11 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     if regime == AMID:
         base = bank.mean[i, LN_U]
     elif engaged:
-        base = balance(bank.mean[i], f, regime, now_s)[0]
+        base = balance(bank.mean[i], f, bank.whole[i], now_s)[0]
+        if not claimed and not _is_fade(bank, i):
+            if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
+                _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
+            chance *= 1.0 - n.FADES_SHARE
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     kinds = 1 if claimed else 2  # torque that is held is any power there
     for k in range(len(n.LEVELS)):
@@ -291,7 +332,7 @@ def _turns(
         if j >= 0:
             if regime == TURN:
                 f, x, p = bank.number[j], bank.mean[i], bank.spread[i]
-                f[BEFORE], f[REVS] = balance(x, f, bank.whole[i, REGIME], now_s)[0], np.nan
+                f[BEFORE], f[REVS] = balance(x, f, bank.whole[i], now_s)[0], np.nan
                 # what the level before it taught
                 f[A0], f[A_VAR], f[P0], f[P_VAR] = (
                     x[LN_A],
@@ -313,7 +354,8 @@ def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         if j >= 0:
             if bank.whole[i, REGIME] != GLIDE:
                 _glide(bank, j, setting)
-                bank.number[j, BEFORE], bank.number[j, REVS] = bank.mean[i, OPEN], np.nan
+                before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
+                bank.number[j, BEFORE], bank.number[j, REVS] = before, np.nan
                 bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = STANDS
                 bank.mean[j, LN_A] += n.DRAGGED[STANDS]
                 bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
@@ -328,7 +370,7 @@ def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: f
     if j >= 0:
         before = bank.number[i, BEFORE]
         bank.number[j, RAMP_FROM], bank.number[j, REVS] = before, np.nan
-        bank.whole[j, KIND] = 0
+        bank.whole[j, KIND] = GOVERNED
         free(bank, j, OPEN, before, 0.02**2)
 
 
@@ -408,15 +450,16 @@ def _children(
     if both and w[LIAR] == NOBODY:
         _lies(bank, i, THE_LOG, n.LIES * hours)
         _lies(bank, i, THE_TRACK, n.LIES * hours)
-    if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
+    fades = _is_fade(bank, i)
+    if regime == LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
         w[REGIME] = regime = DRIVEN
-        w[KIND] = 0
+        w[KIND] = GOVERNED
         f[GUST_A] = math.exp(hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A])
         f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to
     if regime in (DRIVEN, LEVEL) or (claimed and regime == AMID):
-        if regime == LEVEL and age_s < f[RAMP_S]:  # on its way there
+        if regime == LEVEL and not fades and age_s < f[RAMP_S]:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
         if claimed or age_s < n.MANOEUVRING_S * setting.pace:
@@ -436,6 +479,9 @@ def _children(
         if not claimed:
             _turns(bank, i, setting, now_s, turn * hours, TURN)
         left = stop + level + turn
+        if fades:
+            _fade_ends(bank, i, now_s, n.FADE_OUT * hours)
+            left += n.FADE_OUT
     elif regime == GLIDE:
         levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = n.GLIDE_LEVEL + n.GLIDE_BRAKE

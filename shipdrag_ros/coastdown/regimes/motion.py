@@ -21,6 +21,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     DRIVEN,
     EDDY,
     EXCESS,
+    FADING,
     FIRST_A,
     FREE,
     GLIDE,
@@ -70,6 +71,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     STAYS_WAY,
     THE_LOG,
     THE_TRACK,
+    TORQUE,
     TURN,
     WANDER,
     WAY,
@@ -79,7 +81,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     Histories,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
@@ -88,6 +90,7 @@ ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
 _WIDE, _WIDER = float(n.WIDE[0]), float(n.WIDE[1])
 _LONGEST = math.log(float(n.LOG_LAG_MOST) / _LAG_S)
 _REVERSED = -0.05  # of the steady revs
+_MOST_GONE = 0.95  # of an engine that gives less and less
 
 
 @compiled(inline=True, uncounted=True)
@@ -143,10 +146,20 @@ def _thrust_left(f: Float64, now_s: float) -> float:
 
 
 @compiled(inline=True, uncounted=True)
-def balance(x: Float64, f: Float64, regime: int, now_s: float) -> tuple[float, float]:
-    """Return ln of the speed at which thrust and water would balance now, and part of the ramp."""
+def balance(x: Float64, f: Float64, w: Int64, now_s: float) -> tuple[float, float]:
+    """
+    Return ln of the speed at which thrust and water would balance now.
+
+    And its derivative by what is left open: the part of the ramp to a level.
+    """
+    regime = w[REGIME]
     if regime == TURN:
         return f[BEFORE], 0.0
+    if regime == LEVEL and w[KIND] == FADING:  # the speed falls evenly, at a rate left open
+        gone = math.exp(min(x[OPEN], 3.0)) * (now_s - f[SINCE]) / f[RAMP_S]
+        if gone > _MOST_GONE:
+            return f[RAMP_FROM] + math.log(1.0 - _MOST_GONE), 0.0
+        return f[RAMP_FROM] + math.log(1.0 - gone), -gone / (1.0 - gone)
     share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S]) if regime == LEVEL else 1.0
     return f[RAMP_FROM] + (x[OPEN] - f[RAMP_FROM]) * share if share < 1.0 else x[OPEN], share
 
@@ -157,21 +170,21 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
     f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
     if w[REGIME] != LEVEL:
         return w[REGIME] in (DRIVEN, TURN)
-    target = balance(x, f, LEVEL, now_s)[0]
-    free = f[FREE] if w[KIND] == 1 else 0.0
+    target = balance(x, f, w, now_s)[0]
+    free = f[FREE] if w[KIND] == TORQUE else 0.0
     rho = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0]
     return bool(rho * n.NO_THRUST > 1.0)
 
 
 @compiled(inline=True, uncounted=True)
 def _force(
-    regime: int, free: float, x: Float64, f: Float64, now_s: float, law: float, slope: float
+    w: Int64, free: float, x: Float64, f: Float64, now_s: float, law: float, slope: float
 ) -> tuple[float, float, float, float, float]:
     """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
-    a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
+    regime, a = w[REGIME], math.exp(min(max(law + x[LN_A], -20.0), 5.0))
     left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
     if regime in (DRIVEN, LEVEL, TURN):
-        target, share = balance(x, f, regime, now_s)
+        target, share = balance(x, f, w, now_s)
         rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
@@ -199,9 +212,10 @@ def predict(
     """
     Carry a history to the end of the bin; return its acceleration there [m/s^2].
     """
-    x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
-    regime = bank.whole[i, REGIME]
-    free = f[FREE] if regime == LEVEL and bank.whole[i, KIND] == 1 else 0.0
+    x, p, f, w = bank.mean[i], bank.spread[i], bank.number[i], bank.whole[i]
+    regime = w[REGIME]
+    fades = regime == LEVEL and w[KIND] == FADING
+    free = f[FREE] if regime == LEVEL and w[KIND] == TORQUE else 0.0
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
@@ -211,7 +225,7 @@ def predict(
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
-        net, by_u, by_a, by_open, a = _force(regime, free, x, f, now_s, law, slope)
+        net, by_u, by_a, by_open, a = _force(w, free, x, f, now_s, law, slope)
         u = math.exp(x[LN_U])
         change = min(max(dt * net / u, -0.5), 0.5)
         l_l = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
@@ -240,6 +254,8 @@ def predict(
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
             p[OPEN, OPEN] += n.TURNS_DRIFT**2 * dt / (60.0 * pace)
+        elif fades:
+            p[OPEN, OPEN] += n.FADES_DRIFT**2 * dt / (600.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         elif regime == AMID:
@@ -362,11 +378,13 @@ def _driving(
     several: bool,
 ) -> float:
     """Return the density of the revs of a screw that drives."""
-    f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
-    target, share = balance(x, f, regime, now_s)
-    settled = regime == TURN or share == 1.0
+    f, w, x = bank.number[i], bank.whole[i], bank.mean[i]
+    regime = w[REGIME]
+    target, share = balance(x, f, w, now_s)
+    fades = regime == LEVEL and w[KIND] == FADING
+    settled = regime == TURN or fades or share == 1.0
     at = math.exp(min(target - log_first, 1.0))
-    if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
+    if regime == TURN or (regime == LEVEL and w[KIND] == TORQUE):
         free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
         at = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0] * u_part
     if np.isnan(f[REVS]):

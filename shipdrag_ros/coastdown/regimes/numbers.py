@@ -139,6 +139,7 @@ GLIDE_TURN = _number('GLIDE_TURN', 0.5, '1/h', 'gliding to turning without thrus
 BRAKE_GLIDE = _number('BRAKE_GLIDE', 6.0, '1/h', 'braked to gliding')
 BRAKE_LEVEL = _number('BRAKE_LEVEL', 2.0, '1/h', 'braked to a level')
 TURN_OUT = _number('TURN_OUT', 40.0, '1/h', 'turning to what was before')
+FADE_OUT = _number('FADE_OUT', 4.0, '1/h', 'power that is taken off evenly to a level')
 SETTLED_S = _number('SETTLED_S', 900.0, 's', 'a level that is held so long is sailing')
 
 # shapes of switches
@@ -149,6 +150,10 @@ LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a 
 LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
 LEVELS_SD = _grid('LEVELS_SD', (0.3, 0.12, 0.12, 0.12, 0.12, 0.12), 'ln', 'of each')
 LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
+FADES = _grid('FADES', (0.1, 0.4), 'of u_e in 10 min', 'power that is taken off evenly')
+FADES_SHARE = _number('FADES_SHARE', 0.3, '1', 'of switches to another level: evenly to less')
+FADES_DRIFT = _number('FADES_DRIFT', 0.3, 'ln in 10 min', 'sd of the rate')
+FADES_SD = _number('FADES_SD', 0.6, 'ln', 'of each')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
 BRAKES = _grid('BRAKES', (0.4, 1.0, 2.5), 'of the first resistance', 'astern power, tugs')
 BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')

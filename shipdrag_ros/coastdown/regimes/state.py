@@ -41,6 +41,7 @@ COLUMNS = 19
 REGIME, KIND, LIAR, COUNT, GLIDED, GLIDE_KIND = range(6)
 WHOLE = 6
 NOBODY, THE_LOG, THE_TRACK = range(3)
+GOVERNED, TORQUE, FADING = range(3)  # a level: revs are held, or torque; or it falls evenly
 WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 
 # what a bin says; NaN where nothing
