@@ -9,6 +9,7 @@ before the last `history_ns` of it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -387,19 +388,25 @@ class Monitor:
             if glides and each.ended_by is None:
                 return [*events, self._begin(each, number)]
             if glides or each.end_s < number - LEAD_S:
-                events += self._all_of(each, regimes, number)
+                events += self._tell([each], regimes, number, None, None)
         return events
 
-    def _all_of(
+    def _tell(
         self,
-        dated: Dated,
+        dated: Sequence[Dated],
         regimes: RegimeFilter,
         number: int,
-        otherwise: EndedBy = EndedBy.ENGINE,
-        last_ns: int | None = None,
+        ended_by: EndedBy | None,
+        last_ns: int | None,
     ) -> list[Event]:
-        """Report a glide that was never announced."""
-        return [self._begin(dated, number), *self._end(dated, regimes, otherwise, last_ns)]
+        """Report glides, the first of which may be announced; the last ends as the record does."""
+        events: list[Event] = []
+        for one in dated:
+            if self._running is None:
+                events.append(self._begin(one, number))
+            end = (ended_by, last_ns) if one is dated[-1] else (None, None)
+            events += self._end(one, regimes, *end)
+        return events
 
     def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
@@ -438,16 +445,9 @@ class Monitor:
         onset = self._running.onset
         more = [e for e in self._unreported(regimes) if e.end_s > onset.start_ns / SECOND_NS]
         # one that began since is not the one that was announced
-        if more and more[0].stop_s < onset.detected_ns / SECOND_NS:
-            first, more = more[0], more[1:]
-            # only the last of them goes on at the last sample
-            events = self._end(first, regimes, ended_by, None if more else last_ns)
-        else:
-            events = self._withdraw(regimes, ended_by)
-        for one in more:
-            last, otherwise = last_ns if one is more[-1] else None, ended_by or EndedBy.ENGINE
-            events += self._all_of(one, regimes, number, otherwise, last)
-        return events
+        same = more and more[0].stop_s < onset.detected_ns / SECOND_NS
+        events = [] if same else self._withdraw(regimes, ended_by)
+        return events + self._tell(more, regimes, number, ended_by, last_ns)
 
     def _withdraw(self, regimes: RegimeFilter, ended_by: EndedBy | None) -> list[Event]:
         """Say that the coastdown that runs was none."""
@@ -490,14 +490,10 @@ class Monitor:
     ) -> list[Event]:
         """Report what was never announced, say what it was if nothing, and sleep."""
         since_s, dated = max(self._reported_s, self._dismissed_s), self._unreported(regimes)
-        slow_s, otherwise = regimes.slow_since(self._tuning.speed_min), ended_by or EndedBy.ENGINE
+        slow_s, otherwise = regimes.slow_since(self._tuning.speed_min), ended_by
         if ended_by is None and slow_s is not None:
             otherwise, last_ns = EndedBy.SPEED, _ns(slow_s)
-        events = [
-            event
-            for one in dated
-            for event in self._all_of(one, regimes, number, otherwise, last_ns)
-        ]
+        events = self._tell(dated, regimes, number, otherwise, last_ns)
         if not dated:
             was = regimes.dismissal(since_s)
             if was is not None:
