@@ -5,7 +5,7 @@ Coastdowns found and manoeuvres left alone, in one table; no r(v) is estimated.
 Cases are those of `propulsion_found --quick` and, of another author, a ship that the sea makes
 wander (`vouching`). Half an hour of one core for six seeds.
 
-    python -m benchmarks.accuracy.regimes_found [--seeds 61 63 65] [--stops]
+    python -m benchmarks.accuracy.regimes_found [--seeds 61 63 65]
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ import numpy as np
 
 os.environ['SPANS'] = '1'
 
-from benchmarks._tables import put, table
+from benchmarks._tables import table
 from benchmarks.accuracy.propulsion_found import others, stops
-from benchmarks.accuracy.regimes_more import PAGE
 from benchmarks.accuracy.vouching import LEAD_S, START_NS, faulty, ship_of
 from benchmarks.worlds.propulsion.score import SUITES, Row, score
 from benchmarks.worlds.propulsion.tables import MIDDLE_S, fewer
@@ -101,27 +100,19 @@ def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seeds', type=int, nargs='+', default=[61, 63, 65])
-    parser.add_argument(
-        '--stops', action='store_true', help='only what an input more costs, and write it'
-    )
-    chosen = parser.parse_args()
-    seeds = chosen.seeds
+    seeds = parser.parse_args().seeds
     coasts: dict[str, list[Row]] = defaultdict(list)
     none: dict[str, list[Row]] = defaultdict(list)
-    parts = [(stops, coasts), (others, none)][: 1 if chosen.stops else 2]
     for seed in seeds:
-        for made, rows in parts:
+        for made, rows in ((stops, coasts), (others, none)):
             for case in made(range(seed, seed + 1), True):
                 for row in score(case, SUITES):
                     rows[row.suite].append(row)
-    pairs = fewer([row for rows in coasts.values() for row in rows], f'seeds {seeds}')
-    print(*pairs, '', sep='\n')
-    if chosen.stops:
-        put(PAGE, {'paired': '\n'.join(pairs)})
-        return
     columns = [column(coasts[suite], none[suite]) for suite in SUITES]
     print(*table((f'seeds {seeds}', *SUITES), zip(NAMES, *columns, strict=True)), sep='\n')
     print()
+    found = [row for rows in coasts.values() for row in rows]
+    print(*fewer(found, f'seeds {seeds}'), '', sep='\n')
     rows = untrue({suite: [*coasts[suite], *none[suite]] for suite in SUITES})
     print(*table(('said to glide and does not [s]', *SUITES), rows), sep='\n')
     print()
