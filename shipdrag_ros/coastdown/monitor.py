@@ -408,9 +408,10 @@ class Monitor:
             events += self._end(one, regimes, *end)
         return events
 
-    def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
+    def _unreported(self, regimes: RegimeFilter, last_ns: int | None = None) -> list[Dated]:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
+        last_s = np.inf if last_ns is None else last_ns / SECOND_NS
         for each in regimes.glides():
             if each.begin_s >= since_s:
                 found.append(each)
@@ -420,7 +421,7 @@ class Monitor:
                     rest = each.since(regimes.read_after(since_s), since_s)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
-        return found
+        return [each for each in found if each.begin_s < last_s]
 
     def _begin(self, dated: Dated, number: int) -> Onset:
         start = max(int(dated.start_s), 1)
@@ -442,8 +443,8 @@ class Monitor:
     ) -> list[Event]:
         """End the coastdown that runs, as the histories have it now, and tell any after it."""
         assert self._running is not None
-        onset = self._running.onset
-        more = [e for e in self._unreported(regimes) if e.end_s > onset.start_ns / SECOND_NS]
+        onset, dated = self._running.onset, self._unreported(regimes, last_ns)
+        more = [each for each in dated if each.end_s > onset.start_ns / SECOND_NS]
         # one that began since is not the one that was announced
         same = more and more[0].stop_s < onset.detected_ns / SECOND_NS
         events = [] if same else self._withdraw(regimes, ended_by)
@@ -489,10 +490,11 @@ class Monitor:
         last_ns: int | None = None,
     ) -> list[Event]:
         """Report what was never announced, say what it was if nothing, and sleep."""
-        since_s, dated = max(self._reported_s, self._dismissed_s), self._unreported(regimes)
+        since_s = max(self._reported_s, self._dismissed_s)
         slow_s, otherwise = regimes.slow_since(self._tuning.speed_min), ended_by
         if ended_by is None and slow_s is not None:
             otherwise, last_ns = EndedBy.SPEED, _ns(slow_s)
+        dated = self._unreported(regimes, last_ns)
         events = self._tell(dated, regimes, number, otherwise, last_ns)
         if not dated:
             was = regimes.dismissal(since_s)

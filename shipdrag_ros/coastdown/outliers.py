@@ -189,7 +189,7 @@ def _same_as_refused(past: Past, channel: int, reading: JudgedReading) -> bool:
 @compiled(uncounted=True)
 def _follows(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """Say whether a reading may follow the last one that was refused."""
-    gap = reading.stamp - past.refused_ns[channel, 1]
+    gap = abs(reading.stamp - past.refused_ns[channel, 1])  # two senders may cross
     width = _width(past, quick, _FASTEST_M_S, channel, gap, reading)
     return past.refused_count[channel] > 0 and _off_refused(past, channel, reading) <= width
 
@@ -253,6 +253,7 @@ def refuse(past: Past, quick: float, channel: int, reading: JudgedReading) -> No
     same = past.refused_count[channel] > 0 and _same_as_refused(past, channel, reading)
     if _follows(past, quick, channel, reading):
         past.refused_new[channel] += not same
+        past.refused_ns[channel, 0] = min(past.refused_ns[channel, 0], stamp)
     else:
         past.refused_count[channel] = 0
         past.refused_new[channel] = 0

@@ -43,7 +43,7 @@ from shipdrag_ros.coastdown.outliers import (
     sticks,
     take,
 )
-from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past, learn_anew
+from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
@@ -243,13 +243,13 @@ def proves(guard: CheckMemory, limits: Limits, channel: int, reading: JudgedRead
 @compiled(inline=True, uncounted=True)
 def true_since(guard: CheckMemory, channel: int) -> int:
     """
-    Forget what speaks against samples refused, and return the stamp of the first [ns].
+    Refuse the samples that wait no longer, and return the stamp of the first [ns].
 
     Those of it and since, `OUTLIER` so far, are then to be remembered in their order.
     """
-    first = guard.past.refused_ns[channel, 0]
-    learn_anew(guard.past, channel)
-    return int(first)
+    guard.past.refused_count[channel] = 0
+    guard.past.refused_new[channel] = 0
+    return int(guard.past.refused_ns[channel, 0])
 
 
 @compiled(inline=True, uncounted=True)
@@ -403,7 +403,10 @@ def _accept_refused(
     begin = end
     while begin > 0 and not (
         channels[begin - 1] == channel
-        and (reasons[begin - 1] == _ACCEPTED or stamp_ns[begin - 1] < first)
+        and (
+            reasons[begin - 1] == _ACCEPTED
+            or (reasons[begin - 1] == _OUTLIER and stamp_ns[begin - 1] < first)
+        )
     ):
         begin -= 1
     for i in range(begin, end):

@@ -86,10 +86,26 @@ def test_a_position_in_degrees_is_one_without_a_unit_too(
     assert block.value[0].tolist() == [54.1, 7.9]
 
 
-@pytest.mark.parametrize('header', ['t,a,b', 't,lon,lat', 't,lat,b', 't,lat [deg],lon [m]'])
+@pytest.mark.parametrize('header', ['t,a,b', 't,lat,b'])
 def test_values_that_may_be_degrees_are_asked_about(import_text: Import, header: str) -> None:
     given = ','.join(header.split(',')[1:])
     with pytest.raises(ImportDataError, match=r'may be degrees; give .*:deg'):
+        import_text(_PAIR.format(header), f'position={given}', time='t')
+
+
+@pytest.mark.parametrize(
+    ('header', 'message'),
+    [
+        ('t,lon,lat', 'latitude comes first; give position=lat,lon'),
+        ('t,lat [deg],lon [m]', 'do not say one unit, but deg and m; give one'),
+        ('t,east (km),north', 'do not say one unit, but km and none; give one'),
+    ],
+)
+def test_columns_of_a_position_that_disagree_are_refused(
+    import_text: Import, header: str, message: str
+) -> None:
+    given = ','.join(header.split(',')[1:])
+    with pytest.raises(ImportDataError, match=message):
         import_text(_PAIR.format(header), f'position={given}', time='t')
 
 

@@ -588,16 +588,25 @@ def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
     rows, places = FirstRows(table, _FEW_ROWS), [table.column(name) for name in mapped.names]
     said = [role_and_unit(*table.about(place)) for place in places]
     roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
+    text = f'{mapped.name}={",".join(mapped.names)}'
+    if roles == ['lon', 'lat']:
+        swapped = shlex.quote(f'{mapped.name}={",".join(mapped.names[::-1])}')
+        raise ImportDataError(f'--map {shlex.quote(text)}: latitude comes first; give {swapped}')
     units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
-    if len(units) == 1:
+    if len(units) == 1 and (units == {'deg'} or all(unit for _, unit in said)):
         return columns_of(mapped.name, mapped.names, [*units] * 2)
+    if units:
+        raise ImportDataError(
+            f'--map {shlex.quote(text)}: its columns do not say one unit, but '
+            f'{" and ".join(unit or "none" for _, unit in said)}; give one, as '
+            f'{shlex.quote(f"{text}:m")}'
+        )
     beyond = any(
         np.any(np.isnan(degrees) & np.isfinite(rows.values(place)))
         for place, degrees in zip(places, rows.coordinates(places), strict=True)
     )
     if roles == ['x', 'y'] or (beyond and not {'lat', 'lon'} & {*roles}):
         return mapped
-    text = f'{mapped.name}={",".join(mapped.names)}'
     raise ImportDataError(
         f'--map {shlex.quote(text)}: these may be degrees; give {shlex.quote(f"{text}:deg")} '
         f'for latitude and longitude, or {shlex.quote(f"{text}:m")}'
