@@ -22,6 +22,7 @@ Float64 = NDArray[np.float64]
 SECOND_NS = 1_000_000_000
 FUTURE_NS = 2_000_000_000  # a stamp this far after its arrival is not a measurement
 BACKWARD_JUMP_NS = 10_000_000_000  # a stamp this far back means that the clock was set
+SET_BACK = 3  # stamps in a row so far back that make it so: two may be a slip
 ABSURD_SPEED_M_S = 40.0  # faster than any displacement ship
 ABSURD_POSITION_M = 4.1e7  # farther than once around the Earth
 

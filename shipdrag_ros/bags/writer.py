@@ -252,7 +252,6 @@ class RecordWriter:
         self._declared: dict[bytes, Schema | Channel] = {}
         self._indexes: list[ChunkIndex | AttachmentIndex | MetadataIndex] = []
         self._counts: Counter[int] = Counter()
-        self._times_ns: list[int] = []
         self._unpacked = self.size_bytes = 0
         try:
             # of one that grows, what could not be written must not be tried again on closing
@@ -347,7 +346,10 @@ class RecordWriter:
             self._write(as_bytes(DataEnd(0)))
             listed = *self._declared.values(), *self._indexes
             kinds = Counter(map(type, listed))
-            summary = as_bytes(*listed, statistics(kinds, self._counts, self._times_ns))
+            chunks = [each for each in self._indexes if isinstance(each, ChunkIndex)]
+            times_ns = [each.message_start_time for each in chunks]
+            times_ns += [each.message_end_time for each in chunks]
+            summary = as_bytes(*listed, statistics(kinds, self._counts, times_ns))
             start = self.size_bytes
             # its checksum covers the footer too, up to itself
             covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
@@ -401,7 +403,6 @@ class RecordWriter:
             self._counts[number] += each.size // 2
         index.message_index_length = self.size_bytes - at - len(record)
         self._indexes.append(index)
-        self._times_ns += chunk.message_start_time, chunk.message_end_time
         self._unpacked += chunk.uncompressed_size
         least, most = CHUNK_RANGE
         self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)

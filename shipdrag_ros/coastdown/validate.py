@@ -11,7 +11,7 @@ The tests, in this order; the first that fails names the reason:
 1. arrival more than 10 s before the arrival of the sample before: clock set
 2. stamp more than 2 s after its arrival: `FUTURE`
 3. stamp more than 10 s before the last accepted one of the channel: `LATE`; clock set where
-   the `AGREED` of the channel in a row are, and ascend
+   `SET_BACK` of the channel in a row are, and ascend
 4. equal to it: `DUPLICATE`; before it: `OUT_OF_ORDER`
 5. more than `late_s` before the newest accepted stamp of any input: `LATE`
 6. value: `NAN`, `INFINITE`, `ABSURD`, `FROZEN`, `OUTLIER`
@@ -53,6 +53,7 @@ from shipdrag_ros.samples import (
     FUTURE_NS,
     KIND,
     SECOND_NS,
+    SET_BACK,
     Block,
     Channel,
     Float64,
@@ -60,8 +61,6 @@ from shipdrag_ros.samples import (
     Reason,
     UInt8,
 )
-
-AGREED = 3  # stamps in a row that make a clock that was set: two may be a slip
 
 # not reasons of a sample: the clock was set, everything starts afresh
 STAMP_JUMPED_BACK = -1
@@ -194,7 +193,7 @@ def examine(
     last = guard.last_ns[channel]
     if stamp <= last:
         if stamp < last - BACKWARD_JUMP_NS:
-            agree = guard.back[channel] >= AGREED - 1 and stamp > guard.back_ns[channel]
+            agree = guard.back[channel] >= SET_BACK - 1 and stamp > guard.back_ns[channel]
             return STAMP_JUMPED_BACK if agree else _LATE
         if stamp == last:
             return _DUPLICATE
@@ -243,7 +242,7 @@ def proves(guard: CheckMemory, limits: Limits, channel: int, reading: JudgedRead
 @compiled(inline=True, uncounted=True)
 def true_since(guard: CheckMemory, channel: int) -> int:
     """
-    Refuse the samples that wait no longer, and return the stamp of the first [ns].
+    Let the refused samples wait no longer, and return the stamp of the first [ns].
 
     Those of it and since, `OUTLIER` so far, are then to be remembered in their order.
     """
@@ -367,11 +366,8 @@ def _walk(
     reasons: UInt8,
 ) -> None:
     for i in range(len(channel)):
-        c, arrival, reading = (
-            int(channel[i]),
-            receive_ns[i],
-            reading_of(stamp_ns, value, variance, i),
-        )
+        c, arrival = int(channel[i]), receive_ns[i]
+        reading = reading_of(stamp_ns, value, variance, i)
         code = examine(guard, limits, c, arrival, reading)
         if code < 0:
             forget(guard)
@@ -383,7 +379,7 @@ def _walk(
             remember(guard, c, reading)
         else:
             reject(guard, limits, code, c, reading)
-        guard.arrival_ns[0] = receive_ns[i]
+        guard.arrival_ns[0] = arrival
         reasons[i] = code
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown.validate import AGREED, validate
+from shipdrag_ros.coastdown.validate import validate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel, Reason, concatenate
+from shipdrag_ros.samples import SET_BACK, Block, Channel, Reason, concatenate
 
 LENGTH_M = 150.0
 NOW = 1_700_000_000_000_000_000
@@ -81,9 +81,9 @@ def test_a_rejected_sample_leaves_no_trace() -> None:
 
 def test_stamps_far_back_that_agree_start_afresh() -> None:
     old = [sample(LOG, 100.0, 8.0), sample(GROUND, 100.0, 8.0)]
-    back = [sample(LOG, 80.0 + i, 8.0, receive_s=101.0 + i) for i in range(AGREED)]
+    back = [sample(LOG, 80.0 + i, 8.0, receive_s=101.0 + i) for i in range(SET_BACK)]
     after = [sample(GROUND, 83.5, 8.0, receive_s=104.5), sample(LOG, 84.0, 8.0, receive_s=105.0)]
-    late = ['late'] * (AGREED - 1)
+    late = ['late'] * (SET_BACK - 1)
     assert reasons(*old, *back, *after) == ['accepted'] * 2 + late + ['accepted'] * 3
 
 

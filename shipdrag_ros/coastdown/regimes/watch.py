@@ -272,15 +272,13 @@ class RegimeFilter:
         """
         if not self._out or float(self._bank.out[SPEED]) >= speed_m_s:
             return None
+        from scipy.special import ndtr  # slow to import
+
         all_ = self._bank.histories
         used = int(all_.used[0])
         over = all_.mean[:used, LN_U] - math.log(speed_m_s)
-        over /= np.sqrt(2.0 * all_.spread[:used, LN_U, LN_U])
-        weights = np.exp(all_.number[:used, WEIGHT]).tolist()
-        faster = sum(
-            0.5 * weight * math.erfc(-each)
-            for weight, each in zip(weights, over.tolist(), strict=True)
-        )
+        over /= np.sqrt(all_.spread[:used, LN_U, LN_U])
+        faster = float(np.exp(all_.number[:used, WEIGHT]) @ ndtr(over))
         if faster > n.ANNOUNCE[1]:
             return None
         slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0

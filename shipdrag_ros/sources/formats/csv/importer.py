@@ -23,7 +23,14 @@ import numpy as np
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, BACKWARD_JUMP_NS, Block, Channel, Int64
+from shipdrag_ros.samples import (
+    ABSURD_SPEED_M_S,
+    BACKWARD_JUMP_NS,
+    SET_BACK,
+    Block,
+    Channel,
+    Int64,
+)
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
 from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
@@ -107,7 +114,6 @@ class TableResult(ImportResult):
         return [first, *others]
 
 
-_AGREED = 3  # rows behind a step back of the time that make it a clock that was set
 _FEW = 10
 _SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
@@ -241,7 +247,7 @@ class _RowSamples:
             later: Int64 = np.maximum.accumulate(np.r_[self._arrived_ns, clock])[1:]
             behind = clock < later - BACKWARD_JUMP_NS
             behind &= np.diff(clock, prepend=clock[0]) > 0
-            agree = np.flatnonzero(np.convolve(behind, np.ones(_AGREED), 'valid') == _AGREED)
+            agree = np.flatnonzero(np.convolve(behind, np.ones(SET_BACK), 'valid') == SET_BACK)
             at = int(agree[0]) - 1 if len(agree) else len(clock)
             arrived = np.r_[arrived, later[:at]]
             self._arrived_ns = int(arrived[-1]) if len(arrived) else self._arrived_ns
