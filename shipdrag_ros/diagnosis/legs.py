@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A sailing record as legs: means over short stretches on one course at one speed.
+A sailing record as legs: means over short stretches on one course.
 
-Neither baseline nor ship is needed to hold a log against the way made good over
-ground. Where samples are missing, or the vessel turns, stops or changes speed,
-means of the two are not of the same motion: those stretches are left out and
-counted.
+Neither baseline nor ship is needed to compare a log with the way made good over ground. The slope
+of a line through places is a mean of the velocity, with weights that fall to 0 at both ends; the
+log is averaged with the same weights, so that both are of the same motion however it changes.
+Where samples are missing, or the vessel turns or stops, it is left out and counted.
 """
 
 from __future__ import annotations
@@ -16,26 +16,28 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import MAD_TO_SD, OUTLIER, bin_means
+from shipdrag_ros.inference.rows import MAD_TO_SD, OUTLIER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import GEODETIC, Block, Channel, Float64, Int64
+
+_Values = NDArray[np.float64] | NDArray[np.complex128]
 
 LEAST_LEGS = 8
 _LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer ones
 _SAMPLES = 6  # of the slower input in a leg; a leg is as long as that needs
 _SHARE = 0.5  # of the samples that a leg should hold, below which it has a dropout
 _YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
-_STRAIGHT = 0.99  # way made good over that of half legs, where there is no heading
-_NEAR_S = 10.0  # of a time are the positions that show where the vessel was
+_STRAIGHT = 0.994  # velocity over that of both halves, where there is no heading: as short
+_NEAR_S = 10.0  # of a turn the flow at the log is not that of a straight course
 _ZEROS = 0.05  # of the readings of a leg, from where its mean is no speed
 _STOPPED = 0.25  # of the usual speed
-_UNSTEADY = 0.15  # of the speed, between the halves of a leg
 
 
 class Left(StrEnum):
@@ -44,7 +46,6 @@ class Left(StrEnum):
     DROPOUT = 'dropout'
     TURN = 'turn'
     STOP = 'stop'
-    UNSTEADY = 'unsteady'
     ZERO = 'log at 0'
 
 
@@ -86,6 +87,8 @@ class Legs:
         Middle of each, from the start of its record.
     log_m_s, ground_m_s : (n,)
         Mean speed by the log, and over ground.
+    acceleration_m_s2 : (n,)
+        Mean change of the log in a second.
     direction_rad : (n,)
         From east, anticlockwise; 0 where unknown.
     direction
@@ -104,6 +107,7 @@ class Legs:
     time_s: Float64
     log_m_s: Float64
     ground_m_s: Float64
+    acceleration_m_s2: Float64
     direction_rad: Float64
     direction: Direction
     length_s: float
@@ -159,6 +163,7 @@ class Legs:
             np.array([leg.time_s for leg in moving]),
             np.array([leg.log_m_s for leg in moving]),
             np.array([leg.ground_m_s for leg in moving]),
+            np.array([leg.acceleration_m_s2 for leg in moving]),
             np.array([leg.direction_rad for leg in moving]),
             known.pop() if len(known) == 1 else Direction.HEADING,
             max(one.length_s for one in cut),
@@ -174,6 +179,7 @@ class Legs:
             time_s=self.time_s[part],
             log_m_s=self.log_m_s[part],
             ground_m_s=self.ground_m_s[part],
+            acceleration_m_s2=self.acceleration_m_s2[part],
             direction_rad=self.direction_rad[part],
         )
 
@@ -266,14 +272,14 @@ class Stretches:
 
 
 @dataclass(frozen=True)
-class Timed:
+class _Timed:
     """Values at times from the start of the record [s]; places are complex."""
 
     time_s: Float64
-    value: np.ndarray[tuple[int], np.dtype[np.float64 | np.complex128]]
+    value: _Values
 
     @classmethod
-    def of(cls, series: Series, start_ns: int) -> Timed:
+    def of(cls, series: Series, start_ns: int) -> _Timed:
         """Count the times of a series from a start [ns since the epoch]."""
         value = series.value
         flat = value if value.ndim == 1 else value[:, 0] + 1j * value[:, 1]
@@ -287,32 +293,58 @@ class Timed:
         """The usual time between samples."""
         return max(float(np.median(np.diff(self.time_s))), 1e-3)
 
-    def part(self, start_s: float, end_s: float) -> Timed:
+    def part(self, start_s: float, end_s: float) -> _Timed:
         """Return the samples between two times."""
         first, last = np.searchsorted(self.time_s, (start_s, end_s))
-        return Timed(self.time_s[first:last], self.value[first:last])
+        return _Timed(self.time_s[first:last], self.value[first:last])
 
-    def means(self, middle_s: float) -> tuple[float, float, float]:
-        """Return the mean of all, and of each half, without outliers."""
-        value = np.asarray(self.value, np.float64)
-        away = np.abs(value - np.median(value))
-        keep = away <= OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
-        edges = np.array([-np.inf, middle_s, np.inf])
-        halves = bin_means(self.time_s[keep], value[keep], edges)[1]
-        return float(value[keep].mean()), float(halves[0]), float(halves[-1])
+    def near_median(self) -> _Timed:
+        """Return the samples near the median: a log reads 0 now and then, and spikes."""
+        middle = float(np.median(np.asarray(self.value, np.float64)))
+        return self._near(np.abs(self.value - middle), 0.05 * abs(middle))
 
-    def at(self, time_s: float) -> complex:
-        """Return the value on a line through all, without outliers; NaN where they are few."""
-        after, value = self.time_s - time_s, np.asarray(self.value, np.complex128)
+    def near_line(self) -> _Timed:
+        """Return the samples near a line through all."""
+        found = self
         for _ in range(2):
-            if len(after) < 3 or after[0] > 0.0 or after[-1] < 0.0:
-                return complex(math.nan)
-            line = np.polynomial.polynomial.polyfit(after, np.array([value.real, value.imag]).T, 1)
-            place = complex(line[0, 0], line[0, 1])
-            away = np.abs(value - place - after * complex(line[1, 0], line[1, 1]))
-            keep = away <= OUTLIER * np.median(away) + 1e-9
-            after, value = after[keep], value[keep]
-        return place
+            slope = _Weights.of(found.time_s).slope_of(found.value)
+            off = found.value - slope * found.time_s
+            found = found._near(np.abs(off - off.mean()), 1e-9)
+        return found
+
+    def _near(self, away: Float64, least: float) -> _Timed:
+        keep = away <= OUTLIER * MAD_TO_SD * np.median(away) + least
+        return _Timed(self.time_s[keep], self.value[keep])
+
+
+class _Weights(NamedTuple):
+    """
+    How a line through values at some times has its slope [1/s].
+
+    A slope of places is a mean of the velocity, in which each instant weighs as much as all
+    weights after it.
+    """
+
+    time_s: Float64
+    of_slope: Float64
+
+    @classmethod
+    def of(cls, time_s: Float64) -> _Weights:
+        """Return those of a least-squares line."""
+        away = time_s - time_s.mean()
+        return cls(time_s, away / (away @ away))
+
+    def slope_of(self, value: _Values) -> complex:
+        """Return the slope of values at the times."""
+        return complex(self.of_slope @ value)
+
+    def mean_of(self, timed: _Timed) -> complex:
+        """Return the mean of a velocity at times of its own."""
+        after = np.append(np.cumsum(self.of_slope[::-1])[::-1], 0.0)
+        # what is read at a time of a place stands for both sides of it
+        weight = after[np.searchsorted(self.time_s, timed.time_s)]
+        weight += after[np.searchsorted(self.time_s, timed.time_s, side='right')]
+        return complex(weight @ timed.value / weight.sum())
 
 
 @dataclass(frozen=True)
@@ -320,6 +352,7 @@ class _Leg:
     time_s: float
     log_m_s: float
     ground_m_s: float
+    acceleration_m_s2: float
     direction_rad: float
     direction: Direction
 
@@ -353,51 +386,45 @@ class _LegCutter:
         self.geodetic = by_place and first is not None and sent[GEODETIC[first]] > sent[first]
         self.notes = tuple(f'{record.name}: {note}' for note in window.notes)
         self.by_place = by_place
-        self.log = Timed.of(window.speed_through_water, start_ns)
-        self.ground = Timed.of(ground, start_ns)
-        self.heading = Timed.of(window.heading, start_ns)
+        self.log = _Timed.of(window.speed_through_water, start_ns)
+        self.ground = _Timed.of(ground, start_ns)
+        self.heading = _Timed.of(window.heading, start_ns)
         span_s = (end_ns - start_ns) * 1e-9
         step_s = max(self.log.step_s, self.ground.step_s)
         self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
-        self.near_s = max(_NEAR_S, 0.5 * _SAMPLES * self.ground.step_s)
         self.edges = np.arange(0.0, span_s, self.length_s)
 
     def leg(self, start_s: float) -> _Leg | Left:
         """Return the leg that begins at a time, or why there is none."""
-        end_s = start_s + self.length_s
+        middle, end_s = start_s + 0.5 * self.length_s, start_s + self.length_s
         log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
-        heading = self.heading.part(start_s - self.near_s, end_s + self.near_s)
+        halves = ground.part(start_s, middle), ground.part(middle, end_s)
         for part, whole in ((log, self.log), (ground, self.ground)):
             if len(part) < max(_SHARE * self.length_s / whole.step_s, 0.5 * _SAMPLES):
                 return Left.DROPOUT
-        turned = np.exp(1j * heading.value) if len(heading) else np.empty(0, complex)
+        if min(map(len, halves)) < 2:
+            return Left.DROPOUT
+        turned = np.exp(1j * self.heading.part(start_s - _NEAR_S, end_s + _NEAR_S).value)
         yaw = complex(turned.mean()) if len(turned) else 1.0 + 0.0j
         if abs(yaw) < math.exp(-0.5 * _YAW_SD_RAD**2):
             return Left.TURN
-        middle = start_s + 0.5 * self.length_s
-        zeros = float(np.mean(np.asarray(log.value) == 0.0))
-        if zeros > _ZEROS:
+        if float(np.mean(np.asarray(log.value) == 0.0)) > _ZEROS:
             return Left.ZERO
-        through, first, second = log.means(middle)
+        ground, log = self._sound(ground), log.near_median()
+        weights = _Weights.of(ground.time_s)
+        through = weights.mean_of(log).real
         if through <= 0.0:
             return Left.STOP
-        if abs(second - first) > _UNSTEADY * through:
-            return Left.UNSTEADY
+        faster = weights.slope_of(np.interp(weights.time_s, log.time_s, log.value)).real
         if not self.by_place:
-            over, direction = ground.means(middle)[0], math.atan2(yaw.imag, yaw.real)
-            known = Direction.HEADING if len(heading) else Direction.UNKNOWN
-            return _Leg(middle, through, over, direction, known)
-        half_s = 0.5 * self.length_s
-        places = [self._place(start_s + k * half_s) for k in range(-1, 4)]
-        if not all(map(cmath.isfinite, places[1:4])):
-            return Left.DROPOUT
-        way = places[3] - places[1]
-        # a turn just beyond its ends would put them wrong
-        ways = np.diff([place for place in places if cmath.isfinite(place)])
-        if not len(heading) and abs(ways.sum()) < _STRAIGHT * np.abs(ways).sum():
+            known = Direction.HEADING if len(turned) else Direction.UNKNOWN
+            over = weights.mean_of(ground).real
+            return _Leg(middle, through, over, faster, cmath.phase(yaw), known)
+        ways = [_Weights.of(half.time_s).slope_of(half.value) for half in halves]
+        if not len(turned) and abs(sum(ways)) < _STRAIGHT * sum(map(abs, ways)):
             return Left.TURN
-        over = abs(way) / self.length_s
-        return _Leg(middle, through, over, cmath.phase(way), Direction.TRACK)
+        way = weights.slope_of(ground.value)
+        return _Leg(middle, through, abs(way), faster, cmath.phase(way), Direction.TRACK)
 
     def stretch(self, start_s: float) -> tuple[complex, bool] | None:
         """Return velocity over ground, and whether the log reads 0; None without readings."""
@@ -405,13 +432,10 @@ class _LegCutter:
         log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
         if min(len(log), len(ground)) < 0.5 * _SAMPLES:
             return None
-        if self.by_place:
-            way = (self._place(end_s) - self._place(start_s)) / self.length_s
-        else:
-            way = complex(float(np.mean(np.asarray(ground.value, np.float64))))
-        zero = float(np.mean(np.asarray(log.value) == 0.0)) > 0.5
-        return (way, zero) if cmath.isfinite(way) else None
+        ground = self._sound(ground)
+        weights = _Weights.of(ground.time_s)
+        way = weights.slope_of(ground.value) if self.by_place else weights.mean_of(ground)
+        return way, float(np.mean(np.asarray(log.value) == 0.0)) > 0.5
 
-    def _place(self, time_s: float) -> complex:
-        """Return where the vessel was, by positions around that time."""
-        return self.ground.part(time_s - self.near_s, time_s + self.near_s).at(time_s)
+    def _sound(self, ground: _Timed) -> _Timed:
+        return ground.near_line() if self.by_place else ground.near_median()

@@ -9,6 +9,7 @@ it, and it cannot pass for one of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -261,7 +262,9 @@ class SailingModel:
         radar = 1.0 + action.radar_factor
         east, north = action.current_m_s
         through = self.legs.through_water((east * radar, north * radar)) / radar
-        return (1.0 + action.log_factor) * through + action.log_offset_m_s
+        delay_s = _usual_delay(self.legs)[0] + action.log_lag_s + action.log_late_s
+        read = (1.0 + action.log_factor) * through + action.log_offset_m_s
+        return np.asarray(read - delay_s * self.legs.acceleration_m_s2, np.float64)
 
     @cached_property
     def _frame(self) -> Frame:
@@ -286,6 +289,14 @@ def shown() -> list[Effect]:
     return [e for e in LIBRARY.values() if WithoutBaseline.LOG_TRACK in e.without_baseline]
 
 
+def _usual_delay(legs: Legs) -> tuple[float, float]:
+    """Return mean and sd of the delay of the log behind the way over ground [s]."""
+    mean, sd = priors.any_log_lag()
+    if legs.direction is Direction.TRACK:
+        return mean, sd
+    return mean - priors.GROUND_LAG.mean, math.hypot(sd, priors.GROUND_LAG.sd)
+
+
 def _covariance(legs: Legs, sizes: Float64) -> Float64:
     """Return the covariance of the noise; sizes are white, log, water [m/s], two times [s]."""
     white, log, water, log_s, water_s = sizes
@@ -296,5 +307,6 @@ def _covariance(legs: Legs, sizes: Float64) -> Float64:
     speed = legs.ground_m_s
     found = np.where(together, slow + priors.SAILING_CURRENT.sd**2 * course, 0.0)
     found += priors.SAILING_SCALE.sd**2 * np.outer(speed, speed)
+    found += _usual_delay(legs)[1] ** 2 * np.outer(legs.acceleration_m_s2, legs.acceleration_m_s2)
     found[np.diag_indices_from(found)] += white**2
     return np.asarray(found, np.float64)

@@ -9,6 +9,8 @@ docs/results/priors.md prints this table (`python docs/tables.py`). Those of the
 
 from __future__ import annotations
 
+import math
+
 from shipdrag_ros.parameter import Declared, half_normal, log_normal, normal
 
 _REALITY = 'records of many craft, as a range'
@@ -98,6 +100,18 @@ LOG_LAG = Declared(
 GROUND_LAG = Declared(
     'lambda_g', 'filter of a speed over ground', normal(3.0, mean=1.0), 's', '1 to 8 s, or none'
 )
+
+
+def any_log_lag() -> tuple[float, float]:
+    """
+    Return mean and sd of the filter of a log that may have none [s].
+    """
+    none, some, chance = LOG_UNFILTERED, LOG_LAG, UNFILTERED_CHANCE.mean
+    mean = chance * none.mean + (1.0 - chance) * some.mean
+    within = chance * none.sd**2 + (1.0 - chance) * some.sd**2
+    return mean, math.sqrt(within + chance * (1.0 - chance) * (some.mean - none.mean) ** 2)
+
+
 # the water
 CURRENT = Declared('c', 'current along the track', normal(0.4), 'm/s', 'steady 0.1 to 0.8 m/s')
 WRONG = Declared(

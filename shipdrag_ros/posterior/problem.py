@@ -252,19 +252,11 @@ def _extras(
         elif code % KIND_COUNT == LOG:
             sd[own + motion.SCALE] = priors.LOG_SCALE.sd
             sd[own + motion.OFFSET] = priors.LOG_OFFSET.sd
-            mean[own + motion.LAG], sd[own + motion.LAG] = _any_lag()
+            mean[own + motion.LAG], sd[own + motion.LAG] = priors.any_log_lag()
         else:
             lag = priors.GROUND_LAG
             mean[own + motion.GROUND_LAG], sd[own + motion.GROUND_LAG] = lag.mean, lag.sd
     return mean, sd
-
-
-def _any_lag() -> tuple[float, float]:
-    """Return mean and sd of the filter of a log that may have none."""
-    none, some, chance = priors.LOG_UNFILTERED, priors.LOG_LAG, priors.UNFILTERED_CHANCE.mean
-    mean = chance * none.mean + (1.0 - chance) * some.mean
-    within = chance * none.sd**2 + (1.0 - chance) * some.sd**2
-    return mean, math.sqrt(within + chance * (1.0 - chance) * (some.mean - none.mean) ** 2)
 
 
 def _all_families(

@@ -82,10 +82,11 @@ def test_an_effect_of_a_sensor_says_which_reading_errs() -> None:
 def test_confounders_are_inseparable_where_nothing_measured_tells_them_apart() -> None:
     every = list(LIBRARY.values())
     assert inseparable(every) == (frozenset(('added_mass', 'displacement')),)
-    scales = frozenset(('log_scale', 'radar_scale'))
+    scales, delays = frozenset(('log_scale', 'radar_scale')), frozenset(('log_lag', 'time_offset'))
     courses = [Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE, Measure.OTHER_SPEED]
-    assert inseparable(OF_LOG_AND_TRACK, measured=courses) == (scales,)
+    assert inseparable(OF_LOG_AND_TRACK, measured=courses) == (delays, scales)
     assert set(inseparable(OF_LOG_AND_TRACK, measured=courses[2:])) == {
         scales,
+        delays,
         frozenset(('current', 'log_offset')),
     }
