@@ -69,6 +69,7 @@ LOST = 16.0
 """Nats below the best of a history that is dropped."""
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
+_HALVINGS = 24  # in search of the weight of the last that is kept
 _NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
 
@@ -543,21 +544,25 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     for i in range(count):
         total += math.exp(bank.number[i, WEIGHT] - best)
     norm = best + math.log(total)
-    due = bank.clock[0] % _THIN_EVERY == 0
-    now_s = bank.clock[0] * setting.step_s
-    kept = 0
     for i in range(count):
         bank.number[i, WEIGHT] -= norm
-        if bank.number[i, WEIGHT] < -LOST:
-            continue
-        if kept != i:
-            _copy(bank, i, kept)
-        kept += 1
-    bank.used[0] = kept
-    if due:
-        _merge(bank, now_s, setting.pace)
-    _keep_best(bank)  # or the next births find no room
+    if bank.clock[0] % _THIN_EVERY == 0:
+        _keep(bank, -LOST)
+        _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
+    _keep(bank, _least_of_the_best(bank))  # or the next births find no room
     return float(norm)
+
+
+@compiled(uncounted=True)
+def _keep(bank: Histories, least: float) -> None:
+    """Drop the histories of less log weight."""
+    kept = 0
+    for i in range(bank.used[0]):
+        if bank.number[i, WEIGHT] > least:
+            if kept != i:
+                _copy(bank, i, kept)
+            kept += 1
+    bank.used[0] = kept
 
 
 @compiled(uncounted=True)
@@ -591,24 +596,18 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
 
 
 @compiled(uncounted=True)
-def _keep_best(bank: Histories) -> None:
-    count = bank.used[0]
-    if count <= KEPT:
-        return
-    low, high = -LOST - 1.0, 0.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
+def _least_of_the_best(bank: Histories) -> float:
+    """Return a log weight that `KEPT` histories at most exceed; `-LOST` where no more do."""
+    low, least, high = -np.inf, -LOST, 0.0
+    for _ in range(_HALVINGS):
         above = 0
-        for i in range(count):
-            above += bank.number[i, WEIGHT] > middle
+        for i in range(bank.used[0]):
+            above += bank.number[i, WEIGHT] > least
         if above > KEPT:
-            low = middle
+            low = least
+        elif least == -LOST:
+            break
         else:
-            high = middle
-    kept = 0
-    for i in range(count):
-        if bank.number[i, WEIGHT] > high:
-            if kept != i:
-                _copy(bank, i, kept)
-            kept += 1
-    bank.used[0] = kept
+            high = least
+        least = 0.5 * (low + high)
+    return float(high if low > -np.inf else least)

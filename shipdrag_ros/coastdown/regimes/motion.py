@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     AMID,
     BEFORE,
     BRAKE,
+    CHANGING,
     COUNT,
     CURRENT,
     DRIVEN,
@@ -205,9 +207,32 @@ def _force(
     return net, -a * left * slope - a * by_u, -a * left, by_open, a
 
 
+class Kept(NamedTuple):
+    """What is left of gust, slow errors of log and speed over ground, and lag after a part."""
+
+    gust: float
+    wander: float
+    eddy: float
+    lag: float
+
+
+@compiled(uncounted=True)
+def kept_of(setting: BankSetting, noise: Float64) -> Kept:
+    """
+    Return what is left after a part of a bin.
+    """
+    dt, pace = setting.step_s / _PARTS, setting.pace
+    return Kept(
+        math.exp(-dt / (n.GUST_S * pace)),
+        math.exp(-dt / (noise[N_WANDER_S] * pace)),
+        math.exp(-dt / (noise[N_EDDY_S] * pace)),
+        math.exp(-dt / (_LAG_S * pace)),
+    )
+
+
 @compiled(uncounted=True)
 def predict(
-    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, kept: Kept, advance: float
 ) -> float:
     """
     Carry a history to the end of the bin; return its acceleration there [m/s^2].
@@ -218,15 +243,13 @@ def predict(
     free = f[FREE] if regime == LEVEL and w[KIND] == TORQUE else 0.0
     dt = setting.step_s / _PARTS
     pace = setting.pace
-    keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
-    keep_e = math.exp(-dt / (noise[N_EDDY_S] * pace))
-    keep_f = math.exp(-dt / (_LAG_S * pace))
+    keep_g, keep_b, keep_e, keep_f = kept
     slowing = mean_u = mean_lag = 0.0
+    u = math.exp(x[LN_U])
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
         net, by_u, by_a, by_open, a = _force(w, free, x, f, now_s, law, slope)
-        u = math.exp(x[LN_U])
         change = min(max(dt * net / u, -0.5), 0.5)
         l_l = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
         l_a, l_o, l_g = dt * by_a / u, dt * by_open / u, dt / u
@@ -241,7 +264,7 @@ def predict(
             p[LN_U, k], p[GUST, k] = new, gust * keep_g
             p[WANDER, k] *= keep_b
             p[EDDY, k] *= keep_e
-        for k in range(STATES):
+        for k in range(CHANGING):
             old, gust = p[k, LN_U], p[k, GUST]
             new = l_l * old + l_a * p[k, LN_A] + l_o * p[k, OPEN] + l_g * gust
             p[k, LN_A] += power * (new - old) + change * p[k, POWER]
@@ -250,6 +273,9 @@ def predict(
             p[k, LN_U], p[k, GUST] = new, gust * keep_g
             p[k, WANDER] *= keep_b
             p[k, EDDY] *= keep_e
+        for k in range(CHANGING, STATES):
+            for j in range(CHANGING):
+                p[k, j] = p[j, k]
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
         if regime in (TURN, GLIDE_TURN):
@@ -277,14 +303,15 @@ def predict(
         mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
         x[LAG] = lagged
         x[LN_U] = _bounded(setting.hull, x[LN_U] + change)
-        mean_u += 0.5 * (u + math.exp(x[LN_U])) / _PARTS
+        before, u = u, math.exp(x[LN_U])
+        mean_u += 0.5 * (before + u) / _PARTS
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
         x[EDDY] *= keep_e
         slowing = net
     x[WAY] -= advance
-    f[MEAN_U], f[MEAN_LAG] = mean_u - math.exp(x[LN_U]), mean_lag - x[LAG]
+    f[MEAN_U], f[MEAN_LAG] = mean_u - u, mean_lag - x[LAG]
     return slowing
 
 

@@ -15,12 +15,14 @@ KEPT = 300  # histories
 ROOM = 1400  # with those born since they were last thinned out
 SWITCHES = 12  # that a history remembers
 
-# the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
-# of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m], what a filter of usual lag is behind [m/s], ln of
-# the log's own lag over that, and slow error of the speed over ground [m/s]
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG, LONGER, EDDY = range(11)
-STATES = 11
+# the state of a history; what changes within a bin: ln u, ln resistance over the curve of a hull,
+# gust [m/s^2], slow errors of the log and of the speed over ground [m/s], true way less the way as
+# read [m], what a filter of usual lag is behind [m/s]
+LN_U, LN_A, GUST, WANDER, EDDY, WAY, LAG = range(7)
+# and what does not: the exponent of the resistance over that of the curve, what the regime leaves
+# open, current [m/s], ln of the log's own lag over the usual one
+POWER, OPEN, CURRENT, LONGER = range(7, 11)
+CHANGING, STATES = 7, 11
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 AMID = 6  # amid a manoeuvre under power, as a record may begin and a claimed window may be
