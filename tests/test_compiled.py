@@ -370,11 +370,11 @@ def elsewhere(estimates: tuple[Path, str], tmp_path_factory: pytest.TempPathFact
 def test_an_edit_of_this_package_acts_at_once(
     estimates: tuple[Path, str], elsewhere: Path
 ) -> None:
-    """The live estimate differs, whose last step is in another file than what was edited."""
-    rows = elsewhere / 'shipdrag_ros' / 'posterior' / 'rows.py'
-    old, new = '_NEIGHBOURS = 9', '_NEIGHBOURS = 5'
-    edit(rows, old, new)
+    """The live estimate differs; of a callee in another file that is shown above."""
+    laplace = elsewhere / 'shipdrag_ros' / 'posterior' / 'laplace.py'
+    old, new = '_LEAST = 1e-3', '_LEAST = 0.5'
+    edit(laplace, old, new)
     cache = str(elsewhere / 'cache')
     after, _ = run(elsewhere, LIVE, timeout=800.0, SHIPDRAG_CACHE_DIR=cache)
-    edit(rows, new, old)
+    edit(laplace, new, old)
     assert after.split('\n')[0] != estimates[1].split('\n')[0]

@@ -36,7 +36,8 @@ def is_frame(source: object) -> bool:
     """
     Say whether a source has named columns.
     """
-    return hasattr(source, 'columns') and hasattr(source, '__getitem__')
+    # of its type: a lazy frame would look at its data to tell its columns
+    return hasattr(type(source), 'columns') and hasattr(source, '__getitem__')
 
 
 class FrameTable(LogTable):

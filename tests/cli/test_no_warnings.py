@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No verb shows a user a warning of Python or numpy, whatever it is given."""
+"""No verb shows a warning of Python or numpy, which is an error here, whatever it is given."""
 
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.parameters import ESTIMATORS
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 
-NOT_SHOWN = (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning)
 SHIP = """
 name: Odd
 length_m: 60.0
@@ -25,16 +23,9 @@ added_mass: {model: constant, value: 0.1, sd: 0.02}
 DATA = 'SHIPDRAG_DATA'
 
 
-def told(*line: str) -> list[str]:
-    """Run a verb, which may refuse its input, and return the warnings that a user would see."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter('always')
-        assert main(line) in (0, 1)
-    return [
-        f'{each.filename}:{each.lineno}: {each.message}'
-        for each in caught
-        if not issubclass(each.category, NOT_SHOWN)
-    ]
+def run(*line: str) -> None:
+    """Run a verb, which may refuse its input."""
+    assert main(line) in (0, 1)
 
 
 def glide(time_s: Float64) -> Float64:
@@ -99,19 +90,19 @@ def written(values: dict[str, Float64], path: Path, part: slice) -> str:
 def test_odd_records(name: str, ship: Path, tmp_path: Path) -> None:
     bag = written(RECORDS[name], tmp_path / 'odd.mcap', slice(None))
     page = str(tmp_path / 'page.html')
-    said = told('info', bag) + told('check', bag)
-    said += told('replay', bag, '--ship', str(ship), '--report', page)
-    said += told('diagnose', bag, '--ship', str(ship), '--report', page)
-    for window in (('370', '670'), ('460', '480')):
-        said += told('diagnose', bag, '--ship', str(ship), '--window', *window)
+    run('info', bag)
+    run('check', bag)
+    run('replay', bag, '--ship', str(ship), '--report', page)
+    run('diagnose', bag, '--ship', str(ship), '--report', page)
+    run('diagnose', bag, '--ship', str(ship), '--window', '370', '670')
     # every call judges its window again, which takes the longer the more is recorded before it
     part = written(RECORDS[name], tmp_path / 'part.mcap', slice(380, 481))
     more = ('--parameters', str(tmp_path / 'parameters.yaml'), '--json', str(tmp_path / 'a.json'))
     for estimator in ESTIMATORS[:1] if name in REFUSED else ESTIMATORS:
         Path(more[1]).write_text(f'estimator: {estimator}\nfroude_min: 0.001\n')
-        said += told('replay', part, '--ship', str(ship), '--window', '0', '100', *more)
-    said += told('replay', part, '--ship', str(ship), '--window', '80', '100', *more)
-    assert said == []
+        run('replay', part, '--ship', str(ship), '--window', '0', '100', *more)
+    for verb in ('replay', 'diagnose'):
+        run(verb, part, '--ship', str(ship), '--window', '80', '100')
 
 
 @pytest.mark.parametrize(
@@ -128,9 +119,8 @@ def test_measured_records(
     table: str, columns: str, window: tuple[float, float], ship: Path, tmp_path: Path
 ) -> None:
     source, bag = str(Path(os.environ[DATA]) / table), str(tmp_path / 'run.mcap')
-    said = told('import', source, '-o', bag, *columns.split(), '--ship', str(ship))
+    run('import', source, '-o', bag, *columns.split(), '--ship', str(ship))
     page = str(tmp_path / 'page.html')
     for chosen in ((), ('--window', *map(str, window))):
-        said += told('replay', bag, *chosen, '--report', page)
-        said += told('diagnose', bag, *chosen, '--report', page)
-    assert said == []
+        run('replay', bag, *chosen, '--report', page)
+        run('diagnose', bag, *chosen, '--report', page)

@@ -24,7 +24,6 @@ CURVE = tuple(item.name for item in fields(ResistanceCurve))
 RUNS = 40
 Estimator = Callable[[Window, Ship, Parameters], Estimate]
 both = pytest.mark.parametrize('estimator', [estimate, estimate_final])
-pytestmark = pytest.mark.filterwarnings('error')
 
 
 def window(block: Block, end_ns: int = END_NS) -> Window:

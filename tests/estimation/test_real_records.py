@@ -18,7 +18,6 @@ from shipdrag_ros.ship import ConstantAddedMass, Ship
 
 pytestmark = [
     pytest.mark.skipif('SHIPDRAG_DATA' not in os.environ, reason='SHIPDRAG_DATA is not set'),
-    pytest.mark.filterwarnings('error'),
 ]
 START_NS = 1_700_000_000_000_000_000
 

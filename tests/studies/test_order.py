@@ -49,7 +49,6 @@ def test_one_idle_step_is_not_a_plateau() -> None:
     assert plateau_order(table) == 3
 
 
-@pytest.mark.filterwarnings('error')
 def test_exact_fits_are_rounding_not_steps() -> None:
     table = OrderTable.of(range(1, 6), [10.0, 4.0, 1e-28, 1e-29, 0.0], rows=9, rounding=1e-26)
     assert table.f[2] == np.inf

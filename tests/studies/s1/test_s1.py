@@ -26,7 +26,6 @@ CURVE = tuple(item.name for item in fields(ResistanceCurve))
 JOINT = Parameters(estimator='s1_joint')
 SPEED = Parameters(estimator='s1_speed')
 POSITION = Parameters(estimator='s1_position')
-pytestmark = pytest.mark.filterwarnings('error')
 
 
 def only(block: Block, *channels: Channel) -> Block:
