@@ -547,15 +547,17 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     for i in range(count):
         bank.number[i, WEIGHT] -= norm
     if bank.clock[0] % _THIN_EVERY == 0:
-        _keep(bank, -LOST)
+        keep(bank, -LOST)
         _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
-    _keep(bank, _least_of_the_best(bank))  # or the next births find no room
+    keep(bank, _least_of_the_best(bank))  # or the next births find no room
     return float(norm)
 
 
 @compiled(uncounted=True)
-def _keep(bank: Histories, least: float) -> None:
-    """Drop the histories of less log weight."""
+def keep(bank: Histories, least: float) -> None:
+    """
+    Drop the histories of less log weight.
+    """
     kept = 0
     for i in range(bank.used[0]):
         if bank.number[i, WEIGHT] > least:
