@@ -8,12 +8,12 @@ Score of r(v) and its band, on coastdowns of world A or B.
 Runs `shipdrag replay` on each run by itself, in this process, and holds the curve against the
 true one. By default only cases in which r(v) is what a coastdown shows: nothing hidden, or
 something that belongs to the hull. Of world A the cases before 539 are for choosing methods, of
-world B the even ones; the others are for scoring.
+world B the even ones; the others are for scoring. `--hidden` takes others too; `--given` gives the
+time of the stop, `--each` prints each run, `--out` keeps it as a line of JSON.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import time
@@ -29,19 +29,18 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 import numpy as np
 
 from benchmarks import _verbs
+from benchmarks._asked import asked
+from benchmarks._tables import table as markdown
+from benchmarks.accuracy._coasts import rms
 from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
 from benchmarks.worlds.hidden import cases as cases_a
 from benchmarks.worlds.hidden_b import cases as cases_b
 from benchmarks.worlds.hidden_b.plans import plans_of
 
 OWN = (
-    'fouling',
-    'shallow_water',
-    'towed_cable',
-    'locked_propeller',
-    'windmilling_propeller',
+    'fouling', 'shallow_water', 'towed_cable', 'locked_propeller', 'windmilling_propeller',
     'displacement',
-)
+)  # fmt: skip
 """What is part of r(v), and nothing else beside it."""
 NINE_TENTHS = 0.9
 WIDE = 1.96
@@ -79,15 +78,8 @@ class World:
         Return the first world.
         """
         of = cases_a
-        return cls(
-            of.count(),
-            lambda number: of.reveal(number).names,
-            of.condition,
-            of.observe,
-            of.stops_ns,
-            of.first_speed,
-            of.true_r,
-        )
+        more = of.condition, of.observe, of.stops_ns, of.first_speed, of.true_r
+        return cls(of.count(), lambda number: of.reveal(number).names, *more)
 
     @classmethod
     def b(cls, seed: int = cases_b.SEED) -> World:
@@ -95,15 +87,9 @@ class World:
         Return the world of another hand.
         """
         of, plans = cases_b, plans_of(seed)
-        return cls(
-            len(plans),
-            lambda number: tuple(sorted(plans[number][0])),
-            partial(of.condition, seed=seed),
-            partial(of.observe, seed=seed),
-            partial(of.stops_ns, seed=seed),
-            partial(of.first_speed, seed=seed),
-            partial(of.true_r, seed=seed),
-        )
+        more = of.condition, of.observe, of.stops_ns, of.first_speed, of.true_r
+        seeded = (partial(each, seed=seed) for each in more)
+        return cls(len(plans), lambda number: tuple(sorted(plans[number][0])), *seeded)
 
 
 @dataclass(frozen=True)
@@ -189,8 +175,8 @@ def score(
         run,
         ' + '.join(world.names(number)) or 'nothing',
         str(world.condition(number)),
-        float(np.sqrt(np.mean(error**2))) / largest,
-        float(np.sqrt(np.mean(error[below] ** 2))) / largest if below.any() else float('nan'),
+        rms(error) / largest,
+        rms(error[below]) / largest if below.any() else float('nan'),
         float(np.mean(np.abs(error) <= WIDE * sigma)),
         float(np.mean((error / sigma) ** 2)),
         float(np.mean(sigma)) / largest,
@@ -249,25 +235,27 @@ def summary(scores: Sequence[Score], runs: int) -> dict[str, float]:
     if not scores:
         return {'runs': runs, 'with an estimate, %': 0.0}
 
-    def of(name: str) -> np.ndarray:
+    def of(name: str, mean: Callable[..., Any] = np.mean, part: float = 100.0) -> float:
         values = np.array([getattr(each, name) for each in scores])
-        return values[np.isfinite(values)]
+        return part * float(mean(values[np.isfinite(values)]))
+
+    def low(covers: np.ndarray) -> float:
+        return float(np.mean(covers < 0.5))
 
     return {
         'runs': runs,
         'with an estimate, %': 100.0 * len(scores) / runs,
-        'RMSE, % of the largest r': 100.0 * float(np.sqrt(np.mean(of('rmse') ** 2))),
-        'RMSE, median of runs': 100.0 * float(np.median(of('rmse'))),
-        'RMSE below 0.9 of the first speed': 100.0
-        * float(np.sqrt(np.mean(of('rmse_below') ** 2))),
-        'the same, median of runs': 100.0 * float(np.median(of('rmse_below'))),
-        'mean sigma, % of the largest r': 100.0 * float(np.mean(of('sigma'))),
-        'sigma, median of runs': 100.0 * float(np.median(of('sigma'))),
-        'cover of the 95 % band, %': 100.0 * float(np.mean(of('cover'))),
-        'runs with cover below 50 %, %': 100.0 * float(np.mean(of('cover') < 0.5)),
-        'chi^2, mean of runs': float(np.mean(of('chi2'))),
-        'chi^2, median of runs': float(np.median(of('chi2'))),
-        'CPU s a run, median': float(np.median(of('cpu_s'))),
+        'RMSE, % of the largest r': of('rmse', rms),
+        'RMSE, median of runs': of('rmse', np.median),
+        'RMSE below 0.9 of the first speed': of('rmse_below', rms),
+        'the same, median of runs': of('rmse_below', np.median),
+        'mean sigma, % of the largest r': of('sigma'),
+        'sigma, median of runs': of('sigma', np.median),
+        'cover of the 95 % band, %': of('cover'),
+        'runs with cover below 50 %, %': of('cover', low),
+        'chi^2, mean of runs': of('chi2', part=1.0),
+        'chi^2, median of runs': of('chi2', np.median, 1.0),
+        'CPU s a run, median': of('cpu_s', np.median, 1.0),
     }
 
 
@@ -287,29 +275,21 @@ def table(rows: Sequence[tuple[int, int, Score | None, str]]) -> Iterator[str]:
         name: summary([each for _, _, each, _ in part if each is not None], len(part))
         for name, part in groups.items()
     }
-    yield '| | ' + ' | '.join(columns) + ' |'
-    yield '|---|' + '---|' * len(columns)
-    for name in columns['all']:
-        cells = [f'{column[name]:.3g}' if name in column else '-' for column in columns.values()]
-        yield f'| {name} | ' + ' | '.join(cells) + ' |'
+    cells = (
+        [name, *(f'{each[name]:.3g}' if name in each else '-' for each in columns.values())]
+        for name in columns['all']
+    )
+    yield from markdown(['', *columns], cells)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """
     Replay, score and print.
     """
-    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--world', choices=('a', 'b'), default='b')
-    parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
-    parser.add_argument('--hidden', choices=('own', 'nothing', 'all'), default='own')
-    parser.add_argument('--first', type=int, default=0)
-    parser.add_argument('--count', type=int, default=40, help='how many cases')
-    parser.add_argument('--seed', type=int, default=cases_b.SEED, help='of world b')
-    parser.add_argument('--given', action='store_true', help='the time of the stop is given')
-    parser.add_argument('--estimator', default='one', help='the parameter of that name')
-    parser.add_argument('--each', action='store_true', help='print each run')
-    parser.add_argument('--out', type=Path, help='one line of JSON a run')
-    options = parser.parse_args(arguments)
+    options = asked(
+        __doc__, arguments, world=('b', 'a'), half=tuple(HALVES), hidden=('own', 'nothing', 'all'),
+        first=0, count=40, seed=cases_b.SEED, given=False, estimator='one', each=False, out=Path,
+    )  # fmt: skip
     world = World.a() if options.world == 'a' else World.b(options.seed)
     numbers = chosen(world, options.half, options.hidden, options.first, options.count)
     rows = []
@@ -329,8 +309,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     for error in sorted({error for *_, error in rows if error})[:5]:
         print(error)
-    for line in table(rows):
-        print(line)
+    print(*table(rows), sep='\n')
 
 
 if __name__ == '__main__':

@@ -31,7 +31,6 @@ from benchmarks.worlds.hidden_b.oracle_priors import (
     free,
     possible,
     shares,
-    would_decide,
 )
 from benchmarks.worlds.hidden_b.oracle_rows import Run
 from benchmarks.worlds.hidden_b.oracle_sail import made, run_of, sailed, stated
@@ -85,7 +84,7 @@ def diagnose(seen: Observation, known: Known) -> dict[str, Any]:
 
 class _Oracle:
     def __init__(self, seen: Observation, known: Known) -> None:
-        self.known, self.inputs = known, set(seen.runs[0])
+        self.known = known
         self.stated = stated(seen.ship_file, known)
         hull = self.stated.hull
         self.runs = [Run(run, number, known, hull) for number, run in enumerate(seen.runs)]
@@ -378,9 +377,6 @@ class _Oracle:
             'verdict': verdict,
             'effects': effects,
             'candidates': [{'names': list(names), 'probability': p} for p, names in listed],
-            'would_decide': would_decide(
-                [set(names) for _, names in listed], len(self.runs), self.inputs
-            ),
         }
 
     def _stated(self, chance: float, fit: Fit) -> list[dict[str, Any]]:

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.diagnosis_score import diagnosis
 from benchmarks.worlds.hidden_b import cases
 from benchmarks.worlds.hidden_b.instruments import Series
 from benchmarks.worlds.hidden_b.measure import quiet
+from benchmarks.worlds.hidden_b.oracle import diagnose
 from benchmarks.worlds.hidden_b.oracle_rows import _means
 from benchmarks.worlds.hidden_b.oracle_sail import made, quick, run_of, stated
 from benchmarks.worlds.hidden_b.voyage import sail
@@ -40,7 +40,7 @@ def test_it_is_told_nothing_of_what_is_hidden() -> None:
 
 @pytest.mark.parametrize('number', [SCALE, NOTHING])
 def test_it_names_what_is_plain_and_nothing_where_nothing_is(number) -> None:
-    found, _ = diagnosis('oracle', 'blocks', number, 'b')(cases.observe(number))
+    found = diagnose(cases.observe(number), cases.known(number))
     assert sum(each['probability'] for each in found['candidates']) > 0.98
     true = cases.reveal(number).names
     assert found['verdict'] == ('named' if true else 'none')

@@ -16,10 +16,10 @@ def test_the_scoreboard_asks_and_reveals_world_b(monkeypatch) -> None:
     seen = []
 
     def by(*_):
-        return lambda observation: (seen.append(observation), (NOTHING, 0.1))[1]
+        return lambda observation: (seen.append(observation), NOTHING)[1]
 
     monkeypatch.setattr(diagnosis_score, 'diagnosis', by)
-    row = diagnosis_score.answer('anything', 'blocks', 4, 'b')
+    row = diagnosis_score.answer('anything', 4, 'b')
     assert isinstance(seen[0], cases.Observation)
     (trial,) = diagnosis_score.trials([row], 'b')
     assert trial.truth == cases.reveal(4)
