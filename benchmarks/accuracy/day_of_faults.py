@@ -13,11 +13,11 @@ a source that was doubted held.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import table
 from benchmarks.accuracy.vouching import START_NS, by_seconds, sailing, ship_of, well
 from shipdrag_ros.coastdown import Monitor
@@ -49,11 +49,7 @@ def spoilt(kind: str, log: Float64, rng: np.random.Generator) -> Float64:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--hours', type=int, default=24)
-    parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--write', action='store_true')
-    options = parser.parse_args()
+    options = asked(__doc__, hours=24, seed=0, write=False)
     rng = np.random.default_rng(options.seed)
     block = sailing(options.seed, options.hours, LENGTH_M, 'lp', heading=True)
     second = (block.stamp_ns - START_NS) // SECOND_NS

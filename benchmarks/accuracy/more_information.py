@@ -13,9 +13,7 @@ are taken case by case, with two standard errors.
 
 from __future__ import annotations
 
-import argparse
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +21,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from benchmarks._asked import asked
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -117,14 +116,11 @@ def gains(found: Float64) -> list[tuple[float, float]]:
     return list(zip(steps.mean(axis=0).tolist(), error.tolist()))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     """
     Simulate, estimate, print.
     """
-    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--count', type=int, default=30)
-    parser.add_argument('--seed', type=int, default=0)
-    options = parser.parse_args(arguments)
+    options = asked(__doc__, count=30, seed=0)
     found = []
     for number in track(range(options.count), console=Console(stderr=True)):
         try:

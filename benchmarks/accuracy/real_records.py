@@ -10,7 +10,6 @@ tables into docs/results/real_records.txt.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
 import textwrap
@@ -22,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _verbs
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._second_opinion import second_opinion
 from shipdrag_ros import display
@@ -355,10 +355,7 @@ def main() -> None:
     """
     Import, replay, print and draw.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_records')
-    parser.add_argument('--write', action='store_true', help=f'the tables into {PAGE.name}')
-    options = parser.parse_args()
+    options = asked(__doc__, out=ROOT / 'benchmarks' / 'out' / 'real_records', write=False)
     out = options.out
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')

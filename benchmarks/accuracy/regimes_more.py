@@ -11,13 +11,13 @@ docs/results/regimes_more.txt.
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._coasts import CARGO, errors
 from shipdrag_ros.coastdown import Monitor
@@ -186,11 +186,7 @@ def cost(runs: int) -> list[str]:
 def main() -> None:
     """Run, print and write."""
     parts = {'unseen': unseen, 'readings': readings, 'cost': cost}
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--parts', nargs='+', choices=parts, default=list(parts))
-    parser.add_argument('--runs', type=int, default=60)
-    parser.add_argument('--write', action='store_true')
-    chosen = parser.parse_args()
+    chosen = asked(__doc__, parts=list(parts), runs=60, write=False)
     for part in chosen.parts:
         made = '\n'.join([f'{part}, --runs {chosen.runs}', '', *parts[part](chosen.runs)])
         print(made, flush=True)

@@ -15,7 +15,6 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
 from benchmarks.accuracy import _plain_mariner
 from benchmarks.accuracy._wrong_values import verdicts
@@ -269,11 +269,7 @@ def main() -> None:
     """
     Print the tables, and draw where that is asked for.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        '--pictures', action='store_true', help='draw those of docs/s3_sensitivity.md'
-    )
-    options = parser.parse_args()
+    options = asked(__doc__, pictures=False)
     text = files('shipdrag_ros').joinpath('data', 'vitus_bering.yaml').read_text('utf-8')
     ship = Ship.from_yaml(text, subject='vitus_bering.yaml')
     found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)

@@ -11,7 +11,6 @@ instead.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from benchmarks._asked import asked
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
@@ -104,11 +104,7 @@ def main() -> None:
     """
     Simulate, estimate, print.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=20)
-    parser.add_argument('--seed', type=int, default=0, help='of the first run')
-    parser.add_argument('--no-baseline', action='store_true', help='the ship file has none')
-    options = parser.parse_args()
+    options = asked(__doc__, runs=20, seed=0, no_baseline=False)
     ship = replace(Ship.example(), effects=())
     known = replace(ship, baseline=None) if options.no_baseline else ship
     table = Table('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]')

@@ -13,7 +13,6 @@ one table.
 
 from __future__ import annotations
 
-import argparse
 import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
@@ -23,6 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks._asked import asked
 from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps, search
 
 WEEK = 7.0 / 365.25
@@ -200,13 +200,7 @@ def _rms(errors: list[float]) -> str:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--ships', type=int, default=40)
-    parser.add_argument('--years', type=float, default=2.5)
-    parser.add_argument('--cleaning', type=float, default=0.05)
-    parser.add_argument('--noticed', type=int, default=5, help='ships followed week by week')
-    parser.add_argument('--seed', type=int, default=1)
-    options = parser.parse_args()
+    options = asked(__doc__, ships=40, years=2.5, cleaning=0.05, noticed=5, seed=1)
     rng = np.random.default_rng(options.seed)
     noted: list[object] = []
     show([(f'{options.ships} ships each, weekly runs, scatter 2 %', *METHODS.values())])

@@ -15,7 +15,6 @@ NMEA records in it are counted too.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Iterator
 from itertools import pairwise
@@ -23,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Onset
@@ -242,11 +242,7 @@ def alarms(block: Block, ship: Ship) -> list[tuple[int, str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--hours', type=float, default=4.0, help='of each kind of sailing')
-    parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--write', action='store_true')
-    options = parser.parse_args()
+    options = asked(__doc__, hours=4.0, seed=0, write=False)
     rows = []
     for fault in (*SOUND, *FAULTS, *WRONG_SCALES):
         for ground in (Channel.SPEED_OVER_GROUND, Channel.POSITION):

@@ -14,7 +14,6 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,6 +21,7 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import grid
 from benchmarks.accuracy._coasts import Case, coasts
 from shipdrag_ros.estimation import Window, estimate, estimate_final
@@ -136,9 +136,7 @@ def main() -> None:
     """
     Print the table.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--peers', action='store_true', help='needs `make peers`')
-    with_peers = parser.parse_args().peers
+    with_peers = asked(__doc__, peers=False).peers
     times: dict[str, list[float]] = {}
     for n in COUNTS:
         calls = {**one_input(n), **whole(n), **(peers(n) if with_peers else {})}

@@ -10,7 +10,6 @@ killed (SIGKILL) whenever a bag is done, until there were so many kills.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import os
@@ -19,6 +18,7 @@ import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from benchmarks._asked import asked
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import find
@@ -49,10 +49,7 @@ def contents(store: Path) -> dict[str, bytes]:
 
 def main() -> None:
     """Kill, compare and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--kills', type=int, default=20, metavar='N')
-    parser.add_argument('--bags', type=int, default=24, metavar='N')
-    options = parser.parse_args()
+    options = asked(__doc__, kills=20, bags=24)
     random.seed(0)
     killed: list[int] = []
     with TemporaryDirectory() as made, Engine(workers=2) as engine:

@@ -11,7 +11,6 @@ process, the viewers in another; CPU is that of the server alone.
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import resource
@@ -23,6 +22,7 @@ from contextlib import suppress
 import numpy as np
 import psutil
 
+from benchmarks._asked import asked
 from shipdrag_ros.live.app import PAGE, LivePage
 from shipdrag_ros.live.serve import CONNECTIONS, listen, serve
 from shipdrag_ros.live.source import NodeSource
@@ -161,12 +161,7 @@ def long_in_the_browser() -> None:
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--viewers', type=int, default=50)
-    parser.add_argument('--connections', type=int, default=10000)
-    parser.add_argument('--slow', type=int, default=100)
-    parser.add_argument('--seconds', type=float, default=10.0)
-    options = parser.parse_args()
+    options = asked(__doc__, viewers=50, connections=10000, slow=100, seconds=10.0)
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(65536, hard), hard))
     size = sum(path.stat().st_size for path in PAGE.rglob('*') if path.is_file())

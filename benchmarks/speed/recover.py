@@ -18,7 +18,6 @@ growth of the memory on bags of 10, 50 and 200 MB, sound and with a bit flipped 
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import random
 import resource
@@ -37,6 +36,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from benchmarks._asked import asked
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.durable import LiveFile
@@ -375,9 +375,7 @@ def _measured(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--quick', action='store_true', help='few damages, small bags')
-    quick = parser.parse_args().quick
+    quick = asked(__doc__, quick=False).quick
     with TemporaryDirectory() as name:
         salvage(2 if quick else 15, Path(name))
         _read_once(Path(name))
