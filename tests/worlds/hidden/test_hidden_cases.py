@@ -102,7 +102,7 @@ def test_the_true_r_is_what_slows_the_ship_at_last() -> None:
         heading_rad=0.0,
         first_heading_rad=0.0,
         world=world,
-        disturbance=Disturbance.none(leg, step_s=1.0),
+        disturbance=Disturbance.none(leg),
     )
     late = motion.time_s > 20.0 * hull.run_down_s  # of the thrust 2e-9 are left
     speed = motion.surge_m_s[late]
