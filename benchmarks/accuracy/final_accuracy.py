@@ -13,11 +13,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from benchmarks._asked import asked
-from benchmarks._tables import grid
+from benchmarks._tables import along, grid
 from benchmarks.accuracy._coasts import TANKER, YACHT, Case, Compared, coasts, rms
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.estimators import named
@@ -55,7 +53,7 @@ def without_baseline(method: Callable[..., Estimate]) -> Callable[..., Estimate]
 def row(case: Case, runs: int, method: Callable[..., Estimate]) -> list[str]:
     """Run one case; return the cells of its row."""
     largest = float(next(coasts(case, 1)).resists(np.array(case.hull.speed_m_s)))
-    seen = track(coasts(case, runs), case.name, runs, console=Console(stderr=True))
+    seen = along(coasts(case, runs), case.name, runs)
     found = Compared.of(
         method, largest, ((each.window, each.truth.ship, each.resists) for each in seen)
     )

@@ -18,10 +18,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
 from benchmarks._asked import asked
+from benchmarks._tables import along, table
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -122,17 +121,16 @@ def main() -> None:
     """
     options = asked(__doc__, count=30, seed=0)
     found = []
-    for number in track(range(options.count), console=Console(stderr=True)):
+    for number in along(range(options.count), 'cases'):
         try:
             found.append(scores(number, options.seed))
         except EstimationError as error:
             print(f'case {number}: {error}')
     print(f'{len(found)} of {options.count} cases, seed {options.seed}')
-    print('| known | mean log density of the true r | gain on the line above |')
-    print('| --- | --- | --- |')
     steps = ['', *(f'{gain:+.2f} ± {error:.2f}' for gain, error in gains(np.array(found)))]
-    for name, mean, step in zip(SETS, np.mean(found, axis=0), steps):
-        print(f'| {name} | {mean:.2f} | {step} |')
+    means = [f'{mean:.2f}' for mean in np.mean(found, axis=0)]
+    head = ('known', 'mean log density of the true r', 'gain on the line above')
+    print(*table(head, zip(SETS, means, steps)), sep='\n')
 
 
 if __name__ == '__main__':

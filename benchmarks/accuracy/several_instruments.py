@@ -15,11 +15,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
 from benchmarks._asked import asked
+from benchmarks._tables import along, table
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
@@ -107,19 +105,13 @@ def main() -> None:
     options = asked(__doc__, runs=20, seed=0, no_baseline=False)
     ship = replace(Ship.example(), effects=())
     known = replace(ship, baseline=None) if options.no_baseline else ship
-    table = Table('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]')
+    rows, seeds = [], range(options.seed, options.seed + options.runs)
     for case in CASES:
-        seeds = range(options.seed, options.seed + options.runs)
-        each = np.array(
-            [
-                score(case, ship, known, seed)
-                for seed in track(seeds, description=case.name, console=Console(stderr=True))
-            ]
-        )
+        each = np.array([score(case, ship, known, seed) for seed in along(seeds, case.name)])
         error, sigma = 100.0 * np.sqrt(each[:, :2].mean(axis=0))
-        table.add_row(case.name, f'{error:.2f}', f'{sigma:.2f}', f'{100 * each[:, 2].mean():.0f}')
+        rows.append((case.name, f'{error:.2f}', f'{sigma:.2f}', f'{100 * each[:, 2].mean():.0f}'))
     print(f'N = {options.runs} runs a row, seeds from {options.seed}; of the largest r')
-    Console(width=80).print(table)
+    print(*table(('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]'), rows), sep='\n')
 
 
 if __name__ == '__main__':

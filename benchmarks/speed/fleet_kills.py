@@ -11,15 +11,14 @@ killed (SIGKILL) whenever a bag is done, until there were so many kills.
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import random
 import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from benchmarks import _verbs
 from benchmarks._asked import asked
-from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.store import Store
@@ -34,8 +33,7 @@ def simulated(folder: Path, bags: int) -> None:
     for seed in range(bags):
         line = ['simulate', '--ship', str(SHIP), '-o', str(folder / f'{seed}.mcap')]
         line += ['--seed', str(seed), '--lead-in', '250', '--duration', '500', '--speed', '7']
-        with contextlib.redirect_stdout(io.StringIO()):
-            assert shipdrag([*line, '--rate', '0.5']) == 0
+        _verbs.run(*line, '--rate', '0.5')
 
 
 def contents(store: Path) -> dict[str, bytes]:
