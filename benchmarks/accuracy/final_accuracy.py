@@ -3,8 +3,7 @@
 Error and coverage of the final figure on simulated coastdowns.
 
 On three hulls, n samples of log and position each; disturbances of 300 s are learnt from
-1800 s of steady record, never given. `--live`: the estimator during the coastdown instead;
-`--no-baseline`: the ship file states length and volume alone.
+1800 s of steady record, never given. `--no-baseline`: the ship file has length and volume alone.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import numpy as np
 from benchmarks._asked import asked
 from benchmarks._tables import along, grid
 from benchmarks.accuracy._coasts import TANKER, YACHT, Case, Compared, coasts, rms
-from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
@@ -78,9 +77,9 @@ def main() -> None:
     """
     Print the table.
     """
-    options = asked(__doc__, runs=200, live=False, estimator='one', no_baseline=False)
+    options = asked(__doc__, runs=200, estimator='one', no_baseline=False)
     runs = options.runs
-    method = estimate if options.live else named(options.estimator).estimate
+    method = named(options.estimator).estimate
     if options.no_baseline:
         method = without_baseline(method)
     grid(

@@ -87,6 +87,20 @@ def filtered(values: Float64, time_s: float) -> Float64:
     return found
 
 
+def spoilt(fault: str, log: Float64, rng: np.random.Generator) -> Float64:
+    """Return what a log reads with a fault, or in a wrong scale."""
+    count = len(log)
+    nonsense = {
+        'random': rng.uniform(0.0, 10.0, count),
+        'zero': np.zeros(count),
+        'constant': np.full(count, 3.0),
+        'reversed': -log,
+        'other axis': rng.normal(0.0, 0.1, count) + 0.1 * np.sin(np.arange(count) / 9.0),
+        '20 % spikes': np.where(rng.random(count) < 0.2, rng.uniform(-30.0, 30.0, count), log),
+    }
+    return nonsense.get(fault, log * SCALES.get(fault, 1.0))
+
+
 def faulty(fault: str, ground: Channel, *, seed: int = 0) -> Block:
     """
     Return the record of a coastdown with a fault from its first reading on.
@@ -105,16 +119,7 @@ def faulty(fault: str, ground: Channel, *, seed: int = 0) -> Block:
     time_s = np.arange(count, dtype=np.float64)
     # about as friction and waves slow hulls of that length and volume
     speed = 5.0 / (1.0 + 5e-3 * np.maximum(time_s - LEAD_S, 0.0)) + slow(rng, count, 0.03, 60.0)
-    log = speed + rng.normal(0.0, 0.03, count)
-    nonsense = {
-        'random': rng.uniform(0.0, 10.0, count),
-        'zero': np.zeros(count),
-        'constant': np.full(count, 3.0),
-        'reversed': -log,
-        'other axis': rng.normal(0.0, 0.1, count) + 0.1 * np.sin(time_s / 9.0),
-        '20 % spikes': np.where(rng.random(count) < 0.2, rng.uniform(-30.0, 30.0, count), log),
-    }
-    log = nonsense.get(fault, log * SCALES.get(fault, 1.0))
+    log = spoilt(fault, speed + rng.normal(0.0, 0.03, count), rng)
     speed = speed + CURRENTS_M_S.get(fault, 0.0) + 0.005 * np.cumsum(rng.normal(size=count))
     track = np.column_stack([np.cumsum(speed), np.zeros(count)]) + rng.normal(0, 0.7, (count, 2))
     track *= 1e-3 if fault == 'position in km' else 1.0

@@ -4,8 +4,7 @@ Time of the estimators for one window, from Python, one thread.
 
 First all orders up to 12 of one input, compiled, beside the QR decomposition of
 numpy on the same columns; then whole estimates, from a window to r(v), while a
-coastdown runs and after it, beside S1's joint problem; with `--peers` beside
-other ways to differentiate. Process time, the best of several rounds.
+coastdown runs and after it, beside S1's joint problem. Process time, the best of several rounds.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks._asked import asked
 from benchmarks._tables import grid
 from benchmarks.accuracy._coasts import Case, coasts
 from shipdrag_ros.estimation import Window, estimate, estimate_final
@@ -100,28 +98,6 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
     }
 
 
-def peers(n: int) -> dict[str, Callable[[], object]]:
-    """
-    Return calls of the peers on the same samples.
-    """
-    from benchmarks.accuracy import _peers
-
-    (coast,) = coasts(replace(PLAIN, n=n), 1)
-    samples = _peers.Samples.of(coast.window)
-    tuned = _peers.TunedByPynumdiff.on(samples)
-    return {
-        'Chebyshev, BIC (numpy)': partial(_peers.chebyshev, samples),
-        'Savitzky-Golay, CV (scipy)': partial(_peers.savitzky_golay, samples),
-        'smoothing spline, GCV (scipy)': partial(_peers.smoothing_spline, samples),
-        'Kalman RTS, ML (statsmodels)': partial(_peers.kalman_rts, samples),
-        f'Matern 5/2 process, thinned to {_peers.GAUSS_SAMPLES}': partial(
-            _peers.gaussian_process, samples
-        ),
-        'pynumdiff, tuning': partial(_peers.TunedByPynumdiff.on, samples),
-        'pynumdiff, once tuned': partial(tuned, samples),
-    }
-
-
 def shown(time_us: float) -> str:
     """
     Show a time in the unit that suits it.
@@ -136,11 +112,9 @@ def main() -> None:
     """
     Print the table.
     """
-    with_peers = asked(__doc__, peers=False).peers
     times: dict[str, list[float]] = {}
     for n in COUNTS:
-        calls = {**one_input(n), **whole(n), **(peers(n) if with_peers else {})}
-        for name, call in calls.items():
+        for name, call in {**one_input(n), **whole(n)}.items():
             times.setdefault(name, []).append(best_us(call))
     tail, rows = COUNTS.index(SLOPE_FROM), []
     for name, took in times.items():
