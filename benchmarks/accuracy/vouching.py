@@ -21,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
 from benchmarks._asked import asked
 from benchmarks._tables import table
@@ -72,19 +73,16 @@ def ship_of(length_m: float) -> Ship:
 
 def slow(rng: np.random.Generator, count: int, sd: float, time_s: float) -> Float64:
     """Return Gauss-Markov noise, one value a second."""
-    keep, found = float(np.exp(-1.0 / time_s)), np.zeros(count)
+    keep = float(np.exp(-1.0 / time_s))
     steps = sd * np.sqrt(1.0 - keep**2) * rng.normal(size=count)
-    for i in range(1, count):
-        found[i] = keep * found[i - 1] + steps[i]
-    return found
+    steps[0] = 0.0
+    return np.asarray(lfilter([1.0], [1.0, -keep], steps))
 
 
 def filtered(values: Float64, time_s: float) -> Float64:
     """Return values through a first-order filter, one a second."""
-    found, keep = values.copy(), float(np.exp(-1.0 / time_s))
-    for i in range(1, len(found)):
-        found[i] = keep * found[i - 1] + (1.0 - keep) * values[i]
-    return found
+    keep = float(np.exp(-1.0 / time_s))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
 
 
 def spoilt(fault: str, log: Float64, rng: np.random.Generator) -> Float64:

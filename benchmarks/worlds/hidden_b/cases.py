@@ -19,12 +19,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.effects import FREE, LIBRARY, SECOND, Draw, Hidden
 from benchmarks.worlds.hidden_b.facts import Facts, draw_facts
 from benchmarks.worlds.hidden_b.hulls import Array, Hull, draw_hull
 from benchmarks.worlds.hidden_b.instruments import INPUTS, MOTION, Recording, read
 from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.library import FREE, LIBRARY, SECOND
 from benchmarks.worlds.hidden_b.measure import moved, run_down_s
 from benchmarks.worlds.hidden_b.plans import Condition, plans_of
 from benchmarks.worlds.hidden_b.screws import Screw, draw_screw

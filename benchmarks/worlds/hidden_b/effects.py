@@ -329,3 +329,31 @@ def time_offset(d: Draw) -> Hidden:
     """Clocks of log and radar apart."""
     value = d.sign * d.rng.uniform(0.03, 0.09) * d.size * d.hull.time_s
     return _fault('time_offset', 'offset_s', 'late_s')(value)
+
+
+FREE = ('declutched', 'electric')
+LIBRARY: dict[str, tuple[Callable[[Draw], Hidden], tuple[str, ...]]] = {
+    'fouling': (fouling, ()),
+    'shallow_water': (shallow_water, ()),
+    'towed_cable': (towed_cable, ()),
+    'locked_propeller': (locked_propeller, FREE),
+    'windmilling_propeller': (windmilling_propeller, ('declutched',)),
+    'residual_thrust': (residual_thrust, FREE),
+    'wind': (wind, ()),
+    'waves': (waves, ()),
+    'current': (current, ()),
+    'log_scale': (log_scale, ()),
+    'log_offset': (log_offset, ()),
+    'radar_scale': (radar_scale, ()),
+    'turning': (turning, ()),
+    'log_lag': (log_lag, ()),
+    'log_dead_band': (log_dead_band, ()),
+    'time_offset': (time_offset, ()),
+    'current_change': (current_change, ()),
+    'added_mass': (added_mass, ()),
+    'displacement': (displacement, ()),
+}
+"""Its maker by name, and the drives that it needs."""
+SECOND = ('log_lag', 'log_dead_band', 'time_offset', 'current_change', 'added_mass',
+          'displacement')  # fmt: skip
+"""The rarer ones."""

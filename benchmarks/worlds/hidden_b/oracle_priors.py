@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.worlds.hidden_b.cases import SEED, Known
-from benchmarks.worlds.hidden_b.library import FREE, LIBRARY
+from benchmarks.worlds.hidden_b.effects import FREE, LIBRARY
 from benchmarks.worlds.hidden_b.plans import plans_of
 from benchmarks.worlds.hidden_b.strangers import OUTSIDE
 

@@ -18,10 +18,9 @@ import yaml
 from scipy.interpolate import PchipInterpolator
 
 from benchmarks.worlds.hidden_b.cases import Known
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.effects import LIBRARY, Draw, Hidden
 from benchmarks.worlds.hidden_b.hulls import AIR, GRAVITY, SEA, Array, Hull, ittc57
 from benchmarks.worlds.hidden_b.instruments import faulty_log, faulty_place, filtered
-from benchmarks.worlds.hidden_b.library import LIBRARY
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import Track, sail_at, steady_point
 from benchmarks.worlds.hidden_b.weather import Weather
@@ -116,6 +115,68 @@ def run_of(known: Known, hull: Hull, run: int, speed: float, heading: float) -> 
         seed=(0,),
         quiet=True,
     )
+
+
+Change = Callable[[Setting], None]
+_WEATHER = (  # a standard deviation of each: in m/s, of the flow over the speed
+    ('wind', (0.65, 0.0)), ('wind', (0.0, 0.65)),
+    ('flow', (1.6e-3, 0.0)), ('flow', (0.0, 1.6e-3)),
+    ('tide', (6e-3, 0.0, 0.0)), ('tide', (0.0, 6e-3, 0.0)),
+    ('tide', (6e-3, 0.0, -np.pi / 2)), ('tide', (0.0, 6e-3, -np.pi / 2)),
+)  # fmt: skip
+_SCALE, _OFFSET = 1.7e-3, 7e-4  # of the log; over the speed
+
+
+def shared(row: Callable[[Change, Hull], Array], stated: Stated) -> Array:
+    """
+    Return what a standard deviation of each changes, a column each: (n, m).
+
+    Parameters
+    ----------
+    row
+        Returns what would be seen of a hull in settings that are changed.
+    stated
+    """
+    hull = stated.hull
+    plain = row(_nothing, hull)
+    hulls = [replace(hull, still_n=hull.still_n + miss) for miss in stated.misses]
+    hulls.append(replace(hull, n_r=hull.n_r + stated.added_sd))
+    changes = [_run_down(1.0 + stated.run_down_sd)]
+    for name, value in _WEATHER:
+        size = hull.speed_m_s if name == 'flow' else 1.0
+        changes.append(_blowing(name, tuple(size * each for each in value)))
+    changes += [_faulty('scale', _SCALE), _faulty('offset_m_s', _OFFSET * hull.speed_m_s)]
+    rows = [row(_nothing, each) for each in hulls] + [row(change, hull) for change in changes]
+    return np.stack([each - plain for each in rows], axis=1)
+
+
+def _nothing(_: Setting) -> None:
+    """Change nothing."""
+
+
+def _run_down(late: float) -> Change:
+    def change(setting: Setting) -> None:
+        screw = setting.screw
+        setting.screw = replace(
+            screw, inertia_s=screw.inertia_s * late, ramp_s=screw.ramp_s * late
+        )
+
+    return change
+
+
+def _blowing(name: str, value: tuple[float, ...]) -> Change:
+    def change(setting: Setting) -> None:
+        setting.weather = replace(setting.weather, **{name: value})  # type: ignore[arg-type]
+
+    return change
+
+
+def _faulty(name: str, size: float) -> Change:
+    def change(setting: Setting) -> None:
+        more = getattr(setting.faults, name) + size
+        setting.faults = replace(setting.faults, **{name: more})
+
+    return change
 
 
 class _Given:
