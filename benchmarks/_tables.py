@@ -5,11 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from shipdrag_ros.samples import Float64
+
+Item = TypeVar('Item')
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
@@ -32,6 +36,13 @@ def grid(
     for row in rows:
         found.add_row(*row)
     Console(width=width).print(found)
+
+
+def along(items: Iterable[Item], what: str, count: int | None = None) -> Iterable[Item]:
+    """
+    Yield items, and show how far it is.
+    """
+    return track(items, what, count, console=Console(stderr=True))
 
 
 def titled(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:

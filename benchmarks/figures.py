@@ -50,83 +50,39 @@ class Figure(NamedTuple):
 _ROW = r' +│ +\d+ │ +([\d.]+) │.*│ +(\d+) │ +[\d.]+ │ +\d+ │'
 _THIRD = r' +│[^│]+│[^│]+│ +(.+?) │'  # column, n = 500
 _ACCURACY = 'rms error {0} % of the largest r; ±2 sigma holds {1} % of the curve'
-FIGURES = tuple(
-    Figure(*each)
-    for each in (
-        (
-            'How far off is the final curve? Log and position',
-            'final_accuracy',
-            f'white noise{_ROW}',
-            _ACCURACY,
-        ),
-        (
-            'The same in gusts that move the ship by 0.05 m/s, with shaft speed',
-            'final_accuracy',
-            rf'gusts[\s\S]*?the same, shaft{_ROW}',
-            _ACCURACY,
-        ),
-        (
-            'The same of a yacht whose r has a hump',
-            'final_accuracy',
-            f'yacht with a hump{_ROW}',
-            _ACCURACY,
-        ),
-        (
-            'How long does an estimate take?',
-            'estimator_speed',
-            rf'live{_THIRD}[\s\S]*?final{_THIRD}',
-            '{0} during a coastdown, {1} after it',
-        ),
-        (
-            'How soon is a stop noticed, by the log alone in a moderate sea?',
-            'onset',
-            r'coastdown +log +moderate +(\d+) +(\d+) +([\d.]+) ±',
-            'median {0} s, 90 % within {1} s; dated {2} s late on average',
-        ),
-        (
-            'How often is a stop imagined in steady sailing?',
-            'onset',
-            r'rough +\d+ in \d+ days: ([\d.]+) a day',
-            '{0} times a day, in a rough sea',
-        ),
-        (
-            'Does the monitor grow?',
-            'monitor_memory',
-            r'day +1: process +([\d.]+) MiB[\s\S]*day +30: process +([\d.]+) MiB',
-            '{0} MiB after a day, {1} MiB after 30',
-        ),
-        (
-            'How fast is a replay, a coastdown every 85 minutes?',
-            'replay_speed',
-            r'20 coastdowns .* replayed at +(\d+) messages/s',
-            '{0} messages a second',
-        ),
-        (
-            'What is saved of damaged bags?',
-            'recover',
-            r'all +\d+ +\d+ +(\d+) +(\d+)',
-            '{1} of {0} whole messages',
-        ),
-        (
-            'How late is an estimate on board, at 1 Hz?',
-            'node_latency',
-            r'\| 1 Hz \| ([\d.]+) / (\d+) \| ([\d.]+) % \|',
-            'median {0} ms, 99 % within {1} ms; {2} % of a core',
-        ),
-        (
-            'Is a name of `diagnose` right? World B, by another author, one effect hidden',
-            'diagnosis_score',
-            r'something is named \| (\d+ of \d+) \|',
-            '{0}',
-        ),
-        (
-            'Is something named where nothing is hidden? World B',
-            'diagnosis_score',
-            r'nothing hidden: false name; plain "none" \| (\d+); (\d+) of (\d+)',
-            '{0} false names and {1} plain `none` in {2}; the rest are sets that hold "nothing"',
-        ),
-    )
-)
+FIGURES = tuple(Figure(*each) for each in (
+    ('How far off is the final curve? Log and position',
+     'final_accuracy', f'white noise{_ROW}', _ACCURACY),
+    ('The same in gusts that move the ship by 0.05 m/s, with shaft speed',
+     'final_accuracy', rf'gusts[\s\S]*?the same, shaft{_ROW}', _ACCURACY),
+    ('The same of a yacht whose r has a hump',
+     'final_accuracy', f'yacht with a hump{_ROW}', _ACCURACY),
+    ('How long does an estimate take?',
+     'estimator_speed', rf'live{_THIRD}[\s\S]*?final{_THIRD}',
+     '{0} during a coastdown, {1} after it'),
+    ('How soon is a stop noticed, by the log alone in a moderate sea?',
+     'onset', r'coastdown +log +moderate +(\d+) +(\d+) +([\d.]+) ±',
+     'median {0} s, 90 % within {1} s; dated {2} s late on average'),
+    ('How often is a stop imagined in steady sailing?',
+     'onset', r'rough +\d+ in \d+ days: ([\d.]+) a day', '{0} times a day, in a rough sea'),
+    ('Does the monitor grow?',
+     'monitor_memory',
+     r'day +1: process +([\d.]+) MiB[\s\S]*day +30: process +([\d.]+) MiB',
+     '{0} MiB after a day, {1} MiB after 30'),
+    ('How fast is a replay, a coastdown every 85 minutes?',
+     'replay_speed', r'20 coastdowns .* replayed at +(\d+) messages/s',
+     '{0} messages a second'),
+    ('What is saved of damaged bags?',
+     'recover', r'all +\d+ +\d+ +(\d+) +(\d+)', '{1} of {0} whole messages'),
+    ('How late is an estimate on board, at 1 Hz?',
+     'node_latency', r'\| 1 Hz \| ([\d.]+) / (\d+) \| ([\d.]+) % \|',
+     'median {0} ms, 99 % within {1} ms; {2} % of a core'),
+    ('Is a name of `diagnose` right? World B, by another author, one effect hidden',
+     'diagnosis_score', r'something is named \| (\d+ of \d+) \|', '{0}'),
+    ('Is something named where nothing is hidden? World B',
+     'diagnosis_score', r'nothing hidden: false name; plain "none" \| (\d+); (\d+) of (\d+)',
+     '{0} false names and {1} plain `none` in {2}; the rest are sets that hold "nothing"'),
+))  # fmt: skip
 
 
 def found(figure: Figure) -> str:

@@ -3,7 +3,7 @@
 Count the house: how much code there is, and through how many rooms a job goes.
 
     python -m benchmarks.house                     # this tree
-    python -m benchmarks.house --tree OLD --tree . # two trees beside each other
+    python -m benchmarks.house --tree OLD .        # two trees beside each other
 
 Core code is what a coastdown may need: lines of `shipdrag_ros` without
 docstrings, blanks and comments, and without the studies S1 to S5; an `__init__` is no
@@ -16,7 +16,6 @@ diagnosis of the same bag shows which modules run in it.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import json
 import os
@@ -30,6 +29,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
+
+from benchmarks._asked import asked
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'shipdrag_ros'
@@ -282,14 +283,7 @@ def main() -> None:
     """
     Print the table, and what is too long or too wide in the last tree.
     """
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument(
-        '--tree', action='append', type=Path, metavar='DIR', help='default: this one'
-    )
-    options = parser.parse_args()
-    trees = [each.resolve() for each in options.tree or [ROOT]]
+    trees = [each.resolve() for each in asked(__doc__, tree=[ROOT]).tree]
     with tempfile.TemporaryDirectory() as folder:
         columns = [figures(tree, Path(folder)) for tree in trees]
     print('| | ' + ' | '.join(tree.name for tree in trees) + ' | aim |')

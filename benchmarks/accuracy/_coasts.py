@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.estimation.result import ResistanceCurve
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
@@ -195,6 +198,58 @@ def errors(
         for each in (curve.resistance_m_s2, curve.sigma_repeatable_m_s2)
     )
     return r - resists(speeds), sigma
+
+
+@dataclass
+class Compared:
+    """
+    Estimates of many coastdowns beside the truth, in parts of the largest r.
+
+    Attributes
+    ----------
+    error, sigma : (n, POINTS)
+        Evenly over the speeds of each.
+    took_s
+    failed
+    """
+
+    error: Float64
+    sigma: Float64
+    took_s: list[float]
+    failed: int
+
+    @classmethod
+    def of(
+        cls,
+        method: Callable[..., Estimate],
+        largest: float,
+        coasts: Iterable[tuple[Window, Ship, Callable[[Float64], Float64]]],
+    ) -> Compared:
+        """
+        Estimate each coastdown, given with the ship as she is stated and the true r.
+        """
+        found, took, failed = [], [], 0
+        for window, ship, resists in coasts:
+            begin = time.perf_counter()
+            try:
+                curve = method(window, ship, Parameters()).valid_curve
+            except EstimationError:
+                failed += 1
+                continue
+            took.append(time.perf_counter() - begin)
+            found.append(errors(curve, resists))
+        error, sigma = np.array(found).transpose(1, 0, 2) / largest
+        return cls(error, sigma, took, failed)
+
+    @property
+    def rmse(self) -> float:
+        """Over all speeds."""
+        return rms(self.error)
+
+    @property
+    def covered(self) -> float:
+        """Share of the speeds at which two sigma hold the truth."""
+        return float(np.mean(np.abs(self.error) <= 2.0 * self.sigma))
 
 
 def rms(values: object) -> float:

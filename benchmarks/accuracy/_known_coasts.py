@@ -101,33 +101,19 @@ def _slow_car(test: str, *known: Known) -> KnownCoast:
 
 def _boat(run: str, window_s: tuple[float, float]) -> Record:
     table = f'blueboat_{run}_10hz.csv'
-    return Record(
-        f'blueboat_{run}', table, _BOAT, 'blueboat', 'short_compass', window_s, (0.3, 0.4)
-    )
+    name, speeds = f'blueboat_{run}', (0.3, 0.4)
+    return Record(name, table, _BOAT, 'blueboat', 'short_compass', window_s, speeds)
 
 
 def _ferry(name: str, window_s: tuple[float, float]) -> Record:
-    return Record(
-        name,
-        'milliampere_nlp1_t275_20hz.csv',
-        f'{FERRY.columns} --map heading=yaw_rad {_MOTORS}',
-        'ferry',
-        'short_compass',
-        window_s,
-        (0.116,),
-    )
+    columns = f'{FERRY.columns} --map heading=yaw_rad {_MOTORS}'
+    file = 'milliampere_nlp1_t275_20hz.csv'
+    return Record(name, file, columns, 'ferry', 'short_compass', window_s, (0.116,))
 
 
 def _tanker(part: str, window_s: tuple[float, float]) -> Record:
-    return Record(
-        f'esso_osaka_{part}',
-        f'esso_osaka_3m_{part}_10hz.csv',
-        _TANKER,
-        'esso_osaka',
-        'short',
-        window_s,
-        (0.17,),
-    )
+    file = f'esso_osaka_3m_{part}_10hz.csv'
+    return Record(f'esso_osaka_{part}', file, _TANKER, 'esso_osaka', 'short', window_s, (0.17,))
 
 
 _FERRY_KNOWN = (_at(0.116, 0.0053, 0.0009),)

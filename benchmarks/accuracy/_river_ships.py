@@ -59,7 +59,7 @@ def models(count: int, rng: np.random.Generator) -> tuple[Hulls, Float64]:
     return hulls, control(hulls) * lines * (1.0 + NOISE * rng.normal(size=len(hulls)))
 
 
-def asked(count: int, rng: np.random.Generator) -> Hulls:
+def wanted(count: int, rng: np.random.Generator) -> Hulls:
     """
     Return hulls to predict, up to a quarter of the range beyond the data.
     """

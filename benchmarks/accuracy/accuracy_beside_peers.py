@@ -18,13 +18,13 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy import _peers
 from benchmarks.accuracy._bound import bound
@@ -146,10 +146,7 @@ def main() -> None:
     """
     Print the table.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
-    parser.add_argument('--write', action='store_true', help=f'into {PAGE.name}')
-    options = parser.parse_args()
+    options = asked(__doc__, runs=200, write=False)
     columns = [[*ESTIMATORS, 'Cramer-Rao bound'], *(cells(case, options.runs) for case in CASES)]
     heads = ['RMSE / at the top / cover', *(case.name for case in CASES)]
     text = '\n'.join(table(heads, zip(*columns, strict=True)))

@@ -13,17 +13,18 @@ a source that was doubted held.
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import table
-from benchmarks.accuracy.vouching import START_NS, by_seconds, sailing, ship_of, well
+from benchmarks.accuracy.vouching import START_NS, by_seconds, sailing, ship_of, spoilt, well
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.node.health import InputStates
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64
+from shipdrag_ros.samples import SECOND_NS, Channel
 
 PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'day_of_faults.txt'
 KINDS = (
@@ -32,28 +33,8 @@ KINDS = (
 LENGTH_M, HOUR_S, BEGINS_S, LASTS_S, HELD_S = 150.0, 3600, 1800, 600, 330
 
 
-def spoilt(kind: str, log: Float64, rng: np.random.Generator) -> Float64:
-    """Return what a log reads with a fault [m/s]."""
-    count = len(log)
-    found: dict[str, Float64] = {
-        'random': rng.uniform(0.0, 10.0, count),
-        'zero': np.zeros(count),
-        'constant': np.full(count, 3.0),
-        'reversed': -log,
-        'other axis': rng.normal(0.0, 0.1, count),
-        '20 % spikes': np.where(rng.random(count) < 0.2, rng.uniform(-30.0, 30.0, count), log),
-        'in knots': log * 3600.0 / 1852.0,
-        '0.5 times': 0.5 * log,
-    }
-    return found[kind]
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--hours', type=int, default=24)
-    parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--write', action='store_true')
-    options = parser.parse_args()
+    options = asked(__doc__, hours=24, seed=0, write=False)
     rng = np.random.default_rng(options.seed)
     block = sailing(options.seed, options.hours, LENGTH_M, 'lp', heading=True)
     second = (block.stamp_ns - START_NS) // SECOND_NS
@@ -63,7 +44,7 @@ def main() -> None:
         rows = (second >= begins) & (second < begins + LASTS_S)
         rows &= block.channel == Channel.SPEED_THROUGH_WATER
         value[rows, 0] = spoilt(KINDS[hour % len(KINDS)], value[rows, 0], rng)
-    block = Block(block.channel, block.stamp_ns, block.receive_ns, value, block.variance)
+    block = replace(block, value=value)
     monitor, states = Monitor(ship_of(LENGTH_M), Parameters(), estimate=None), InputStates()
     green, false = dict.fromkeys(KINDS, 0), dict.fromkeys(KINDS, 0)
     first: dict[int, int] = {}

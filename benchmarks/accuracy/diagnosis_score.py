@@ -2,28 +2,25 @@
 """
 Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
 
-    python -m benchmarks.accuracy.diagnosis_score --by oracle --count 40
-    python -m benchmarks.accuracy.diagnosis_score --by command
-    python -m benchmarks.accuracy.diagnosis_score --by MODULE:FUNCTION --as blocks
-    python -m benchmarks.accuracy.diagnosis_score --world b --half odd --count 40
+    python -m benchmarks.accuracy.diagnosis_score --first 539 --count 191
+    python -m benchmarks.accuracy.diagnosis_score --world b --half odd --count 40 [--facts]
     python -m benchmarks.accuracy.diagnosis_score --world b --half odd --count 40 --by oracle
+    python -m benchmarks.accuracy.diagnosis_score --by MODULE:FUNCTION
 
 World a is `hidden`; world b, of another hand, is `hidden_b`: its even cases are for choosing
-methods, its odd ones for scoring.
+methods, its odd ones for scoring. Its oracle knows its physics. `--facts` says what a crew knows
+(world b). A function is given the ship file's text and the readings of each run.
 
-Every answer is kept in a file before the truth of its case is asked for; a run
+Every answer is kept in a file (`--out`) before the truth of its case is asked for; a run
 that was broken off goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -33,10 +30,13 @@ from typing import Any
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 from benchmarks import _verbs
+from benchmarks._asked import asked, pooled
+from benchmarks._tables import table as markdown
 from benchmarks.worlds.hidden import cases, scoring
 from benchmarks.worlds.hidden.recording import Recording
 from benchmarks.worlds.hidden_b import cases as cases_b
 from benchmarks.worlds.hidden_b import facts as facts_b
+from benchmarks.worlds.hidden_b import oracle
 from benchmarks.worlds.hidden_b import plans as plans_b
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -45,7 +45,7 @@ OUT = Path(__file__).parent / 'out'
 WORLDS: dict[str, Any] = {'a': cases, 'b': cases_b}
 HALVES = {'all': (0, 1), 'even': (0, 2), 'odd': (1, 2)}  # remainder, divisor
 Found = dict[str, Any]
-Diagnose = Callable[[cases.Observation], tuple[Found, float]]  # and its CPU time [s]
+Diagnose = Callable[[cases.Observation], Found]
 
 
 def as_block(recording: Recording) -> Block:
@@ -54,143 +54,76 @@ def as_block(recording: Recording) -> Block:
     """
     return in_arrival_order(
         [
-            Block.of(
-                Channel[name.upper()],
-                series.stamp_ns,
-                series.value,
-                receive_ns=series.receive_ns,
-            )
-            for name, series in recording.items()
+            Block.of(Channel[name.upper()], each.stamp_ns, each.value, receive_ns=each.receive_ns)
+            for name, each in recording.items()
         ]
     )
 
 
-def write_bags(observation: cases.Observation, folder: Path) -> tuple[Path, list[Path]]:
+def write_bag(path: Path, ship_file: str, recording: Recording) -> Path:
+    """
+    Write a run with its ship file as a bag; return its path.
+    """
+    with BagWriter(path) as writer:
+        writer.attach('ship.yaml', ship_file)
+        writer.write_samples(as_block(recording))
+    return path
+
+
+def write_bags(seen: cases.Observation, folder: Path) -> tuple[Path, list[Path]]:
     """
     Write the ship file and one bag a run; return where they are.
     """
     ship = folder / 'ship.yaml'
-    ship.write_text(observation.ship_file, encoding='utf-8')
-    bags = []
-    for number, recording in enumerate(observation.runs):
-        bags.append(folder / f'run_{number}.mcap')
-        with BagWriter(bags[-1]) as writer:
-            writer.attach('ship.yaml', observation.ship_file)
-            writer.write_samples(as_block(recording))
-    return ship, bags
+    ship.write_text(seen.ship_file, encoding='utf-8')
+    runs = enumerate(seen.runs)
+    return ship, [write_bag(folder / f'run_{k}.mcap', seen.ship_file, run) for k, run in runs]
 
 
-def by_blocks(diagnose: Callable[[str, list[Block]], Found]) -> Diagnose:
-    """
-    Adapt a function of the ship file's text and one block a run.
-    """
-    return lambda seen: _timed(diagnose, seen.ship_file, [as_block(run) for run in seen.runs])
-
-
-def by_bags(diagnose: Callable[[Path, list[Path]], Found]) -> Diagnose:
-    """
-    Adapt a function of the paths of the ship file and the bags.
-    """
-
-    def adapted(seen: cases.Observation) -> tuple[Found, float]:
-        with TemporaryDirectory() as folder:
-            return _timed(diagnose, *write_bags(seen, Path(folder)))
-
-    return adapted
-
-
-def _timed(diagnose: Callable[..., Found], *arguments: Any) -> tuple[Found, float]:
-    start = time.process_time()
-    found = diagnose(*arguments)
-    return found, time.process_time() - start
-
-
-def command(ship: Path, bags: list[Path], more: Sequence[str] = ()) -> Found:
-    """
-    Diagnose with the verb `shipdrag diagnose`, in this process.
-
-    Parameters
-    ----------
-    ship, bags
-    more
-        Further arguments: the facts that a crew knows.
-    """
-    return _verbs.found('diagnose', *map(str, bags), '--ship', str(ship), *more)
-
-
-def diagnosis(
-    by: str, form: str, number: int, world: str = 'a', with_facts: bool = False
-) -> Diagnose:
+def diagnosis(by: str, number: int, world: str = 'a', facts: bool = False) -> Diagnose:
     """
     Return the diagnosis that is asked for; the oracle alone knows of the noise.
     """
     if by == 'oracle':
-        oracle = import_module(
-            f'benchmarks.worlds.{"hidden" if world == "a" else "hidden_b"}.oracle'
-        )
-        return lambda seen: _timed(oracle.diagnose, seen, WORLDS[world].known(number))
-    if by == 'command':
-        more: list[str] = []
-        if with_facts:
-            more = facts_b.arguments(WORLDS[world].reveal(number).facts)
-        return by_bags(lambda ship, bags: command(ship, bags, more))
-    module, _, function = by.partition(':')
-    found = getattr(import_module(module), function)
-    return by_blocks(found) if form == 'blocks' else by_bags(found)
+        return lambda seen: oracle.diagnose(seen, cases_b.known(number))
+    if by != 'command':
+        module, _, name = by.partition(':')
+        function = getattr(import_module(module), name)
+        return lambda seen: function(seen.ship_file, [as_block(run) for run in seen.runs])
+    more = facts_b.arguments(cases_b.reveal(number).facts) if facts else []
+
+    def command(seen: cases.Observation) -> Found:
+        with TemporaryDirectory() as folder:
+            ship, bags = write_bags(seen, Path(folder))
+            return _verbs.found('diagnose', *map(str, bags), '--ship', str(ship), *more)
+
+    return command
 
 
-def answer(
-    by: str,
-    form: str,
-    number: int,
-    world: str = 'a',
-    with_facts: bool = False,
-    once: bool = False,
-) -> dict[str, Any]:
+def answer(by: str, number: int, world: str = 'a', facts: bool = False) -> dict[str, Any]:
     """
-    Diagnose one case, and again with what the answer recommends, unless once is enough.
+    Diagnose one case.
     """
-    hidden = WORLDS[world]
-    diagnose = diagnosis(by, form, number, world, with_facts)
-    found, cpu_s = diagnose(hidden.observe(number))
-    row: dict[str, Any] = {
-        'case': number,
-        'cpu_s': cpu_s,
-        'found': found,
-        'followed': None,
-        'everything': None,
-    }
-    if found['verdict'] == 'one_of' and not once:
-        tried = scoring.parse(found).tried
-        if tried is not None:
-            row['followed'], _ = diagnose(hidden.observe(number, added=(tried.test,)))
-        row['everything'], _ = diagnose(hidden.observe(number, added=hidden.TESTS))
-    return row
+    seen, diagnose = WORLDS[world].observe(number), diagnosis(by, number, world, facts)
+    start = time.process_time()
+    found = diagnose(seen)
+    return {'case': number, 'cpu_s': time.process_time() - start, 'found': found}
 
 
-def _answer(task: tuple[str, str, int, str, bool, bool]) -> dict[str, Any]:
+def _answer(task: tuple[str, int, str, bool]) -> dict[str, Any]:
     try:
         return answer(*task)
     except Exception as error:
-        return {'case': task[2], 'error': f'{type(error).__name__}: {error}'}
+        return {'case': task[1], 'error': f'{type(error).__name__}: {error}'}
 
 
 def trials(rows: Sequence[dict[str, Any]], world: str = 'a') -> list[scoring.Trial]:
     """
     Reveal the truth of the cases that were answered.
     """
-
-    def parsed(found: Found | None) -> scoring.Answer | None:
-        return None if found is None else scoring.parse(found)
-
+    reveal = WORLDS[world].reveal
     return [
-        scoring.Trial(
-            WORLDS[world].reveal(row['case']),
-            scoring.parse(row['found']),
-            row['cpu_s'],
-            parsed(row['followed']),
-            parsed(row['everything']),
-        )
+        scoring.Trial(reveal(row['case']), scoring.parse(row['found']), row['cpu_s'])
         for row in rows
         if 'error' not in row
     ]
@@ -200,26 +133,19 @@ def table(done: Sequence[scoring.Trial]) -> Iterator[str]:
     """
     Yield the lines of the scoreboard.
     """
-    conditions = sorted({str(trial.truth.condition) for trial in done})
     grouped = {
         text: scoring.scores([t for t in done if str(t.truth.condition) == text])
-        for text in conditions
+        for text in sorted({str(trial.truth.condition) for trial in done})
     }
     grouped['all but mis-stated'] = scoring.scores(
         [trial for trial in done if not trial.truth.condition.misstated] or done
     )
-    yield '| | ' + ' | '.join(grouped) + ' |'
-    yield '|---|' + '---|' * len(grouped)
-    for name in grouped['all but mis-stated']:
-        cells = [_cell(columns[name]) for columns in grouped.values()]
-        yield f'| {name} | ' + ' | '.join(cells) + ' |'
-    yield ''
-    yield 'parameters within 2 sd'
-    known = [trial for trial in done if not trial.truth.condition.misstated]
-    for name, share in scoring.parameters_inside(known).items():
-        yield f'  {name}: {share}'
-    yield ''
-    yield 'hidden: answers (name: how often)'
+    rows = [
+        [name, *(_cell(column[name]) for column in grouped.values())]
+        for name in grouped['all but mis-stated']
+    ]
+    yield from markdown(['', *grouped], rows)
+    yield '\nhidden: answers (name: how often)'
     for truth, answers in scoring.confusion(done).items():
         yield f'  {truth}: ' + ', '.join(f'{name} {n}' for name, n in answers.most_common())
 
@@ -234,59 +160,38 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     Ask, keep, reveal, and print.
     """
-    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument(
-        '--by',
-        default='command',
-        help='oracle, command or MODULE:FUNCTION',
-    )
-    parser.add_argument('--as', dest='form', choices=('blocks', 'bags'), default='blocks')
-    parser.add_argument('--first', type=int, default=0, help='number of the first case')
-    parser.add_argument('--count', type=int, help='how many cases; all of them by default')
-    parser.add_argument('--world', choices=tuple(WORLDS), default='a')
-    parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
-    parser.add_argument('--facts', action='store_true', help='say what a crew knows (world b)')
-    parser.add_argument(
-        '--once', action='store_true', help='without what the answers recommend: quicker'
-    )
-    parser.add_argument('--processes', type=int, default=2)
-    parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
-    options = parser.parse_args(arguments)
-    if options.facts and options.world == 'a':
-        parser.error('--facts: world a has none')
-    hidden = WORLDS[options.world]
+    options = asked(
+        __doc__, arguments, by='command', world=tuple(WORLDS), half=tuple(HALVES), first=0,
+        count=int, facts=False, processes=2, out=Path,
+    )  # fmt: skip
+    by, world = options.by, options.world
+    if world == 'a' and (options.facts or by == 'oracle'):
+        raise SystemExit('world a has neither facts nor an oracle')
+    hidden = WORLDS[world]
     place, step = HALVES[options.half]
     numbers = [n for n in range(options.first, hidden.count()) if n % step == place]
     numbers = numbers[: options.count]
-    name = options.by.replace(':', '_') + '_b' * (options.world == 'b') + '_facts' * options.facts
+    name = by.replace(':', '_') + '_b' * (world == 'b') + '_facts' * options.facts
     out = options.out or OUT / f'diagnosis_{name}.jsonl'
     out.parent.mkdir(parents=True, exist_ok=True)
-
     kept = _kept(out)
-    tasks = [
-        (options.by, options.form, number, options.world, options.facts, options.once)
-        for number in numbers
-        if number not in kept
-    ]
-    with ProcessPoolExecutor(options.processes) as pool, out.open('a', encoding='utf-8') as file:
-        for row in pool.map(_answer, tasks):
-            file.write(json.dumps(row) + '\n')
-            file.flush()
+    tasks = [(by, number, world, options.facts) for number in numbers if number not in kept]
+    with out.open('a', encoding='utf-8') as file:
+        for row in pooled(_answer, tasks, options.processes):
+            print(json.dumps(row), file=file, flush=True)
             kept[row['case']] = row
     rows = [kept[number] for number in numbers]
 
-    print(f'{len(rows)} of {hidden.count()} cases, seed {hidden.SEED}, answers of {options.by}')
+    print(f'{len(rows)} of {hidden.count()} cases, seed {hidden.SEED}, answers of {by}')
     failed = [row for row in rows if 'error' in row]
     for row in failed[:10]:
         print(f'case {row["case"]}: {row["error"]}')
     if failed:
         print(f'{len(failed)} cases without an answer, not counted below')
-    done = trials(rows, options.world)
-    for line in table(done):
-        print(line)
-    if options.world == 'b':
+    done = trials(rows, world)
+    print(*table(done), sep='\n')
+    if world == 'b':
         print(f'\nnothing hidden, and named what is always there: {_always(done)}')
-    _write_summary(out.with_suffix('.json'), done, hidden.SEED)
 
 
 def _always(done: Sequence[scoring.Trial]) -> scoring.Share:
@@ -297,22 +202,8 @@ def _always(done: Sequence[scoring.Trial]) -> scoring.Share:
 def _kept(out: Path) -> dict[int, dict[str, Any]]:
     if not out.exists():
         return {}
-    rows = (json.loads(line) for line in out.read_text(encoding='utf-8').splitlines())
+    rows = map(json.loads, out.read_text(encoding='utf-8').splitlines())
     return {row['case']: row for row in rows if 'error' not in row}
-
-
-def _write_summary(path: Path, done: Sequence[scoring.Trial], seed: int) -> None:
-    figures = {
-        name: asdict(value) if isinstance(value, scoring.Share) else value
-        for name, value in scoring.scores(done).items()
-    }
-    summary = {
-        'seed': seed,
-        'cases': len(done),
-        'figures': figures,
-        'confusion': scoring.confusion(done),
-    }
-    path.write_text(json.dumps(summary, indent=1) + '\n', encoding='utf-8')
 
 
 if __name__ == '__main__':

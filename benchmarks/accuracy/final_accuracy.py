@@ -3,24 +3,20 @@
 Error and coverage of the final figure on simulated coastdowns.
 
 On three hulls, n samples of log and position each; disturbances of 300 s are learnt from
-1800 s of steady record, never given.
+1800 s of steady record, never given. `--no-baseline`: the ship file has length and volume alone.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
-from benchmarks._tables import grid
-from benchmarks.accuracy._coasts import TANKER, YACHT, Case, coasts, errors, rms
-from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate
+from benchmarks._asked import asked
+from benchmarks._tables import along, grid
+from benchmarks.accuracy._coasts import TANKER, YACHT, Case, Compared, coasts, rms
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
@@ -55,21 +51,12 @@ def without_baseline(method: Callable[..., Estimate]) -> Callable[..., Estimate]
 
 def row(case: Case, runs: int, method: Callable[..., Estimate]) -> list[str]:
     """Run one case; return the cells of its row."""
-    found, covered, took, failed, largest = [], [], [], 0, np.nan
-    seen = coasts(case, runs)
-    for coast in track(seen, case.name, runs, console=Console(stderr=True)):
-        largest = float(coast.resists(np.array(case.hull.speed_m_s)))
-        begin = time.perf_counter()
-        try:
-            curve = method(coast.window, coast.truth.ship, Parameters()).valid_curve
-        except EstimationError:
-            failed += 1
-            continue
-        took.append(time.perf_counter() - begin)
-        error, sigma = errors(curve, coast.resists)
-        found.append(error / largest)
-        covered.append(np.abs(error) <= 2.0 * sigma)
-    error = np.array(found)
+    largest = float(next(coasts(case, 1)).resists(np.array(case.hull.speed_m_s)))
+    seen = along(coasts(case, runs), case.name, runs)
+    found = Compared.of(
+        method, largest, ((each.window, each.truth.ship, each.resists) for each in seen)
+    )
+    error = found.error
     bias = error.mean(axis=0)
     return [
         case.name,
@@ -80,9 +67,9 @@ def row(case: Case, runs: int, method: Callable[..., Estimate]) -> list[str]:
         f'{100 * rms(error[:, -1]):.1f}',
         f'{100 * bias[-1]:+.1f}',
         f'{100 * rms(error[:, 0]):.2f}',
-        f'{100 * np.mean(covered):.0f}',
-        f'{1e3 * np.median(took):.1f}',
-        f'{failed}',
+        f'{100 * found.covered:.0f}',
+        f'{1e3 * np.median(found.took_s):.1f}',
+        f'{found.failed}',
     ]
 
 
@@ -90,18 +77,9 @@ def main() -> None:
     """
     Print the table.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
-    parser.add_argument(
-        '--live', action='store_true', help='the estimator during the coastdown instead'
-    )
-    parser.add_argument('--estimator', default='one', help='the parameter of that name')
-    parser.add_argument(
-        '--no-baseline', action='store_true', help='the ship file states length and volume alone'
-    )
-    options = parser.parse_args()
+    options = asked(__doc__, runs=200, estimator='one', no_baseline=False)
     runs = options.runs
-    method = estimate if options.live else named(options.estimator).estimate
+    method = named(options.estimator).estimate
     if options.no_baseline:
         method = without_baseline(method)
     grid(

@@ -13,7 +13,6 @@ into docs/forecast.md, and what was not foretold into docs/results/forecast_reco
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -23,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import curve_fit
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._known_coasts import COASTS, KnownCoast
 from benchmarks.accuracy.real_records import DATA, run_command
@@ -40,6 +40,7 @@ from shipdrag_ros.ship import Ship
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'forecast.md'
 REASONS = ROOT / 'docs' / 'results' / 'forecast_records.txt'
+OUT = ROOT / 'benchmarks' / 'out' / 'forecast'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 EIGHTHS = np.arange(1, 9) / 8.0
 OURS, RIVALS = 'forecast', ('persistence', 'polynomial', 'v^2')
@@ -308,11 +309,7 @@ def main() -> None:
     """
     Print the tables, and write them into the page if asked.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into docs/forecast.md, docs/results')
-    parser.add_argument('--estimator', default='one', help='of the estimate that is used')
-    parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'forecast')
-    options = parser.parse_args()
+    options = asked(__doc__, write=False, estimator='one', out=OUT)
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
         return

@@ -12,7 +12,6 @@ of. `--write` puts the table of both worlds into docs/forecast.md.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy.band_score import World
 from benchmarks.accuracy.diagnosis_score import HALVES, as_block
@@ -84,15 +84,10 @@ def main() -> None:
     """
     Print a line of the table, and write all that are kept into the page if asked.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--world', choices=('a', 'b'), default='a')
-    parser.add_argument('--half', choices=tuple(HALVES), default='all')
-    parser.add_argument('--first', type=int, default=539)
-    parser.add_argument('--count', type=int, default=30)
-    parser.add_argument('--seed', type=int, default=31)
-    parser.add_argument('--estimator', default='one')
-    parser.add_argument('--write', action='store_true', help='into docs/forecast.md')
-    options = parser.parse_args()
+    options = asked(
+        __doc__, world=('a', 'b'), half=tuple(HALVES), first=539, count=30, seed=31,
+        estimator='one', write=False,
+    )  # fmt: skip
     world = World.a() if options.world == 'a' else World.b(options.seed)
     first = options.first if options.world == 'a' else 0
     remainder, divisor = HALVES[options.half]

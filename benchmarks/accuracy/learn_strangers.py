@@ -15,12 +15,12 @@ both write docs/results/learn_strangers.txt.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -31,11 +31,11 @@ import numpy as np
 from scipy.stats import binomtest
 
 from benchmarks import _verbs
-from benchmarks.accuracy.diagnosis_score import as_block
+from benchmarks._asked import asked
+from benchmarks.accuracy.diagnosis_score import write_bag
 from benchmarks.worlds.hidden_b.cases import EPOCH_NS
 from benchmarks.worlds.strangers import world
 from benchmarks.worlds.strangers.hidden import CURVES, PLAIN, STRANGERS
-from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
@@ -43,12 +43,9 @@ from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import declared
 
 WHY = (
-    'no form is certain',
-    'something smooth',
-    'half of them',
-    'effects of the library',
+    'no form is certain', 'something smooth', 'half of them', 'effects of the library',
     'nothing is missing',
-)
+)  # fmt: skip
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
 RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
@@ -60,11 +57,7 @@ def write_run(case: world.Case, run: int, folder: Path) -> str:
     """
     Write a run as a bag; return its path.
     """
-    path = folder / f'run_{run}.mcap'
-    with BagWriter(path) as writer:
-        writer.attach('ship.yaml', case.ship_file)
-        writer.write_samples(as_block(case.recording(run)))
-    return str(path)
+    return str(write_bag(folder / f'run_{run}.mcap', case.ship_file, case.recording(run)))
 
 
 def foretold(case: world.Case, run: int, term: LearntTerm) -> tuple[float, float, float]:
@@ -215,13 +208,9 @@ def main() -> None:
     """
     Learn on all cases that are not done, or show one.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--show', choices=list(STRANGERS))
-    parser.add_argument('--ships', type=int, default=1)
-    parser.add_argument('--runs', type=int, nargs='+', default=[4])
-    parser.add_argument('--only', nargs='+', choices=[*STRANGERS, 'none'])
-    parser.add_argument('--table', action='store_true')
-    options = parser.parse_args()
+    options = asked(
+        __doc__, show=('', *STRANGERS), ships=1, runs=[4], only=['none', *STRANGERS], table=False
+    )
     if options.show:
         print(json.dumps(tried(options.show, 0, options.runs[0], show=True), indent=1))
         return
@@ -229,15 +218,12 @@ def main() -> None:
     rows = [json.loads(line) for line in OUT.read_text().splitlines()] if OUT.exists() else []
     if not options.table:
         done = {(row['stranger'], row['ship'], row['runs']) for row in rows}
-        names = ['' if name == 'none' else name for name in options.only or ['none', *STRANGERS]]
-        for ship in range(options.ships):
-            for name in names:
-                for runs in options.runs:
-                    if (name, ship, runs) in done:
-                        continue
-                    rows.append(tried(name, ship, runs))
-                    with OUT.open('a') as file:
-                        print(json.dumps(rows[-1]), file=file)
+        names = ['' if name == 'none' else name for name in options.only]
+        for ship, name, runs in product(range(options.ships), names, options.runs):
+            if (name, ship, runs) not in done:
+                rows.append(tried(name, ship, runs))
+                with OUT.open('a') as file:
+                    print(json.dumps(rows[-1]), file=file)
     text = '\n'.join(table(rows))
     RESULTS.write_text(text + '\n')
     print(text)

@@ -13,16 +13,14 @@ are taken case by case, with two standard errors.
 
 from __future__ import annotations
 
-import argparse
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
+from benchmarks._asked import asked
+from benchmarks._tables import along, table
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -117,26 +115,22 @@ def gains(found: Float64) -> list[tuple[float, float]]:
     return list(zip(steps.mean(axis=0).tolist(), error.tolist()))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     """
     Simulate, estimate, print.
     """
-    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--count', type=int, default=30)
-    parser.add_argument('--seed', type=int, default=0)
-    options = parser.parse_args(arguments)
+    options = asked(__doc__, count=30, seed=0)
     found = []
-    for number in track(range(options.count), console=Console(stderr=True)):
+    for number in along(range(options.count), 'cases'):
         try:
             found.append(scores(number, options.seed))
         except EstimationError as error:
             print(f'case {number}: {error}')
     print(f'{len(found)} of {options.count} cases, seed {options.seed}')
-    print('| known | mean log density of the true r | gain on the line above |')
-    print('| --- | --- | --- |')
     steps = ['', *(f'{gain:+.2f} ± {error:.2f}' for gain, error in gains(np.array(found)))]
-    for name, mean, step in zip(SETS, np.mean(found, axis=0), steps):
-        print(f'| {name} | {mean:.2f} | {step} |')
+    means = [f'{mean:.2f}' for mean in np.mean(found, axis=0)]
+    head = ('known', 'mean log density of the true r', 'gain on the line above')
+    print(*table(head, zip(SETS, means, steps)), sep='\n')
 
 
 if __name__ == '__main__':

@@ -2,31 +2,31 @@
 """
 How soon a coastdown is noticed, how surely it is known from others, how often in vain.
 
-    python -m benchmarks.accuracy.onset [RUNS] [DAYS]
+    python -m benchmarks.accuracy.onset --runs 200 --days 20
 
 The ship is data/vitus_bering.yaml at 8.2 m/s, the speed log reads once a second with
 white noise of 0.05 m/s and the slow wandering of the sea on top: sd 0.02 (calm), 0.07 (moderate)
 and 0.13 m/s (rough), correlation time 60 s. The record starts 40 minutes before the event.
-RUNS (200) of each kind and sea, seeds 0.., DAYS (20) of steady sailing in each sea.
+`--runs` of each kind and sea, seeds 0.., `--days` of steady sailing in each sea.
 """
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
-from importlib.resources import files
 
 import numpy as np
 
+from benchmarks._asked import asked
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Onset, State
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
+    START_NS,
     EngineOrder,
     GaussMarkov,
     Scenario,
@@ -37,8 +37,6 @@ from shipdrag_ros.simulation import (
     simulate,
 )
 
-START_NS = 1_700_000_000_000_000_000
-SECOND_NS = 1_000_000_000
 LEAD_IN_S = 2400
 SEAS = {'calm': 0.02, 'moderate': 0.07, 'rough': 0.13}
 COLOUR_S = 60.0
@@ -132,11 +130,8 @@ def spread(values: list[float]) -> str:
 
 
 def main() -> None:
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    days = int(sys.argv[2]) if len(sys.argv) > 2 else 20
-    ship = Ship.from_yaml(
-        files('shipdrag_ros').joinpath('data/vitus_bering.yaml').read_text(), subject='example'
-    )
+    options = asked(__doc__, runs=200, days=20)
+    runs, days, ship = options.runs, options.days, Ship.example()
     happenings = truths(ship)
     print(f'N = {runs} runs each, seeds 0..{runs - 1}; times in s after the event')
     print(

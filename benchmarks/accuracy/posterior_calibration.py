@@ -11,14 +11,13 @@ with what was drawn.
 
 from __future__ import annotations
 
-import argparse
 import math
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
 
+from benchmarks._asked import asked
+from benchmarks._tables import along
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.inference.learning import settings_at
 from shipdrag_ros.inference.noise import SIZE, Noise, noise_of, whiten
@@ -138,12 +137,9 @@ def main() -> None:
     """
     Draw, infer, print.
     """
-    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--count', type=int, default=100)
-    parser.add_argument('--seed', type=int, default=0)
-    options = parser.parse_args()
+    options = asked(__doc__, count=100, seed=0)
     found, failed = [], 0
-    for number in track(range(options.count), console=Console(stderr=True)):
+    for number in along(range(options.count), 'cases'):
         try:
             found.append(place(np.random.default_rng([options.seed, number])))
         except EstimationError:

@@ -13,7 +13,6 @@ Nothing is random. Takes about a minute.
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import shlex
@@ -26,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _verbs
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._known_coasts import COASTS, Known, KnownCoast
 from benchmarks.accuracy.real_records import DATA, PAGE, ROOT, run_command
@@ -33,6 +33,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
+OUT = ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
 AGREES_SD = 2.0
 WIDEST = 1.5  # of the stated standard deviation to that of the known figure
 SLACK_S = 3.0  # by which a reported stretch may exceed the coast
@@ -266,13 +267,7 @@ def main() -> None:
     """
     Print the table, and write it into the page if asked.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into docs/results/real_records.txt')
-    parser.add_argument(
-        '--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
-    )
-    parser.add_argument('--estimator', default='one', help='the parameter of that name')
-    options = parser.parse_args()
+    options = asked(__doc__, write=False, estimator='one', out=OUT)
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
         return

@@ -8,13 +8,13 @@ and draws nothing at random. `--write` puts it into docs/results/real_records.tx
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks._asked import asked
 from benchmarks._tables import put
 from benchmarks.accuracy.real_records import DATA, PAGE, run_command
 
@@ -81,9 +81,7 @@ def main() -> None:
     """
     Run all.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help=f'into {PAGE.name} as well')
-    options = parser.parse_args()
+    options = asked(__doc__, write=False)
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set')
         return

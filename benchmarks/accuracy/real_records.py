@@ -10,29 +10,29 @@ tables into docs/results/real_records.txt.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shlex
-import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
 from benchmarks import _verbs
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy._second_opinion import second_opinion
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.estimation import pictures
-from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import ReplayResult, replay
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report import drawing
+from shipdrag_ros.samples import Float64
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
@@ -93,56 +93,35 @@ def usv(test: str, parameters: str) -> Record:
     Return a test of the catamaran, one position a second.
     """
     columns = '--map position=x_m,y_m --map heading=yaw_rad --time t_s --where segment=coast'
-    return Record(
-        f'usv_test_{test}',
-        'awsp_usv_coast_1hz.csv',
-        f'{columns} --where test=Test_{test}',
-        'usv',
-        parameters,
-        (1.0, 15.0),
-        (0.5, 0.8, 1.1),
-    )
+    columns = f'{columns} --where test=Test_{test}'
+    name, file, speeds = f'usv_test_{test}', 'awsp_usv_coast_1hz.csv', (0.5, 0.8, 1.1)
+    return Record(name, file, columns, 'usv', parameters, (1.0, 15.0), speeds)
 
 
 def car(test: str, end_s: float, parameters: str) -> Record:
     """
     Return a test of a car at 100 Hz, cut to its coast.
     """
-    return Record(
-        f'car_{test.lower().replace("-", "_")}',
-        f'car/shotgoose_RR-Coastdown-{test}_coast_100hz.csv',
-        '--time t_s --map speed_over_ground=v_mps',
-        'car',
-        parameters,
-        (0.0, end_s),
-        (4.0, 7.0, 9.0),
-    )
+    name, file = f'car_{test.lower().replace("-", "_")}', f'shotgoose_RR-Coastdown-{test}'
+    columns, speeds = '--time t_s --map speed_over_ground=v_mps', (4.0, 7.0, 9.0)
+    file = f'car/{file}_coast_100hz.csv'
+    return Record(name, file, columns, 'car', parameters, (0.0, end_s), speeds)
 
 
 def slow_car(test: str, parameters: str) -> Record:
     """
     Return a test of a car at 1 Hz.
     """
-    return Record(
-        f'car_{test.lower()}',
-        f'car/{test}.csv',
-        '--rate 1 --map speed_over_ground=1:km/h',
-        'car',
-        parameters,
-        (0.0, 172.0),
-        (2.0, 4.0, 6.0),
-    )
+    name, columns = f'car_{test.lower()}', '--rate 1 --map speed_over_ground=1:km/h'
+    window_s, speeds = (0.0, 172.0), (2.0, 4.0, 6.0)
+    return Record(name, f'car/{test}.csv', columns, 'car', parameters, window_s, speeds)
 
 
 MODEL_SHIP = Record(
-    'model_ship',
-    'cse1_coast_153s_20hz.csv',
-    '--time t_s --map speed_through_water=u_mps --map heading=psi_rad',
-    'model_ship',
-    'small_craft_speed',
-    (6.0, 32.0),
-    (0.05, 0.1, 0.15),
-)
+    'model_ship', 'cse1_coast_153s_20hz.csv',
+    '--time t_s --map speed_through_water=u_mps --map heading=psi_rad', 'model_ship',
+    'small_craft_speed', (6.0, 32.0), (0.05, 0.1, 0.15),
+)  # fmt: skip
 MODEL_SHIP_JOINT = replace(
     MODEL_SHIP,
     name='model_ship_joint',
@@ -150,14 +129,10 @@ MODEL_SHIP_JOINT = replace(
     parameters='small_craft',
 )
 FERRY = Record(
-    'ferry',
-    'milliampere_coast_t457_20hz.csv',
-    '--time t_s --map speed_over_ground=speed_mps --map position=pos_e_m,pos_n_m',
-    'ferry',
-    'small_craft',
-    (8.5, 34.8),
-    (0.12, 0.17, 0.22),
-)
+    'ferry', 'milliampere_coast_t457_20hz.csv',
+    '--time t_s --map speed_over_ground=speed_mps --map position=pos_e_m,pos_n_m', 'ferry',
+    'small_craft', (8.5, 34.8), (0.12, 0.17, 0.22),
+)  # fmt: skip
 CAR_ENDS_S = {'2': 15.0, '3': 13.0, '2WD-1': 12.3, '4WD-1': 17.8}
 RECORDS = (
     MODEL_SHIP,
@@ -202,20 +177,6 @@ def replayed(record: Record, out: Path, *, window: bool = True, **changes: Any) 
     )
 
 
-def resistance_at(found: Estimate, speed_m_s: float) -> tuple[float, float] | None:
-    """
-    Return r and sigma at a speed; None outside the valid range.
-    """
-    curve = found.valid_curve
-    if not curve.speed_m_s[0] <= speed_m_s <= curve.speed_m_s[-1]:
-        return None
-    r, sigma = (
-        float(np.interp(speed_m_s, curve.speed_m_s, values))
-        for values in (curve.resistance_m_s2, curve.sigma_m_s2)
-    )
-    return r, sigma
-
-
 def estimated(record: Record, out: Path, **changes: Any) -> Estimate:
     """
     Return the estimate in the window, with changed parameters.
@@ -229,9 +190,14 @@ def figures(found: Estimate, record: Record) -> Iterator[tuple[float, float, str
     """
     Yield speed, two sigma, and r with it as text, where a speed is inside.
     """
+    curve = found.valid_curve
     for speed in record.speeds_m_s:
-        if (at := resistance_at(found, speed)) is not None:
-            yield speed, 2.0 * at[1], f'{speed:g}: {display.plus_minus(at[0], 2.0 * at[1])}'
+        if curve.speed_m_s[0] <= speed <= curve.speed_m_s[-1]:
+            r, sigma = (
+                float(np.interp(speed, curve.speed_m_s, values))
+                for values in (curve.resistance_m_s2, curve.sigma_m_s2)
+            )
+            yield speed, 2.0 * sigma, f'{speed:g}: {display.plus_minus(r, 2.0 * sigma)}'
 
 
 def limits(found: Estimate) -> str:
@@ -239,6 +205,38 @@ def limits(found: Estimate) -> str:
     Return the valid range [m/s].
     """
     return '{:.2f} to {:.2f}'.format(*found.valid_curve.speed_m_s[[0, -1]])
+
+
+def second_opinion(found: Estimate) -> Float64:
+    """
+    Fit v' = -(c0 + c1 v + c2 v |v|) to the samples and return c0, c1, c2.
+
+    Least squares through the equation of motion: it shares the samples with
+    the estimate and nothing else. The speed is fitted; without one the
+    distance, and then no coefficient is negative, or noise would rule them.
+    """
+    name = next((each for each in found.tracks if each != 'position'), 'position')
+    track = found.tracks[name]
+    time_s = (track.time_ns - found.start_ns) * 1e-9
+    column = 1 if name == 'position' else 0
+
+    def residual(x: Float64) -> Float64:
+        solved = solve_ivp(
+            lambda _, s: (-(x[1] + x[2] * s[0] + x[3] * s[0] * abs(s[0])), s[0]),
+            (time_s[0], time_s[-1]),
+            (x[0], x[4]),
+            t_eval=time_s,
+            rtol=1e-7,
+            atol=1e-9,
+        )
+        return np.asarray(solved.y[column] - track.measured)
+
+    v0 = float(found.curve.speed_m_s[-1])
+    quadratic = float(found.curve.resistance_m_s2.mean()) / v0**2
+    start = [v0, 1e-3 * quadratic, 1e-3 * quadratic, quadratic, 0.0]
+    low = [-np.inf, *(3 * [0.0 if name == 'position' else -np.inf]), -np.inf]
+    fit = least_squares(residual, start, bounds=(low, np.inf), x_scale='jac')
+    return np.asarray(fit.x[1:4])
 
 
 def show(record: Record, out: Path) -> tuple[Estimate, list[str]]:
@@ -250,15 +248,10 @@ def show(record: Record, out: Path) -> tuple[Estimate, list[str]]:
     found = estimated(record, out)
     print(f'\n== {record.name}: {result.ship.name}; onset without --window: {onsets or "none"}')
     print(f'  {record.import_command()}\n  {record.replay_command()}')
-    for name, counts in result.inputs.items():
-        rejected = ', '.join(f'{n} {why}' for why, n in counts.rejected.items()) or 'none'
-        print(f'  {name}: {counts.messages} messages, rejected: {rejected}')
     noise = ', '.join(f'{name} {sd:.2g}' for name, sd in found.noise_sd.items())
     print(f'  {found.duration_s:.1f} s; noise {noise}; Fr_max by {found.froude_max_by.value}')
     c0, c1, c2 = second_opinion(found)
     print(f"  second opinion: v' = -({c0:.2g} {c1:+.2g} v {c2:+.2g} v|v|)")
-    for note in estimate_words.notes(found):
-        print(textwrap.fill(note, 96, initial_indent='  - ', subsequent_indent='    '))
     cells = []
     for speed, band, shown in figures(found, record):
         other = (1.0 + float(result.ship.n_r(speed))) * (c0 + c1 * speed + c2 * speed * speed)
@@ -287,14 +280,12 @@ def default_line(record: Record, published: Estimate, out: Path) -> list[str]:
 
 def show_model_ship_at_rest(out: Path) -> None:
     """
-    Print r of the model ship where the speed all but vanishes, and by other orders.
+    Print r of the model ship where the speed all but vanishes.
     """
-    print('\n== model ship: r near rest, and by the number of coefficients [m/s^2, 2 sigma]')
-    for changes in ({'froude_min': 0.001}, {'order_max': 5}, {'order_max': 6}):
-        found = estimated(MODEL_SHIP, out, **changes)
-        low = float(found.valid_curve.speed_m_s[0])
-        shown = [s for *_, s in figures(found, replace(MODEL_SHIP, speeds_m_s=(low, 0.1, 0.15)))]
-        print(f'  {changes}: order {found.order}, {", ".join(shown)}')
+    print('\n== model ship: r near rest [m/s^2, 2 sigma]')
+    found = estimated(MODEL_SHIP, out, froude_min=0.001)
+    low = float(found.valid_curve.speed_m_s[0])
+    print(*(s for *_, s in figures(found, replace(MODEL_SHIP, speeds_m_s=(low,)))))
 
 
 def show_ferry_path(out: Path) -> None:
@@ -311,19 +302,6 @@ def show_ferry_path(out: Path) -> None:
             length = float(np.ptp(track.fitted))
         noise = ', '.join(f'{name} {sd:.2g}' for name, sd in found.noise_sd.items())
         print(f'  {estimator:<12} {length:.3f}; order {found.order}, noise {noise}')
-
-
-def show_repeats(found: dict[str, Estimate], names: Sequence[str], speed_m_s: float) -> None:
-    """
-    Print how far repeated runs differ, beside what each says of itself.
-    """
-    values = [at for name in names if (at := resistance_at(found[name], speed_m_s)) is not None]
-    r, sigma = np.array(values).T
-    print(
-        f'  r({speed_m_s:g} m/s) of {", ".join(names)}: {" ".join(f"{each:.4f}" for each in r)}; '
-        f'sd from run to run {100 * np.std(r, ddof=1) / r.mean():.0f} %, stated sigma '
-        f'{100 * np.mean(sigma) / r.mean():.0f} %'
-    )
 
 
 def draw(out: Path, data: Path) -> None:
@@ -355,10 +333,7 @@ def main() -> None:
     """
     Import, replay, print and draw.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_records')
-    parser.add_argument('--write', action='store_true', help=f'the tables into {PAGE.name}')
-    options = parser.parse_args()
+    options = asked(__doc__, out=ROOT / 'benchmarks' / 'out' / 'real_records', write=False)
     out = options.out
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
@@ -376,10 +351,6 @@ def main() -> None:
         published.append(line_of_it)
     show_model_ship_at_rest(out)
     show_ferry_path(out)
-    print('\n== repeated runs')
-    show_repeats(found, ['usv_test_6', 'usv_test_8', 'usv_test_10'], 0.8)
-    show_repeats(found, ['car_2', 'car_3'], 7.0)
-    show_repeats(found, ['car_michelin60a', 'car_michelin60a1'], 4.0)
     default = [default_line(record, found[record.name], out) for record in RECORDS]
     in_brackets = 'r at m/s: ± 2 sigma (second opinion)'
     of_published = ('record', 'fit, order', 'valid [m/s]', in_brackets, 'w [%]')

@@ -11,7 +11,6 @@ report would say is explained less well, which is 5, 25, 50, 75, 95 % where they
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Iterator, Sequence
 
@@ -19,7 +18,8 @@ import numpy as np
 
 os.environ['SPANS'] = '1'
 
-from benchmarks.accuracy.propulsion_found import stops
+from benchmarks._asked import asked
+from benchmarks.worlds.propulsion.cases import stops
 from benchmarks.worlds.propulsion.score import SUITES
 from benchmarks.worlds.propulsion.world import build, inputs
 from shipdrag_ros.coastdown import Monitor
@@ -28,15 +28,14 @@ from shipdrag_ros.coastdown.regimes.numbers import EXPLAINED_SHARE
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import in_arrival_order
 
-HOURS = 8.0
 SHOWN = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 def excesses(seeds: Sequence[int]) -> Iterator[tuple[float, float]]:
     """Yield excess and share said of each coastdown that is reported."""
     for seed in seeds:
-        for case in stops(range(seed, seed + 1), True):
-            world = build(case, HOURS)
+        for case in stops(seed):
+            world = build(case)
             for instruments in SUITES.values():
                 monitor = Monitor(
                     world.ship, Parameters(), estimate=None, final=lambda window, _, __: window
@@ -49,21 +48,17 @@ def excesses(seeds: Sequence[int]) -> Iterator[tuple[float, float]]:
 
 def main() -> None:
     """Print both tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--learnt', type=int, nargs='+', default=[1, 3, 5])
-    parser.add_argument('--others', type=int, nargs='*', default=[73, 75])
-    chosen = parser.parse_args()
+    chosen = asked(__doc__, learnt=[1, 3, 5], others=[73, 75])
     learnt = np.array(list(excesses(chosen.learnt)))
     print(f'seeds {chosen.learnt}, {len(learnt)} coastdowns')
     for share, value in zip(
         EXPLAINED_SHARE, np.quantile(learnt[:, 0], EXPLAINED_SHARE), strict=True
     ):
         print(f'{share:.2f}  {value:+.3f} nats a reading')
-    if chosen.others:
-        others = np.array(list(excesses(chosen.others)))[:, 1]
-        print(f'seeds {chosen.others}, {len(others)} coastdowns: share said, at')
-        for share, value in zip(SHOWN, np.quantile(others, SHOWN), strict=True):
-            print(f'{share:.2f}  {value:.2f}')
+    others = np.array(list(excesses(chosen.others)))[:, 1]
+    print(f'seeds {chosen.others}, {len(others)} coastdowns: share said, at')
+    for share, value in zip(SHOWN, np.quantile(others, SHOWN), strict=True):
+        print(f'{share:.2f}  {value:.2f}')
 
 
 if __name__ == '__main__':

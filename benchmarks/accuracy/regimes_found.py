@@ -2,7 +2,9 @@
 """
 Coastdowns found and manoeuvres left alone, in one table; no r(v) is estimated.
 
-Cases are those of `propulsion_found --quick` and, of another author, a ship that the sea makes
+Ships, propellers, engines, sea and instruments are those of `worlds/propulsion`, which shares
+nothing with the package: every way to stop a propeller x three ships, a sea in turn, and
+manoeuvres that are no coastdown; and, of another author, a ship that the sea makes
 wander (`vouching`). Half an hour of one core for six seeds.
 
     python -m benchmarks.accuracy.regimes_found [--seeds 61 63 65]
@@ -10,7 +12,6 @@ wander (`vouching`). Half an hour of one core for six seeds.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections import defaultdict
 
@@ -18,16 +19,17 @@ import numpy as np
 
 os.environ['SPANS'] = '1'
 
+from benchmarks._asked import asked
 from benchmarks._tables import table
-from benchmarks.accuracy.propulsion_found import others, stops
 from benchmarks.accuracy.vouching import LEAD_S, START_NS, faulty, ship_of
-from benchmarks.worlds.propulsion.score import SUITES, Row, score
-from benchmarks.worlds.propulsion.tables import MIDDLE_S, fewer
+from benchmarks.worlds.propulsion.cases import others, stops
+from benchmarks.worlds.propulsion.score import FEWER, SUITES, Row, score
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Channel
 
 LOG, GROUND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
+MIDDLE_S = 180.0
 HEARD = {'log': [LOG], 'speed over ground': [GROUND], 'both': [LOG, GROUND]}
 
 
@@ -75,6 +77,19 @@ def untrue(suites: dict[str, list[Row]]) -> list[list[str]]:
     ]
 
 
+def fewer(rows: list[Row], which: str) -> list[str]:
+    """Return what an input more brings and costs: cases found by one set of inputs alone."""
+    found = {(row.case, row.suite): row.found for row in rows}
+    cells = []
+    for less, more in FEWER:
+        both = [(found[case, less], found[case, more]) for case in {row.case for row in rows}]
+        gained = sum(b and not a for a, b in both)
+        lost = sum(a and not b for a, b in both)
+        error = float(np.sqrt(lost * (1.0 - lost / len(both))))
+        cells.append([f'{less} -> {more}', gained, f'{lost} ± {error:.1f}', len(both)])
+    return table((f'an input more, {which}', 'gained', 'lost, ± standard error', 'of'), cells)
+
+
 NAMES = (
     'found', 'from 3 min', 'long ones', 'dated within 5 s', 'within 20 s',
     'announced after, median and 90 % [s]', 'no coastdowns left as one, + an idling screw',
@@ -98,14 +113,12 @@ def wandering(heard: list[Channel], seeds: int = 10) -> str:
 
 def main() -> None:
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--seeds', type=int, nargs='+', default=[61, 63, 65])
-    seeds = parser.parse_args().seeds
+    seeds = asked(__doc__, seeds=[61, 63, 65]).seeds
     coasts: dict[str, list[Row]] = defaultdict(list)
     none: dict[str, list[Row]] = defaultdict(list)
     for seed in seeds:
         for made, rows in ((stops, coasts), (others, none)):
-            for case in made(range(seed, seed + 1), True):
+            for case in made(seed):
                 for row in score(case, SUITES):
                     rows[row.suite].append(row)
     columns = [column(coasts[suite], none[suite]) for suite in SUITES]
@@ -115,13 +128,8 @@ def main() -> None:
     print(*fewer(found, f'seeds {seeds}'), '', sep='\n')
     rows = untrue({suite: [*coasts[suite], *none[suite]] for suite in SUITES})
     print(*table(('said to glide and does not [s]', *SUITES), rows), sep='\n')
-    print()
-    print(
-        *table(
-            ('a ship that wanders, in one piece', *HEARD), [('', *map(wandering, HEARD.values()))]
-        ),
-        sep='\n',
-    )
+    heard = [('', *map(wandering, HEARD.values()))]
+    print('', *table(('a ship that wanders, in one piece', *HEARD), heard), sep='\n')
 
 
 if __name__ == '__main__':

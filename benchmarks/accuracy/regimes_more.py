@@ -11,15 +11,15 @@ docs/results/regimes_more.txt.
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy._coasts import CARGO, errors
+from benchmarks.accuracy._coasts import CARGO, errors, rms
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.parameters import Parameters
@@ -146,11 +146,12 @@ def readings(runs: int) -> list[str]:
             value[:3300, 0] = spoil(value[:3300, 0])
             ended = watched(replace(block, value=value)[~np.isnan(value[:, 0])])
             if holds(ended, LEAD_S, LEAD_S + 1500.0):
-                found[seed] = errors(ended[0].estimate, truth).rmse
+                curve = ended[0].estimate.valid_curve
+                found[seed] = rms(errors(curve, truth.specific_resistance)[0])
         before = before or found
         both = [seed for seed in found if seed in before]
-        rms = [np.sqrt(np.mean([each[s] ** 2 for s in both])) for each in (found, before)]
-        rows.append((name, f'{len(found) / runs:.0%}', f'{rms[0] / rms[1]:.2f}'))
+        ratio = rms([found[s] for s in both]) / rms([before[s] for s in both])
+        rows.append((name, f'{len(found) / runs:.0%}', f'{ratio:.2f}'))
         print(rows[-1], flush=True)
     return table((f'the log, {runs} records', 'found', 'RMSE, over that as it is'), rows)
 
@@ -186,11 +187,7 @@ def cost(runs: int) -> list[str]:
 def main() -> None:
     """Run, print and write."""
     parts = {'unseen': unseen, 'readings': readings, 'cost': cost}
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--parts', nargs='+', choices=parts, default=list(parts))
-    parser.add_argument('--runs', type=int, default=60)
-    parser.add_argument('--write', action='store_true')
-    chosen = parser.parse_args()
+    chosen = asked(__doc__, parts=list(parts), runs=60, write=False)
     for part in chosen.parts:
         made = '\n'.join([f'{part}, --runs {chosen.runs}', '', *parts[part](chosen.runs)])
         print(made, flush=True)

@@ -15,7 +15,6 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
 import tempfile
 import time
 from collections import Counter
@@ -25,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks._tables import grid, table
 from benchmarks.accuracy._coasts import CARGO, Case, read, rms, voyage
 from benchmarks.accuracy.s1_experiment import (
@@ -215,12 +215,7 @@ def main() -> None:
     """
     Print it all, and draw where that is asked for.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
-    parser.add_argument('--polynomials', type=int, default=2000, help='for the order rule')
-    parser.add_argument('--coasts', type=int, default=100, help='for the order rule')
-    parser.add_argument('--picture', action='store_true', help=PICTURE.name)
-    options = parser.parse_args()
+    options = asked(__doc__, runs=200, polynomials=2000, coasts=100, picture=False)
     print(*beside(), '', sep='\n')
     with tempfile.TemporaryDirectory() as folder:
         draw(PICTURE if options.picture else Path(folder) / PICTURE.name)

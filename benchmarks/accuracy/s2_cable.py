@@ -8,7 +8,6 @@ docs/s2_cable.md and the pictures beside it. No random numbers; some seconds.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
@@ -205,9 +205,7 @@ def main() -> None:
     """
     Print the numbers; write them and the pictures into the docs if asked.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='docs/s2_cable.md and its pictures')
-    options = parser.parse_args()
+    options = asked(__doc__, write=False)
     print(numbers())
     if options.write:
         put(DOCS / 's2_cable.md', {'numbers': numbers()})

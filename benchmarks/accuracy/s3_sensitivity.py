@@ -15,24 +15,28 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
 from benchmarks.accuracy import _plain_mariner
-from benchmarks.accuracy._wrong_values import verdicts
+from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.display import Table
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import (
     ManoeuvreMotion,
@@ -42,7 +46,7 @@ from shipdrag_ros.studies.manoeuvring.simulate import (
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.sensitivity.coast import coast_from
+from shipdrag_ros.studies.sensitivity.coast import coast_from, particulars
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
@@ -215,6 +219,46 @@ def surge() -> list[tuple[str, Float64]]:
     return list(zip(labels, speeds))
 
 
+ERRORS = (-0.2, -0.1, 0.1, 0.25)  # of the file, relative to the truth
+LEAD_IN_S, COAST_S, SPEED_M_S = 1200.0, 1500.0, 8.0
+_SHOWN = 0.05  # probability from which a candidate is shown
+
+
+def verdicts(ship: Ship) -> Table:
+    """
+    Show the answers to two reciprocal coastdowns, log and positions at 1 Hz.
+    """
+    rows = []
+    for one in particulars(ship, speed_m_s=SPEED_M_S):
+        answers = []
+        for error in ERRORS:
+            truth = one.scaled(ship, 1.0 / (1.0 + error))
+            runs = [_run(truth, heading, seed) for seed, heading in enumerate((0.0, math.pi))]
+            answers.append(_answer(diagnose(runs, ship, Parameters())))
+        rows.append((one.key, *answers))
+    return Table(('the file is wrong by', *(f'{error:+.0%}' for error in ERRORS)), tuple(rows))
+
+
+def _run(truth: Ship, heading_rad: float, seed: int) -> CoastRun:
+    scenario = Scenario(
+        speed_m_s=SPEED_M_S, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=heading_rad
+    )
+    sensors = standard_sensors(inputs=('speed_through_water', 'position'))
+    block = sense(simulate(truth, scenario), sensors, seed=seed)
+    stop = START_NS + round(LEAD_IN_S * 1e9)
+    first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
+    return CoastRun(f'run {seed}', Window.from_block(block, stop, last, before_ns=first))
+
+
+def _answer(found: DiagnosisResult) -> str:
+    shown = [
+        f'{" + ".join(each.names) or "nothing"} {each.probability:.0%}'
+        for each in found.candidates
+        if each.probability >= _SHOWN
+    ]
+    return f'{found.verdict}: {", ".join(shown)}' if shown else str(found.verdict)
+
+
 def lines_of(table: Table) -> list[str]:
     """
     Return a table in Markdown.
@@ -269,13 +313,8 @@ def main() -> None:
     """
     Print the tables, and draw where that is asked for.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        '--pictures', action='store_true', help='draw those of docs/s3_sensitivity.md'
-    )
-    options = parser.parse_args()
-    text = files('shipdrag_ros').joinpath('data', 'vitus_bering.yaml').read_text('utf-8')
-    ship = Ship.from_yaml(text, subject='vitus_bering.yaml')
+    options = asked(__doc__, pictures=False)
+    ship = Ship.example()
     found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)
     coast = study_coast(ship, coast_from(ship, SHIP_SPEED_M_S))
     print(*tables(found, shown, coast, speed(found), verdicts(ship)), sep='\n')

@@ -12,7 +12,6 @@ mean stands beside the forms. `--pictures` draws those of docs/s4_residual.md.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections import Counter
 from collections.abc import Iterator
@@ -24,6 +23,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from benchmarks.accuracy._delft import FILE as DELFT
 from benchmarks.accuracy._delft import delft
@@ -33,10 +33,10 @@ from benchmarks.accuracy._river_ships import (
     NAMES,
     NOISE,
     PROTOTYPE,
-    asked,
     control,
     models,
     sweep,
+    wanted,
 )
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
@@ -200,7 +200,7 @@ def guard(runs: int) -> Iterator[str]:
             off, passed, within = [], [], []
             for _ in range(runs):
                 found = fit_form(form, *models(count, rng))
-                ships = asked(ASKED, rng)
+                ships = wanted(ASKED, rng)
                 truth = control(ships)
                 said = found.predict(ships)
                 value = np.array([each.value for each in said])
@@ -268,10 +268,7 @@ def main() -> None:
     """
     Print the tables, and draw where that is asked for.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=500, help='data sets of each kind')
-    parser.add_argument('--pictures', action='store_true', help='those of the page, and its data')
-    options = parser.parse_args()
+    options = asked(__doc__, runs=500, pictures=False)
     print(*nine_ships(options.runs), *guard(options.runs), sep='\n')
     if (folder := os.environ.get('SHIPDRAG_DATA')) is None:
         print(f'skipped: {DELFT}, as SHIPDRAG_DATA is not set')

@@ -12,7 +12,6 @@ those of docs/s5_surfaces.md.
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +26,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
+from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
@@ -346,10 +346,7 @@ def main() -> None:
     """
     Print the tables, and draw where that is asked for.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=500, help='draws of each case')
-    parser.add_argument('--pictures', action='store_true', help='those of the page, and its data')
-    options = parser.parse_args()
+    options = asked(__doc__, runs=500, pictures=False)
     runs = options.runs
     (one,) = draws(17, NOISE, 1)
     found = {

@@ -11,15 +11,13 @@ instead.
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
+from benchmarks._asked import asked
+from benchmarks._tables import along, table
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
@@ -75,22 +73,15 @@ def readings(case: Case, ship: Ship, seed: int) -> Block:
     return replace(block, value=value)
 
 
-def score(case: Case, ship: Ship, known: Ship, seed: int) -> tuple[float, float, float]:
+def score(case: Case, ship: Ship, seed: int) -> tuple[float, float, float]:
     """
     Return mean square error, mean variance (of the largest r) and cover of a run.
-
-    Parameters
-    ----------
-    case, ship
-    known
-        The ship as the estimator is told of her.
-    seed
     """
     stop_ns = START_NS + round(LEAD_S * 1e9)
     window = Window.from_block(
         readings(case, ship, seed), stop_ns, stop_ns + round(COAST_S * 1e9), before_ns=START_NS
     )
-    found = estimate_final(window, known, Parameters()).valid_calm
+    found = estimate_final(window, ship, Parameters()).valid_calm
     speed = np.minimum(found.speed_m_s, ship.baseline_range_m_s[1])
     true = ship.resistance_n(speed) / ship.mass_kg
     largest = float(ship.resistance_n(SPEED_M_S)) / ship.mass_kg
@@ -104,26 +95,15 @@ def main() -> None:
     """
     Simulate, estimate, print.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--runs', type=int, default=20)
-    parser.add_argument('--seed', type=int, default=0, help='of the first run')
-    parser.add_argument('--no-baseline', action='store_true', help='the ship file has none')
-    options = parser.parse_args()
+    options = asked(__doc__, runs=20, seed=0)
     ship = replace(Ship.example(), effects=())
-    known = replace(ship, baseline=None) if options.no_baseline else ship
-    table = Table('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]')
+    rows, seeds = [], range(options.seed, options.seed + options.runs)
     for case in CASES:
-        seeds = range(options.seed, options.seed + options.runs)
-        each = np.array(
-            [
-                score(case, ship, known, seed)
-                for seed in track(seeds, description=case.name, console=Console(stderr=True))
-            ]
-        )
+        each = np.array([score(case, ship, seed) for seed in along(seeds, case.name)])
         error, sigma = 100.0 * np.sqrt(each[:, :2].mean(axis=0))
-        table.add_row(case.name, f'{error:.2f}', f'{sigma:.2f}', f'{100 * each[:, 2].mean():.0f}')
+        rows.append((case.name, f'{error:.2f}', f'{sigma:.2f}', f'{100 * each[:, 2].mean():.0f}'))
     print(f'N = {options.runs} runs a row, seeds from {options.seed}; of the largest r')
-    Console(width=80).print(table)
+    print(*table(('instruments', 'rmse [%]', 'sigma [%]', 'cover [%]'), rows), sep='\n')
 
 
 if __name__ == '__main__':

@@ -15,7 +15,6 @@ level and jump of both, side by side; `r hat` of two chains says whether the sam
 
 from __future__ import annotations
 
-import argparse
 import os
 from typing import Any
 
@@ -23,6 +22,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads on
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks.accuracy.trend_score import ship
 from shipdrag_ros.trend import hull_state as priors
 from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps
@@ -113,12 +113,7 @@ def r_hat(chains: np.ndarray) -> float:
 
 def main() -> None:
     """Print the table, and how far the two are apart."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--ships', type=int, default=6)
-    parser.add_argument('--years', type=float, default=1.5)
-    parser.add_argument('--draws', type=int, default=1000, help='of each of two chains')
-    parser.add_argument('--seed', type=int, default=1)
-    options = parser.parse_args()
+    options = asked(__doc__, ships=6, years=1.5, draws=1000, seed=1)
     rng = np.random.default_rng(options.seed)
     off: dict[str, list[float]] = {'growth': [], 'level': [], 'jump': []}
     width: dict[str, list[float]] = {name: [] for name in off}

@@ -13,7 +13,6 @@ one table.
 
 from __future__ import annotations
 
-import argparse
 import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
@@ -23,6 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks._asked import asked
 from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps, search
 
 WEEK = 7.0 / 365.25
@@ -65,23 +65,6 @@ def _is_jump(world: World, year: float) -> bool:
     """Say whether the hull fouled by 2 % or more within a month around a step."""
     near = np.abs(world.runs.years - year) < 0.5 * MONTH
     return bool(near.any() and np.ptp(world.level[near]) > 0.02)
-
-
-def first_noticed(world: World) -> float | None:
-    """Return how many days after a cleaning it is first found and dated, week by week."""
-    assert world.cleaned is not None
-    years = world.runs.years
-    for last in np.flatnonzero(years > world.cleaned + WEEK)[::2]:
-        part = Runs(
-            *(
-                each[: last + 1]
-                for each in (years, world.runs.added, world.runs.sd, world.runs.covariates)
-            )
-        )
-        steps = search(part, Steps(), Growth()).steps
-        if any(abs(step.year - world.cleaned) < MONTH for step in steps):
-            return float(years[last] - world.cleaned) * 365.25
-    return None
 
 
 def steps_by_ruptures(runs: Runs) -> list[float] | None:
@@ -200,28 +183,15 @@ def _rms(errors: list[float]) -> str:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--ships', type=int, default=40)
-    parser.add_argument('--years', type=float, default=2.5)
-    parser.add_argument('--cleaning', type=float, default=0.05)
-    parser.add_argument('--noticed', type=int, default=5, help='ships followed week by week')
-    parser.add_argument('--seed', type=int, default=1)
-    options = parser.parse_args()
+    options = asked(__doc__, ships=40, years=2.5, cleaning=0.05, seed=1)
     rng = np.random.default_rng(options.seed)
-    noted: list[object] = []
     show([(f'{options.ships} ships each, weekly runs, scatter 2 %', *METHODS.values())])
     for cleaning in (0.0, options.cleaning):
         score = Score()
-        for number in range(options.ships):
-            world = ship(rng, options.years, cleaning)
-            score.add(world, cleaning)
-            if cleaning and number < options.noticed:
-                noted.append(first_noticed(world))
+        for _ in range(options.ships):
+            score.add(ship(rng, options.years, cleaning), cleaning)
         what = f'one cleaning of {cleaning:.0%} that nobody noted:' if cleaning else 'no cleaning:'
         show([(what,), *score.rows()])
-    if noted:
-        days = [day and round(day) for day in noted]
-        print(f'first noticed after (days, {options.noticed} ships): {days}')
 
 
 if __name__ == '__main__':

@@ -15,14 +15,15 @@ NMEA records in it are counted too.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
+from benchmarks._asked import asked
 from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Onset
@@ -72,19 +73,30 @@ def ship_of(length_m: float) -> Ship:
 
 def slow(rng: np.random.Generator, count: int, sd: float, time_s: float) -> Float64:
     """Return Gauss-Markov noise, one value a second."""
-    keep, found = float(np.exp(-1.0 / time_s)), np.zeros(count)
+    keep = float(np.exp(-1.0 / time_s))
     steps = sd * np.sqrt(1.0 - keep**2) * rng.normal(size=count)
-    for i in range(1, count):
-        found[i] = keep * found[i - 1] + steps[i]
-    return found
+    steps[0] = 0.0
+    return np.asarray(lfilter([1.0], [1.0, -keep], steps))
 
 
 def filtered(values: Float64, time_s: float) -> Float64:
     """Return values through a first-order filter, one a second."""
-    found, keep = values.copy(), float(np.exp(-1.0 / time_s))
-    for i in range(1, len(found)):
-        found[i] = keep * found[i - 1] + (1.0 - keep) * values[i]
-    return found
+    keep = float(np.exp(-1.0 / time_s))
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
+
+
+def spoilt(fault: str, log: Float64, rng: np.random.Generator) -> Float64:
+    """Return what a log reads with a fault, or in a wrong scale."""
+    count = len(log)
+    nonsense = {
+        'random': rng.uniform(0.0, 10.0, count),
+        'zero': np.zeros(count),
+        'constant': np.full(count, 3.0),
+        'reversed': -log,
+        'other axis': rng.normal(0.0, 0.1, count) + 0.1 * np.sin(np.arange(count) / 9.0),
+        '20 % spikes': np.where(rng.random(count) < 0.2, rng.uniform(-30.0, 30.0, count), log),
+    }
+    return nonsense.get(fault, log * SCALES.get(fault, 1.0))
 
 
 def faulty(fault: str, ground: Channel, *, seed: int = 0) -> Block:
@@ -105,16 +117,7 @@ def faulty(fault: str, ground: Channel, *, seed: int = 0) -> Block:
     time_s = np.arange(count, dtype=np.float64)
     # about as friction and waves slow hulls of that length and volume
     speed = 5.0 / (1.0 + 5e-3 * np.maximum(time_s - LEAD_S, 0.0)) + slow(rng, count, 0.03, 60.0)
-    log = speed + rng.normal(0.0, 0.03, count)
-    nonsense = {
-        'random': rng.uniform(0.0, 10.0, count),
-        'zero': np.zeros(count),
-        'constant': np.full(count, 3.0),
-        'reversed': -log,
-        'other axis': rng.normal(0.0, 0.1, count) + 0.1 * np.sin(time_s / 9.0),
-        '20 % spikes': np.where(rng.random(count) < 0.2, rng.uniform(-30.0, 30.0, count), log),
-    }
-    log = nonsense.get(fault, log * SCALES.get(fault, 1.0))
+    log = spoilt(fault, speed + rng.normal(0.0, 0.03, count), rng)
     speed = speed + CURRENTS_M_S.get(fault, 0.0) + 0.005 * np.cumsum(rng.normal(size=count))
     track = np.column_stack([np.cumsum(speed), np.zeros(count)]) + rng.normal(0, 0.7, (count, 2))
     track *= 1e-3 if fault == 'position in km' else 1.0
@@ -242,11 +245,7 @@ def alarms(block: Block, ship: Ship) -> list[tuple[int, str]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--hours', type=float, default=4.0, help='of each kind of sailing')
-    parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--write', action='store_true')
-    options = parser.parse_args()
+    options = asked(__doc__, hours=4.0, seed=0, write=False)
     rows = []
     for fault in (*SOUND, *FAULTS, *WRONG_SCALES):
         for ground in (Channel.SPEED_OVER_GROUND, Channel.POSITION):

@@ -39,13 +39,6 @@ SHOWN = """
   new MutationObserver(note).observe(figure, all);
 }
 """
-DRAW = """
-() => new Promise(done => {
-  const begin = performance.now();
-  document.getElementById('mode').click();  // every part is drawn anew, charts included
-  requestAnimationFrame(() => setTimeout(() => done(performance.now() - begin)));
-})
-"""
 
 
 @contextmanager
@@ -88,19 +81,11 @@ def sample_to_pixel_ms(count: int) -> Milliseconds:
     return np.array([seen.get(value, np.nan) - 1000.0 * at for value, at in sent_s.items()])
 
 
-def draw_ms(count: int) -> tuple[Milliseconds, Milliseconds, float]:
+def draw_ms(count: int) -> Milliseconds:
     """
-    Return how long all of it takes to draw: six hours, a curve with its band, a verdict.
+    Return how long six hours, a curve with its band and a verdict take to be drawn.
 
-    Returns
-    -------
-    fresh
-        From the whole picture's arrival in a page just opened, code not warm, to the screen.
-    again
-        Every part anew, charts included, in a page that is open.
-    main_thread
-        Processor time of the browser's main thread for one of `again`, whatever else the machine
-        does meanwhile.
+    From their arrival in a page just opened, code not warm, to the screen.
     """
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'run.mcap'
@@ -111,13 +96,7 @@ def draw_ms(count: int) -> tuple[Milliseconds, Milliseconds, float]:
         try:
             with in_browser(source) as page:
                 page.wait_for_selector('#verdict h3', timeout=200_000)
-                fresh = np.array([_opened_ms(page) for _ in range(count)])
-                tools = page.context.new_cdp_session(page)
-                tools.send('Performance.enable')
-                begin_s = _metric(tools, 'ThreadTime')
-                again = np.array([page.evaluate(DRAW) for _ in range(count)])
-                thread_ms = 1000.0 * (_metric(tools, 'ThreadTime') - begin_s) / count
-                return fresh, again, thread_ms
+                return np.array([_opened_ms(page) for _ in range(count)])
         finally:
             source.close()
 
@@ -127,13 +106,6 @@ def _opened_ms(page: Any) -> float:
     while (found := page.evaluate('window.shipdrag?.wholeMs')) is None:
         page.wait_for_timeout(20)
     return float(found)
-
-
-def _metric(tools: Any, name: str) -> float:
-    values = {
-        each['name']: each['value'] for each in tools.send('Performance.getMetrics')['metrics']
-    }
-    return float(values[name])
 
 
 def heap_mb(hours: int, speed: float) -> list[float]:

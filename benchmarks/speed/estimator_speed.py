@@ -4,8 +4,7 @@ Time of the estimators for one window, from Python, one thread.
 
 First all orders up to 12 of one input, compiled, beside the QR decomposition of
 numpy on the same columns; then whole estimates, from a window to r(v), while a
-coastdown runs and after it, beside S1's joint problem; with `--peers` beside
-other ways to differentiate. Process time, the best of several rounds.
+coastdown runs and after it, beside S1's joint problem. Process time, the best of several rounds.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -100,28 +98,6 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
     }
 
 
-def peers(n: int) -> dict[str, Callable[[], object]]:
-    """
-    Return calls of the peers on the same samples.
-    """
-    from benchmarks.accuracy import _peers
-
-    (coast,) = coasts(replace(PLAIN, n=n), 1)
-    samples = _peers.Samples.of(coast.window)
-    tuned = _peers.TunedByPynumdiff.on(samples)
-    return {
-        'Chebyshev, BIC (numpy)': partial(_peers.chebyshev, samples),
-        'Savitzky-Golay, CV (scipy)': partial(_peers.savitzky_golay, samples),
-        'smoothing spline, GCV (scipy)': partial(_peers.smoothing_spline, samples),
-        'Kalman RTS, ML (statsmodels)': partial(_peers.kalman_rts, samples),
-        f'Matern 5/2 process, thinned to {_peers.GAUSS_SAMPLES}': partial(
-            _peers.gaussian_process, samples
-        ),
-        'pynumdiff, tuning': partial(_peers.TunedByPynumdiff.on, samples),
-        'pynumdiff, once tuned': partial(tuned, samples),
-    }
-
-
 def shown(time_us: float) -> str:
     """
     Show a time in the unit that suits it.
@@ -136,13 +112,9 @@ def main() -> None:
     """
     Print the table.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--peers', action='store_true', help='needs `make peers`')
-    with_peers = parser.parse_args().peers
     times: dict[str, list[float]] = {}
     for n in COUNTS:
-        calls = {**one_input(n), **whole(n), **(peers(n) if with_peers else {})}
-        for name, call in calls.items():
+        for name, call in {**one_input(n), **whole(n)}.items():
             times.setdefault(name, []).append(best_us(call))
     tail, rows = COUNTS.index(SLOPE_FROM), []
     for name, took in times.items():

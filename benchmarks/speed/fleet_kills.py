@@ -10,16 +10,15 @@ killed (SIGKILL) whenever a bag is done, until there were so many kills.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
-import io
 import os
 import random
 import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from shipdrag_ros.cli import main as shipdrag
+from benchmarks import _verbs
+from benchmarks._asked import asked
 from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.store import Store
@@ -34,8 +33,7 @@ def simulated(folder: Path, bags: int) -> None:
     for seed in range(bags):
         line = ['simulate', '--ship', str(SHIP), '-o', str(folder / f'{seed}.mcap')]
         line += ['--seed', str(seed), '--lead-in', '250', '--duration', '500', '--speed', '7']
-        with contextlib.redirect_stdout(io.StringIO()):
-            assert shipdrag([*line, '--rate', '0.5']) == 0
+        _verbs.run(*line, '--rate', '0.5')
 
 
 def contents(store: Path) -> dict[str, bytes]:
@@ -49,10 +47,7 @@ def contents(store: Path) -> dict[str, bytes]:
 
 def main() -> None:
     """Kill, compare and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--kills', type=int, default=20, metavar='N')
-    parser.add_argument('--bags', type=int, default=24, metavar='N')
-    options = parser.parse_args()
+    options = asked(__doc__, kills=20, bags=24)
     random.seed(0)
     killed: list[int] = []
     with TemporaryDirectory() as made, Engine(workers=2) as engine:

@@ -2,13 +2,13 @@
 """
 Coastdowns an hour and a core of `shipdrag fleet`, on one and on two workers.
 
-    python -m benchmarks.speed.fleet_throughput KEPT [--coastdowns 1000] [--workers 2 1]
+    python -m benchmarks.speed.fleet_throughput [--kept DIR] [--coastdowns 1000] [--workers 2 1]
 
 A few different bags are simulated (30 minutes at 1 Hz, four inputs, 7204 messages) and linked
 under many names. Each link has a run file of its own, so that each has another content hash and
 is replayed and diagnosed for itself. An empty store is brought up to date with each number of
-workers. What is done stays in the folder KEPT: stopped and started again, the script goes on and
-adds up what its parts took. Starting and warming the workers is not counted.
+workers. What is done stays in the folder `--kept`: stopped and started again, the script goes on
+and adds up what its parts took. Starting and warming the workers is not counted.
 
 It prints messages and coastdowns an hour and a core, the efficiency from one worker to two, the
 memory of the largest worker and of this process against the number of bags, and what more cores
@@ -19,7 +19,6 @@ by the time of the processors are those to read.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import shutil
@@ -27,12 +26,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks._asked import asked
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, find
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.fleet.update import update
 
+OUT = Path(__file__).parents[1] / 'out' / 'fleet_throughput'
 DISTINCT = 20
 CORES = 1, 2, 16, 370
 SAMPLES = 4  # of memory, over all bags
@@ -158,12 +159,7 @@ def on_paper(each_s: float, alone_s: float) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('kept', type=Path, metavar='KEPT', help='folder; made if missing')
-    parser.add_argument('--coastdowns', type=int, default=1000, metavar='N')
-    parser.add_argument('--workers', type=int, nargs='+', default=[2, 1], metavar='N')
-    parser.add_argument('--minutes', type=float, default=30.0, help='at most, of each')
-    options = parser.parse_args()
+    options = asked(__doc__, kept=OUT, coastdowns=1000, workers=[2, 1], minutes=30.0)
     options.kept.mkdir(parents=True, exist_ok=True)
     folder = make_bags(options.kept, options.coastdowns)
     print(

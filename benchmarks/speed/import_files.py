@@ -11,19 +11,16 @@ goes into docs/results/import.txt.
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
 import os
 import shlex
-import sys
-import tempfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from shipdrag_ros.cli import main as shipdrag
+from benchmarks import _verbs
+from benchmarks._asked import asked
+from benchmarks._tables import put, table
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'results' / 'import.txt'
-BEGIN, END = '<!-- import_files begin -->', '<!-- import_files end -->'
 FILES = (  # and the one option, '' where none is needed or none helps
     ('irene_2014_20140611.nmea.gz', ''),
     ('psaros_lake_geneva.nmea.gz', ''),
@@ -47,20 +44,18 @@ MOTION = ('speed_through_water', 'speed_over_ground', 'position')
 
 def attempt(path: Path, option: str) -> tuple[list[str], str]:
     """Import a file; return the inputs understood, or why there are none."""
-    with tempfile.TemporaryDirectory() as folder:
-        said, errors = io.StringIO(), io.StringIO()
-        line = ['import', str(path), '-o', f'{folder}/out.mcap', '--json', *shlex.split(option)]
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(errors):
-            status = shipdrag(line)
-        if status != 0:
-            return [], errors.getvalue().strip().splitlines()[-1]
-        return list(json.loads(said.getvalue())['written']), ''
+    with TemporaryDirectory() as folder:
+        line = ['import', str(path), '-o', f'{folder}/out.mcap', *shlex.split(option)]
+        try:
+            return list(_verbs.found(*line)['written']), ''
+        except RuntimeError as error:
+            return [], str(error).splitlines()[-1]
 
 
-def main() -> int:
+def main() -> None:
     """Import the files and print the table."""
     data = Path(os.environ['SHIPDRAG_DATA'])
-    lines = ['| file | without an option | with one | the option |', '|---|---|---|---|']
+    rows = []
     without = with_one = 0
     for name, option in FILES:
         first, why = attempt(data / name, '')
@@ -70,15 +65,13 @@ def main() -> int:
         reason = why.rpartition(name)[2].lstrip("': ")
         shown = ', '.join(first) or f'refused: {reason[:70]}...'
         more = ', '.join(each for each in second if each not in first)
-        lines.append(f'| {name} | {shown} | {more or "-"} | {f"`{option}`" if option else "-"} |')
+        rows.append((name, shown, more or '-', f'`{option}`' if option else '-'))
+    lines = table(('file', 'without an option', 'with one', 'the option'), rows)
     lines += ['', f'{without} of {len(FILES)} without an option, {with_one} with at most one.']
     print('\n'.join(lines))
-    if '--write' in sys.argv[1:]:
-        before, _, rest = PAGE.read_text(encoding='utf-8').partition(BEGIN)
-        made = '\n'.join([BEGIN, *lines, END])
-        PAGE.write_text(f'{before}{made}{rest.partition(END)[2]}', encoding='utf-8')
-    return 0
+    if asked(__doc__, write=False).write:
+        put(PAGE, {'import_files': '\n'.join(lines)})
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -9,7 +9,6 @@ Read from the environment that it runs in, which `make env` has made; nothing is
 
 from __future__ import annotations
 
-import re
 import sys
 from distutils.core import run_setup
 from importlib.metadata import PackageNotFoundError, distribution
@@ -89,8 +88,6 @@ def main() -> None:
         print(f'| `[{extra}]` adds | {len(more)} | {added / _MIB:.0f} |')
     largest = sorted(sizes, key=sizes.__getitem__, reverse=True)[:6]
     print(f'\nlargest: {", ".join(f"{name} {sizes[name] / _MIB:.0f}" for name in largest)}')
-    scipy = closure([text for text in base if not re.match(r'scipy\b', text)])
-    print(f'without scipy: {(total - sum(sizes[n] for n in packages - scipy)) / _MIB:.0f} MiB')
 
 
 if __name__ == '__main__':

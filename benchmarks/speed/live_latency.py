@@ -12,7 +12,6 @@ publishing the sample that makes an estimate due to hearing `~/speed`.
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import re
@@ -27,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks.speed._onboard import PARAMETERS, SEED, late_ms, onboard, record
 from benchmarks.speed.live_page import read
 
@@ -123,11 +123,7 @@ def measure(pairs: int, viewers: int, seconds: float) -> dict[bool, np.ndarray]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--viewers', type=int, default=50)
-    parser.add_argument('--pairs', type=int, default=4)
-    parser.add_argument('--seconds', type=float, default=20.0)
-    options = parser.parse_args()
+    options = asked(__doc__, viewers=50, pairs=4, seconds=20.0)
     late = measure(options.pairs, options.viewers, options.seconds)
     print(
         f'an estimate each second at {RATE_HZ:g} Hz, {options.pairs} turns of '

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The page under load: how late a reading is, CPU for many viewers, connections refused, slow
-readers survived, eight hours of simulated time in memory.
+The page under load: how late a reading is, CPU for many viewers, connections refused, eight hours
+of simulated time in memory.
 
     python -m benchmarks.speed.live_page [--viewers 50] [--connections 10000]
 
@@ -11,7 +11,6 @@ process, the viewers in another; CPU is that of the server alone.
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import resource
@@ -19,10 +18,11 @@ import socket
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
-import psutil
 
+from benchmarks._asked import asked
 from shipdrag_ros.live.app import PAGE, LivePage
 from shipdrag_ros.live.serve import CONNECTIONS, listen, serve
 from shipdrag_ros.live.source import NodeSource
@@ -106,32 +106,9 @@ def connect(address: tuple[str, int], count: int) -> tuple[int, float]:
     return closed, slowest
 
 
-def soak(hours: int) -> list[float]:
-    """Return the memory after each hour of simulated time at 10 Hz, the history being full."""
-    source = NodeSource()
-    page = LivePage(source)
-    begin_s = 1_700_000_000
-    stamps = np.arange(begin_s - 2 * 86400, begin_s) * 1_000_000_000
-    for channel in (Channel.SPEED_THROUGH_WATER, Channel.SHAFT):
-        source.hear(Samples(Block.of(channel, stamps, np.full(len(stamps), 8.0))))
-    page.tick()
-    values = {'lifecycle': 'active', 'monitor': 'steady', 'steady lead used at most [s]': '1800'}
-    found = []
-    for second in range(hours * 3600):
-        stamps = (begin_s + second) * 1_000_000_000 + np.arange(10) * 100_000_000
-        source.hear(Samples(Block.of(Channel.SPEED_THROUGH_WATER, stamps, np.full(10, 8.0))))
-        state = Status('node', 'state', 0, 'steady', {**values, 'steady lead [s]': f'{second}'})
-        source.hear(Health((state,)))
-        if second % 5 == 4:
-            page.tick()
-        if second % 3600 == 3599:
-            found.append(psutil.Process().memory_info().rss / 1e6)
-    return found
-
-
 def in_the_browser() -> None:
-    """Print how late a reading is in the page, and how long a picture takes."""
-    from benchmarks.speed._live_browser import draw_ms, sample_to_pixel_ms
+    """Print how late a reading is in the page, how long a picture takes, and what it holds."""
+    from benchmarks.speed._live_browser import draw_ms, heap_mb, sample_to_pixel_ms
 
     late = sample_to_pixel_ms(300)
     half, most = np.nanpercentile(late, (50, 99))
@@ -139,19 +116,11 @@ def in_the_browser() -> None:
         f'a reading heard to its figure in the page: median {half:.0f} ms, p99 {most:.0f} ms '
         f'({np.isfinite(late).sum()} of {len(late)} readings at 10 Hz)'
     )
-    fresh, again, thread_ms = draw_ms(20)
-    for name, drawn in (('in a page just opened', fresh), ('anew in an open page', again)):
-        print(
-            f'six hours, curve, band and verdict drawn {name}: least {drawn.min():.0f} ms, median '
-            f'{np.median(drawn):.0f} ms, at most {drawn.max():.0f} ms (20 times)'
-        )
-    print(f"  of which the browser's main thread computes {thread_ms:.0f} ms")
-
-
-def long_in_the_browser() -> None:
-    """Print what the page in the browser holds over eight hours."""
-    from benchmarks.speed._live_browser import heap_mb
-
+    drawn = draw_ms(20)
+    print(
+        f'six hours, curve, band and verdict drawn in a page just opened: median '
+        f'{np.median(drawn):.0f} ms, at most {drawn.max():.0f} ms (20 times)'
+    )
     held = heap_mb(8, speed=600.0)
     print(
         '8 h at 600 times in the browser, two days of history: JavaScript heap after each hour '
@@ -161,29 +130,20 @@ def long_in_the_browser() -> None:
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--viewers', type=int, default=50)
-    parser.add_argument('--connections', type=int, default=10000)
-    parser.add_argument('--slow', type=int, default=100)
-    parser.add_argument('--seconds', type=float, default=10.0)
-    options = parser.parse_args()
+    options = asked(__doc__, viewers=50, connections=10000, seconds=10.0)
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(65536, hard), hard))
     size = sum(path.stat().st_size for path in PAGE.rglob('*') if path.is_file())
     print(f'page: {size / 1000:.0f} kB')
     print(f'load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores')
     in_the_browser()
-    long_in_the_browser()
-    held = soak(8)
-    print(f'8 h at 10 Hz in simulated time: {held[0]:.1f} MB after 1 h, {held[-1]:.1f} MB after 8')
     source, ended = NodeSource(), threading.Event()
     page = LivePage(source)
     with listen('127.0.0.1', 0) as found:
         address = found.getsockname()
-        for target, arguments in ((serve, (page, [found])), (feed, (source, ended))):
-            more = {'until': ended} if target is serve else {}
-            arguments = arguments if more else (source, ended)
-            threading.Thread(target=target, args=arguments, kwargs=more, daemon=True).start()
+        serving = partial(serve, page, [found], until=ended)
+        for target in (serving, partial(feed, source, ended)):
+            threading.Thread(target=target, daemon=True).start()
         time.sleep(2.0)
         print(f'whole picture with six hours: {len(page.frames.whole()) / 1000:.0f} kB')
         for viewers in (1, options.viewers):
@@ -193,15 +153,6 @@ def main() -> None:
         print(
             f'{options.connections} connections at once that ask nothing: {closed} closed (limit '
             f'{CONNECTIONS}); then a page within {1000 * slowest:.0f} ms'
-        )
-        slow = [socket.create_connection(address) for _ in range(options.slow)]
-        for each in slow:
-            each.sendall(ASK)  # and reads nothing
-        share, rate = cpu_with(address, 1, options.seconds)
-        memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(
-            f'{options.slow} readers who read nothing: one who reads gets {rate:.1f} frames/s, '
-            f'{100 * share:.1f} % of a core, at most {memory_mb:.0f} MB'
         )
         ended.set()
         time.sleep(0.5)

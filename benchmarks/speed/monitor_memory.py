@@ -2,22 +2,21 @@
 """
 Memory and speed of the monitor over a month at sea.
 
-    python -m benchmarks.speed.monitor_memory [DAYS]
+    python -m benchmarks.speed.monitor_memory --days 30
 
-DAYS (30) of steady sailing with a coastdown each day, log, position and heading once a second,
+Days of steady sailing with a coastdown each day, log, position and heading once a second,
 in blocks of an hour; seed 0. Then the same sequence rate at 10 and 100 Hz for speed alone.
 """
 
 from __future__ import annotations
 
-import sys
 import time
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 import psutil
 
+from benchmarks._asked import asked
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, Update
 from shipdrag_ros.parameters import Parameters
@@ -95,10 +94,8 @@ def steady(ship: Ship, rate_hz: int) -> None:
 
 
 def main() -> None:
-    days = int(sys.argv[1]) if len(sys.argv) > 1 else 30
-    text = files('shipdrag_ros').joinpath('data/vitus_bering.yaml').read_text()
-    ship = Ship.from_yaml(text, subject='example')
-    month(ship, days)
+    ship = Ship.example()
+    month(ship, asked(__doc__, days=30).days)
     for rate_hz in (1, 10, 100):
         steady(ship, rate_hz)
 

@@ -13,7 +13,6 @@ by a person: those that survived are printed with their lines.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import random
@@ -25,6 +24,8 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 from tempfile import gettempdir
+
+from benchmarks._asked import asked
 
 HERE = Path(__file__).resolve().parents[2]
 OUT = Path(gettempdir()) / 'shipdrag_mutations'
@@ -44,14 +45,9 @@ ALONE = ['unshare', '-n', 'bash', '-c', 'ip link set lo up; exec "$@"', 'tests']
 
 def main() -> None:
     """Draw mutations, run the tests on each, print what survived."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
-    parser.add_argument('--count', type=int, default=60)
-    parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--cosmic-ray', type=Path, help='folder of its programs')
-    parser.add_argument('--whole', action='store_true', help='survivors against all tests')
-    parser.add_argument('--limit-s', type=float, default=900.0, help='for the tests of one')
-    parser.add_argument('--nearest', action='store_true', help='run the tests of what is changed')
-    options = parser.parse_args()
+    options = asked(
+        __doc__, count=60, seed=1, cosmic_ray=Path, whole=False, limit_s=900.0, nearest=False
+    )
     if options.nearest:
         sys.exit(nearest(options.whole))
     copy, session = OUT / f'copy_{options.seed}', OUT / f'{options.seed}.sqlite'

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import gzip
 import os
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.parameters import Parameters
@@ -33,13 +32,12 @@ SMOOTH_S = 9  # a running median over this many samples is taken for the truth
 REPEATS = (1, 2, 4)
 
 
-def main() -> int:
+def main() -> None:
     """
     Print the figures.
     """
     if 'SHIPDRAG_DATA' not in os.environ:
-        print('SHIPDRAG_DATA names no folder of records', file=sys.stderr)
-        return 1
+        raise SystemExit('SHIPDRAG_DATA names no folder of records')
     source = Path(os.environ['SHIPDRAG_DATA'], LOG)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder, 'log.mcap')
@@ -50,7 +48,6 @@ def main() -> int:
         show_speeds(block)
         show_replay(bag)
         show_cost(source, Path(folder))
-    return 0
 
 
 def write(source: Path, out: Path) -> NmeaResult:
@@ -90,7 +87,7 @@ def show_speeds(block: Block) -> None:
         steps = np.unique(np.round(np.abs(np.diff(speed)), 6))
         step = steps[steps > 0].min()
         moving = speed > 2.0
-        noise = speed - running_median(speed, SMOOTH_S)
+        noise = speed - median_filter(speed, SMOOTH_S, mode='nearest')
         spread = np.sqrt(np.mean(noise[moving] ** 2))
         print(
             f'{channel.input}: step {step:.3f} kn = {step * KNOT:.4f} m/s, '
@@ -111,16 +108,6 @@ def show_speeds(block: Block) -> None:
     at = np.interp(water.stamp_ns, ground.stamp_ns, ground.value[:, 0])
     both = (water.value[:, 0] > 2.0) & (at > 2.0)
     print(f'  log / over ground above 2 m/s: {water.value[both, 0].sum() / at[both].sum():.3f}')
-
-
-def running_median(x: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """
-    Return the running median, (n,) as `x`, shortened at the ends.
-    """
-    padded = np.pad(x, width // 2, mode='edge')
-    return np.asarray(
-        np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1), np.float64
-    )
 
 
 def show_replay(bag: Path) -> None:
@@ -157,4 +144,4 @@ def show_cost(source: Path, folder: Path) -> None:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

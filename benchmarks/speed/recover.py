@@ -18,14 +18,13 @@ growth of the memory on bags of 10, 50 and 200 MB, sound and with a bit flipped 
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import random
 import resource
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Set
+from contextlib import suppress
 from io import BytesIO
 from mmap import mmap
 from pathlib import Path
@@ -37,6 +36,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from benchmarks._asked import asked
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.durable import LiveFile
@@ -171,72 +171,49 @@ def damaged(kind: str, content: bytes, at: int, rng: random.Random) -> Damaged:
 
 
 DAMAGES = (
-    'cut off',
-    'a bit flipped',
-    'a sector of zeros',
-    'a sector of chance',
-    'up to 2000 bytes lost',
+    'cut off', 'a bit flipped', 'a sector of zeros', 'a sector of chance', 'up to 2000 bytes lost',
     'up to 200 bytes inserted',
-)
+)  # fmt: skip
 
 
-@dataclass
-class Tally:
-    """What came out of many damaged bags."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-
-    def add(self, sound: Sound, hurt: Damaged, folder: Path) -> None:
-        """Recover a bag, check what comes out and count it."""
-        hit = {
-            number
-            for start, end, inside in sound.spans
-            if start < hurt.end and hurt.start < end
-            for number in inside
-        }
-        whole = {message for message in sound.messages if message[0] not in hit}
-        source = folder / 'damaged.mcap'
-        source.write_bytes(hurt.content)
-        saved, quarantined = self._recover(source, folder)
-        self.counts += Counter(
-            {
-                'damages': 1,
-                'found': not check([source])[0].sound,
-                'whole': len(whole),
-                'bytes': _bytes(whole),
-                'in sound': len(whole & saved),
-                'in quarantine': len(_known(whole, quarantined) - (whole & saved)),
-                'bytes saved': _bytes((whole & saved) | _known(whole, quarantined)),
-                'partly': len(_known(sound.messages - whole, saved | quarantined)),
-                'false': len(saved - sound.messages),
-            }
-        )
-
-    def _recover(self, source: Path, folder: Path) -> tuple[set[Message], set[Message]]:
-        output = folder / 'saved.mcap'
-        quarantine = folder / 'saved.quarantine.mcap'
-        try:
-            result = recover(source, output)
-        except BagError:
-            return set(), set()  # nothing is left of it
-        found = []
-        for path in (output, quarantine):
-            found.append(set[Message]())
+def tallied(sound: Sound, hurt: Damaged, folder: Path) -> Counter[str]:
+    """Recover a bag, check what comes out and count it."""
+    hit = {
+        number
+        for start, end, inside in sound.spans
+        if start < hurt.end and hurt.start < end
+        for number in inside
+    }
+    whole = {message for message in sound.messages if message[0] not in hit}
+    source = folder / 'damaged.mcap'
+    source.write_bytes(hurt.content)
+    saved, quarantined = set[Message](), set[Message]()
+    counts = Counter(damages=1, found=not check([source])[0].sound)
+    with suppress(BagError):  # nothing is left of it
+        result = recover(source, folder / 'saved.mcap')
+        for path, found in (
+            (result.output, saved),
+            (folder / 'saved.quarantine.mcap', quarantined),
+        ):
             if path.exists():
-                found[-1] |= messages_of(path.read_bytes())
-                self.counts['unsound'] += not check([path])[0].sound
+                found |= messages_of(path.read_bytes())
+                counts['unsound'] += not check([path])[0].sound
                 path.unlink()
-        assert len(found[0]) <= result.messages_recovered
-        return found[0], found[1]
+        assert len(saved) <= result.messages_recovered
+    counts['whole'], counts['bytes'] = len(whole), _bytes(whole)
+    counts['in sound'] = len(whole & saved)
+    counts['in quarantine'] = len(_known(whole, quarantined) - (whole & saved))
+    counts['bytes saved'] = _bytes((whole & saved) | _known(whole, quarantined))
+    counts['partly'] = len(_known(sound.messages - whole, saved | quarantined))
+    counts['false'] = len(saved - sound.messages)
+    return counts
 
 
-def _bytes(messages: set[Message] | frozenset[Message]) -> int:
+def _bytes(messages: Set[Message]) -> int:
     return sum(len(message[3]) for message in messages)
 
 
-def _known(
-    wanted: set[Message] | frozenset[Message], found: set[Message]
-) -> set[Message] | frozenset[Message]:
+def _known(wanted: Set[Message], found: Set[Message]) -> Set[Message]:
     """Return the messages that were found, be their topic known or not."""
     numbers = {(number, log_ns, payload) for number, _, log_ns, payload in found}
     return {m for m in wanted if (m[0], m[2], m[3]) in numbers}
@@ -246,7 +223,7 @@ def salvage(per_cell: int, folder: Path) -> None:
     """Print what is saved, by damage and writer."""
     rng = random.Random(SEED)
     bags = {name: write(options) for name, options in WRITERS.items()}
-    rows: dict[str, Tally] = {name: Tally() for name in (*DAMAGES, *WRITERS, 'all')}
+    rows: dict[str, Counter[str]] = {name: Counter() for name in (*DAMAGES, *WRITERS, 'all')}
     for damage in DAMAGES:
         for name, sound in bags.items():
             for _ in range(per_cell):
@@ -254,14 +231,12 @@ def salvage(per_cell: int, folder: Path) -> None:
                 hurt = damaged(damage, sound.content, at, rng)
                 if hurt.content == sound.content:
                     continue
-                tally = Tally()
-                tally.add(sound, hurt, folder)
+                counts = tallied(sound, hurt, folder)
                 for key in (damage, name, 'all'):
-                    rows[key].counts += tally.counts
+                    rows[key] += counts
     columns = ('damages', 'found', 'whole', 'in sound', 'in quarantine', 'partly', 'false')
     print(f'{"":26}' + ''.join(f'{each:>14}' for each in (*columns, 'unsound', 'bytes saved')))
-    for name, row in rows.items():
-        counts = row.counts
+    for name, counts in rows.items():
         share = counts['bytes saved'] / max(counts['bytes'], 1)
         cells = ''.join(f'{counts[each]:14}' for each in (*columns, 'unsound'))
         print(f'{name:26}{cells}{share:14.3%}')
@@ -276,7 +251,7 @@ def cost(sizes: tuple[int, ...], folder: Path) -> None:
         path = folder / f'{n}.mcap'
         finished(path, encode(record(n)))
         bytes_of.append(path.stat().st_size)
-        uses: dict[str, Callable[[Path], Any]] = {'read': _read, 'check': _check, 'recover': _save}
+        uses: dict[str, Callable[[Path], Any]] = {'read': _read, 'check': _look, 'recover': _save}
         for name, use in uses.items():
             took, grown = zip(*(_measured(use, path) for _ in range(2)), strict=True)
             seconds.setdefault(name, []).append(min(took))
@@ -338,10 +313,6 @@ def _read(path: Path) -> None:
             pass
 
 
-def _check(path: Path) -> None:
-    assert check([path])[0].sound
-
-
 def _look(path: Path) -> None:
     check([path])
 
@@ -375,9 +346,7 @@ def _measured(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
-    parser.add_argument('--quick', action='store_true', help='few damages, small bags')
-    quick = parser.parse_args().quick
+    quick = asked(__doc__, quick=False).quick
     with TemporaryDirectory() as name:
         salvage(2 if quick else 15, Path(name))
         _read_once(Path(name))

@@ -10,14 +10,14 @@ of a process of its own for each bag.
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
 import time
-from importlib.resources import files
+from dataclasses import replace
 from pathlib import Path
 
+from benchmarks._asked import asked
 from shipdrag_ros.bags import BagWriter, Compression, open_runs
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block
@@ -34,13 +34,11 @@ def main() -> None:
     """
     Print a table; with a bag given, replay that one and print its line alone.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('bag', nargs='?', type=Path)
-    bag: Path | None = parser.parse_args().bag
+    bag = asked(__doc__, bag=Path).bag
     if bag is not None:
         _measure(bag)
         return
-    ship = Ship.load(Path(str(files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')))
+    ship = Ship.example()
     print(f'seed {SEED}, best of {ROUNDS}')
     with tempfile.TemporaryDirectory() as folder:
         for compression, coastdowns, lead_in_s in (
@@ -66,7 +64,11 @@ def main() -> None:
                 end='',
                 flush=True,
             )
-            subprocess.run([sys.executable, __file__, str(path)], check=True, timeout=280)
+            subprocess.run(
+                [sys.executable, '-m', 'benchmarks.speed.replay_speed', '--bag', str(path)],
+                check=True,
+                timeout=280,
+            )
 
 
 def _write(
@@ -77,16 +79,10 @@ def _write(
     with BagWriter(path, compression=compression) as bag:
         bag.attach('ship.yaml', ship.to_yaml())
         for number in range(coastdowns):
-            later = number * voyage_ns
-            bag.write_samples(
-                Block(
-                    block.channel,
-                    block.stamp_ns + later,
-                    block.receive_ns + later,
-                    block.value,
-                    block.variance,
-                )
+            stamps, arrivals = (
+                each + number * voyage_ns for each in (block.stamp_ns, block.receive_ns)
             )
+            bag.write_samples(replace(block, stamp_ns=stamps, receive_ns=arrivals))
     return coastdowns * len(block) / (time.process_time() - begun)
 
 

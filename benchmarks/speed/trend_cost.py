@@ -13,13 +13,13 @@ same rule, and a cleaning every two years whatever was measured.
 
 from __future__ import annotations
 
-import argparse
 import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
 
 import numpy as np
 
+from benchmarks._asked import asked
 from benchmarks.accuracy.trend_score import World, ship
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.hull_state import Growth, Mixture, Runs, Steps, search
@@ -83,10 +83,7 @@ def cleaned_at(world: World, economics: Economics, advice: object) -> float:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--ships', type=int, default=20)
-    parser.add_argument('--seed', type=int, default=1)
-    options = parser.parse_args()
+    options = asked(__doc__, ships=20, seed=1)
     rng = np.random.default_rng(options.seed)
     above: dict[str, list[float]] = {'trend': [], 'straight line': [], 'every two years': []}
     for _ in range(options.ships):

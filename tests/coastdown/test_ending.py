@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.propulsion_found import stops
+from benchmarks.worlds.propulsion.cases import stops
 from benchmarks.worlds.propulsion.score import SUITES, score
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Onset
@@ -54,7 +54,7 @@ def test_noise_of_positions_begins_no_other_of_a_ship_that_is_too_slow(
     monkeypatch, kind: str, hull: str, seed: int
 ) -> None:
     monkeypatch.setenv('SPANS', '1')  # no r(v) is estimated
-    (case,) = [each for each in stops([seed], True) if (each.kind, each.hull) == (kind, hull)]
+    (case,) = [each for each in stops(seed) if (each.kind, each.hull) == (kind, hull)]
     (row,) = score(case, {'track': SUITES['track + shaft']})
     assert (row.found, row.why) == (True, '')
 

@@ -75,9 +75,9 @@ def test_two_sound_instruments_give_no_wider_band_than_one() -> None:
 
 def test_a_log_that_is_off_beside_two_sound_sources_is_named_and_spoils_nothing() -> None:
     ship = replace(SHIP, effects=())
-    alone = np.mean([score(Case('', 1, off=True), ship, ship, seed)[0] for seed in range(3)])
+    alone = np.mean([score(Case('', 1, off=True), ship, seed)[0] for seed in range(3)])
     for case in (Case('', 3, off=True), Case('', 2, 1, off=True)):
-        each = np.array([score(case, ship, ship, seed) for seed in range(3)])
+        each = np.array([score(case, ship, seed) for seed in range(3)])
         assert each[:, 0].mean() < 0.4 * alone
         assert each[:, 2].min() > 0.9
     stop_ns = START_NS + 1800 * 10**9

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small sample of benchmarks/accuracy/thrust_law.py: what a shaft does to r."""
+"""What a shaft does to r, whatever law the thrust has."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.thrust_law import CARGO, CASES, LAWS, YACHT, Hull, score
+from benchmarks.accuracy._thrust_law import CARGO, CASES, LAWS, YACHT, Hull, score
 
 RUNS = 3  # seeds 0..2
-SHAFT, WITHOUT, DOUBLED = 0, 2, 3  # of CASES
+SHAFT, WITHOUT, DOUBLED = range(3)  # of CASES
 
 
 @pytest.mark.parametrize(('hull', 'rmse', 'worse'), [(CARGO, 0.013, 0.0), (YACHT, 0.015, 0.005)])

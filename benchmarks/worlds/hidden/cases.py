@@ -19,7 +19,6 @@ from benchmarks.worlds.hidden.library import FIRST_SHELF, SECOND_SHELF
 from benchmarks.worlds.hidden.outside import OUTSIDE
 from benchmarks.worlds.hidden.recording import (
     BETWEEN_RUNS_NS,
-    CONTEXT,
     INPUTS,
     MOTION,
     START_NS,
@@ -33,8 +32,6 @@ from benchmarks.worlds.hidden.sailing import LEAD_IN_S, World, coasting_m_s2, sa
 
 SEED = 20260601
 SHAPE_RMS = 0.01
-RECIPROCAL = 'reciprocal_run'
-TESTS = (RECIPROCAL, *CONTEXT, 'speed_over_ground')
 PAIRS = (
     ('current', 'fouling'),
     ('current', 'log_scale'),
@@ -51,14 +48,6 @@ PAIRS = (
 )
 _BY_NAME = {kind.name: kind for kind in (*FIRST_SHELF, *SECOND_SHELF)}
 _ONE, _SECOND, _PAIR, _OUTSIDE, _NONE, _MISSTATED = 7, 3, 1, 4, 60, 20  # of a kind
-# among the cases whose baseline is as stated
-SHARES: dict[tuple[str, ...], int] = {
-    **{(kind.name,): _ONE for kind in FIRST_SHELF},
-    **{(kind.name,): _SECOND for kind in SECOND_SHELF},
-    **dict.fromkeys(PAIRS, _PAIR),
-    ('unknown',): _OUTSIDE * len(OUTSIDE),
-    (): _NONE,
-}
 
 
 @dataclass(frozen=True)
@@ -103,26 +92,6 @@ class Observation:
 
     ship_file: str
     runs: tuple[Recording, ...]
-
-
-@dataclass(frozen=True)
-class Known:
-    """
-    What an oracle knows besides.
-
-    Attributes
-    ----------
-    hull
-        As the ship file states it.
-    noise
-        Sizes of what is random.
-    duration_s
-        From the stop, at the end of the lead-in, to the end of the record.
-    """
-
-    hull: Hull
-    noise: Noise
-    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -197,33 +166,15 @@ def count() -> int:
     return len(_plans())
 
 
-def observe(number: int, *, added: tuple[str, ...] = ()) -> Observation:
+def observe(number: int) -> Observation:
     """
-    Return what a diagnosis may see of a case.
-
-    Parameters
-    ----------
-    number
-        Of the case, from 0.
-    added
-        Of `TESTS`: what is measured besides. All else keeps its last digit.
+    Return what a diagnosis may see of a case, counted from 0.
     """
-    case = _case(number)
-    condition = _plans()[number].condition
-    runs = 2 if RECIPROCAL in added else condition.runs
-    inputs = {*MOTION, *(CONTEXT if condition.context else ()), *added} - {RECIPROCAL}
-    ordered = tuple(name for name in INPUTS if name in inputs)
+    case, given = _case(number), condition(number)
+    inputs = INPUTS if given.context else MOTION
     return Observation(
-        case.hull.ship_file(), tuple(_run(number, case, k, ordered) for k in range(runs))
+        case.hull.ship_file(), tuple(_run(number, case, k, inputs) for k in range(given.runs))
     )
-
-
-def known(number: int) -> Known:
-    """
-    Return what the oracle alone knows.
-    """
-    case = _case(number)
-    return Known(case.hull, case.noise, case.voyages[0].leg.duration_s)
 
 
 def reveal(number: int) -> Truth:

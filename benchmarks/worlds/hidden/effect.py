@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -61,6 +61,7 @@ class Size:
         return value if not self.signed or rng.random() < 0.5 else -value
 
 
+@dataclass(frozen=True)
 class Effect:
     """
     Nothing; an effect overrides the ways in which it acts.
@@ -104,7 +105,7 @@ class Effect:
         """
         Return what a diagnosis should find.
         """
-        return {size.name: float(getattr(self, size.name)) for size in self.sizes}
+        return {size.name: float(value) for size, value in zip(self.sizes, astuple(self))}
 
     def drag_n(self, leg: Leg, speed: Array) -> Array | float:
         """

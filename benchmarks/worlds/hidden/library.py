@@ -116,9 +116,6 @@ class ShallowWater(Effect):
     def units(cls, leg: Leg) -> tuple[float, ...]:
         return (leg.hull.draught_m,)
 
-    def parameters(self) -> dict[str, float]:
-        return {'depth_m': self.depth}
-
     def depth_m(self) -> float:
         return self.depth
 
@@ -222,9 +219,6 @@ class TowedCable(Effect):
     @classmethod
     def units(cls, leg: Leg) -> tuple[float, ...]:
         return (_drag_area_m2(leg),)
-
-    def parameters(self) -> dict[str, float]:
-        return {'drag_area_m2': self.area}
 
     def drag_n(self, leg: Leg, speed: Array) -> Array:
         return 0.5 * leg.hull.density_kg_m3 * self.area * speed**2

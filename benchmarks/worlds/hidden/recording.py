@@ -20,7 +20,7 @@ START_NS = 1_750_000_000_000_000_000
 BETWEEN_RUNS_NS = 7_200_000_000_000
 MOTION = ('speed_through_water', 'position')
 CONTEXT = ('wind_apparent', 'depth', 'heading', 'shaft')
-INPUTS = (*MOTION, *CONTEXT, 'speed_over_ground')
+INPUTS = (*MOTION, *CONTEXT)
 _EVERY_S = {'position': 3.0, 'wind_apparent': 2.0, 'depth': 2.0}
 _DEEP = 12.0  # draughts of water where nothing is said of the depth
 
@@ -225,12 +225,6 @@ def _position(scene: _Scene, time: Array) -> Array:
     return _rounded(place, scene.noise.position_quantum_m)
 
 
-def _ground_speed(scene: _Scene, time: Array) -> Array:
-    velocity = [np.gradient(scene.motion.position_m[:, k], scene.motion.time_s) for k in range(2)]
-    speed = np.interp(time, scene.motion.time_s, np.hypot(*velocity))
-    return _columns(np.abs(speed + scene.rng.normal(0.0, 0.05, len(time))))
-
-
 def _heading(scene: _Scene, time: Array) -> Array:
     yaw = np.interp(time, scene.motion.time_s, scene.motion.heading_rad)
     yaw = yaw + scene.rng.normal(0.0, 0.005) + scene.rng.normal(0.0, 0.005, len(time))
@@ -273,7 +267,6 @@ def _wind(scene: _Scene, time: Array) -> Array:
 _SENSORS = {
     'speed_through_water': _log,
     'position': _position,
-    'speed_over_ground': _ground_speed,
     'heading': _heading,
     'shaft': _shaft,
     'depth': _depth,

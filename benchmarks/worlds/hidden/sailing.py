@@ -13,7 +13,7 @@ from benchmarks.worlds.hidden.hull import SHAPE_TERMS, Array, Hull
 from benchmarks.worlds.hidden.motion import TABLE_POINTS, Drive, integrate
 
 LEAD_IN_S = 1800.0
-_FINE_FROM_S, _FINE_TO_S = -10.0, 50.0
+_FINE_FROM_S = -10.0
 _FREE_WHEEL = 0.35  # shaft speed of a free-wheeling propeller over that under power
 
 
@@ -59,11 +59,11 @@ class Disturbance:
     swing_rad: Array
 
     @classmethod
-    def none(cls, leg: Leg, *, step_s: float) -> Disturbance:
+    def none(cls, leg: Leg) -> Disturbance:
         """
         Return stillness.
         """
-        n = len(times(leg, step_s=step_s))
+        n = len(times(leg))
         return cls(np.zeros(n), np.zeros((n, 2)), np.zeros(n))
 
 
@@ -90,19 +90,12 @@ class Motion:
     shaft_rad_s: Array
 
 
-def times(leg: Leg, *, step_s: float = 1.0) -> Array:
+def times(leg: Leg) -> Array:
     """
     Return the steps of a run: coarse while it is steady.
-
-    Parameters
-    ----------
-    leg
-    step_s
-        Once the thrust has run down; five of it before the stop.
     """
-    coarse = np.arange(-LEAD_IN_S, _FINE_FROM_S, 5.0 * step_s)
-    fine = np.arange(_FINE_FROM_S, _FINE_TO_S)
-    return np.concatenate([coarse, fine, np.arange(_FINE_TO_S, leg.duration_s + step_s, step_s)])
+    coarse = np.arange(-LEAD_IN_S, _FINE_FROM_S, 5.0)
+    return np.concatenate([coarse, np.arange(_FINE_FROM_S, leg.duration_s + 1.0)])
 
 
 def sail(
@@ -113,7 +106,6 @@ def sail(
     first_heading_rad: float,
     world: World,
     disturbance: Disturbance,
-    step_s: float = 1.0,
 ) -> Motion:
     """
     Sail and coast.
@@ -128,10 +120,8 @@ def sail(
     first_heading_rad
         Of the first run, from which earth-fixed effects count.
     world, disturbance
-    step_s
-        See `times`; the disturbance has the same.
     """
-    time = times(leg, step_s=step_s)
+    time = times(leg)
     drive = _drive(leg, effects, time, world, first_heading_rad)
     drive = drive._replace(
         push_m_s2=drive.push_m_s2 + disturbance.force_m_s2,

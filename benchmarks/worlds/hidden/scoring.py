@@ -16,30 +16,9 @@ from benchmarks.worlds.hidden.cases import Truth
 LARGEST_SET = 3  # names; nothing and unknown may stand beside them
 _SET = 0.9  # what a set holds at least, as the headline has it
 _BINS = 10
-_DRAWS = 200
 _LEAST = 0.003  # probability of an answer that is not listed
 Names = tuple[str, ...]
 UNKNOWN: Names = ('unknown',)
-
-# words of a recommendation -> the test of `cases.TESTS`; the first that is found counts
-_WORDS = (
-    (('reciprocal',), 'reciprocal_run'),
-    (('anemometer', 'wind'), 'wind_apparent'),
-    (('echo sounder', 'depth'), 'depth'),
-    (('shaft',), 'shaft'),
-    (('over ground', 'third source', 'third speed'), 'speed_over_ground'),
-    (('heading', 'compass'), 'heading'),
-)
-
-
-@dataclass(frozen=True)
-class Recommendation:
-    """
-    What would decide; the test is None where the cases cannot try it.
-    """
-
-    test: str | None
-    probability: float | None
 
 
 @dataclass(frozen=True)
@@ -57,7 +36,6 @@ class Answer:
         Names and probability, most probable first; () is none.
     parameters
         Value and standard deviation, by effect and parameter.
-    recommended
     held_out_chi2
         Per sample, after the effect was added.
     """
@@ -66,18 +44,12 @@ class Answer:
     named: Names
     candidates: tuple[tuple[Names, float], ...]
     parameters: Mapping[str, Mapping[str, tuple[float, float]]]
-    recommended: tuple[Recommendation, ...]
     held_out_chi2: float | None
 
     @property
     def first(self) -> tuple[Names, float] | None:
         """The most probable candidate."""
         return self.candidates[0] if self.candidates else None
-
-    @property
-    def tried(self) -> Recommendation | None:
-        """The first recommendation that the cases can try."""
-        return next((each for each in self.recommended if each.test is not None), None)
 
     def holds(self, names: Names) -> bool:
         """
@@ -115,10 +87,6 @@ def parse(found: Mapping[str, Any]) -> Answer:
             }
             for effect in found['effects']
         },
-        tuple(
-            _recommendation(item, (found.get('resolves') or {}).get(item))
-            for item in found.get('would_decide') or ()
-        ),
         after.get('chi2_per_sample'),
     )
 
@@ -127,33 +95,15 @@ def _names(names: Iterable[str]) -> Names:
     return tuple(sorted(name for name in names if name != 'none'))
 
 
-def _recommendation(text: str, probability: float | None) -> Recommendation:
-    for words, test in _WORDS:
-        if any(word in text.lower().replace('_', ' ') for word in words):
-            return Recommendation(test, probability)
-    return Recommendation(None, probability)
-
-
 @dataclass(frozen=True)
 class Trial:
     """
-    One case: the truth, the answer, and what became of it with more measured.
-
-    Attributes
-    ----------
-    cpu_s
-        Of the answer.
-    followed
-        The answer with what it recommends, None where it does not apply.
-    everything
-        The answer with all there is to measure, None where it was not asked.
+    One case: the truth, the answer, and its CPU time.
     """
 
     truth: Truth
     answer: Answer
     cpu_s: float
-    followed: Answer | None = None
-    everything: Answer | None = None
 
 
 @dataclass(frozen=True)
@@ -189,19 +139,6 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
     first_shelf = [trial for trial in ones if trial.truth.shelf == 1]
     named = [trial for trial in ones if trial.answer.verdict == 'named']
     right = [trial for trial in named if _right(trial)]
-    sets = [trial for trial in (*ones, *pairs) if trial.answer.verdict == 'one_of']
-    resolvable = [
-        trial
-        for trial in sets
-        if trial.everything is not None and trial.everything.named == trial.truth.names
-    ]
-    predicted = [
-        (tried.probability, trial.followed.verdict == 'named')
-        for trial in sets
-        if trial.followed is not None
-        and (tried := trial.answer.tried) is not None
-        and tried.probability is not None
-    ]
     chi2 = [
         trial.answer.held_out_chi2 for trial in right if trial.answer.held_out_chi2 is not None
     ]
@@ -245,12 +182,6 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         'parameters within 2 sd': Share.over(
             inside for trial in right for _, inside in _parameters(trial)
         ),
-        'recommended test resolves, of what anything resolves': Share.over(
-            trial.followed is not None and trial.followed.named == trial.truth.names
-            for trial in resolvable
-        ),
-        'error of the predicted probability to resolve': calibration_error(predicted),
-        'the same, by chance, if all were right': error_by_chance(predicted),
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
         'CPU s a case, 95 % are below': float(np.quantile([t.cpu_s for t in trials], 0.95)),
     }
@@ -281,21 +212,6 @@ def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:
         sum(
             abs(probability[place == k].mean() - was_so[place == k].mean()) * np.mean(place == k)
             for k in np.unique(place)
-        )
-    )
-
-
-def error_by_chance(stated: Sequence[tuple[float, bool]]) -> float:
-    """
-    Return the calibration error that right probabilities show in so few outcomes, on average.
-    """
-    rng = np.random.default_rng(0)
-    return float(
-        np.mean(
-            [
-                calibration_error([(p, bool(rng.random() < p)) for p, _ in stated])
-                for _ in range(_DRAWS)
-            ]
         )
     )
 
@@ -340,18 +256,6 @@ def _has_pair(trial: Trial) -> bool:
 
 def _answer_sought(truth: Truth) -> Names:
     return UNKNOWN if truth.kind == 'outside' else truth.names
-
-
-def parameters_inside(trials: Sequence[Trial]) -> dict[str, Share]:
-    """
-    Return how often each parameter is within 2 sd, of effects that are named rightly.
-    """
-    inside: dict[str, list[bool]] = {}
-    for trial in trials:
-        if trial.truth.kind == 'one' and _right(trial):
-            for name, is_inside in _parameters(trial):
-                inside.setdefault(name, []).append(is_inside)
-    return {name: Share.over(found) for name, found in sorted(inside.items())}
 
 
 def _parameters(trial: Trial) -> Iterable[tuple[str, bool]]:

@@ -13,17 +13,17 @@ move r by less than one percent (`everyday`) and are no effect. What is hidden m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.effects import FREE, LIBRARY, SECOND, Draw, Hidden
 from benchmarks.worlds.hidden_b.facts import Facts, draw_facts
 from benchmarks.worlds.hidden_b.hulls import Array, Hull, draw_hull
-from benchmarks.worlds.hidden_b.instruments import CONTEXT, FURTHER, MOTION, Recording, read
+from benchmarks.worlds.hidden_b.instruments import INPUTS, MOTION, Recording, read
 from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.library import FREE, LIBRARY, SECOND
 from benchmarks.worlds.hidden_b.measure import moved, run_down_s
 from benchmarks.worlds.hidden_b.plans import Condition, plans_of
 from benchmarks.worlds.hidden_b.screws import Screw, draw_screw
@@ -35,8 +35,6 @@ from benchmarks.worlds.hidden_b.weather import Weather, draw_weather
 
 SEED = 77_001
 LEAST, MOST, EVERYDAY = 0.03, 0.45, 0.01
-RECIPROCAL, THIRD = 'reciprocal_run', 'third_run'
-TESTS = (RECIPROCAL, *CONTEXT, *FURTHER)
 EPOCH_NS = 1_780_272_000_000_000_000  # 1 June 2026
 
 
@@ -140,29 +138,16 @@ def condition(number: int, seed: int = SEED) -> Condition:
     return plans_of(seed)[number][1]
 
 
-def observe(number: int, *, added: tuple[str, ...] = (), seed: int = SEED) -> Observation:
+def observe(number: int, *, seed: int = SEED) -> Observation:
     """
-    Return what a diagnosis may see of a case.
-
-    Parameters
-    ----------
-    number
-        Of the case, from 0.
-    added
-        Of `TESTS`: what is measured besides; `THIRD`, a third run on another course, too. All
-        else keeps its last digit.
-    seed
-        Of the world.
+    Return what a diagnosis may see of a case, counted from 0, of the world of a seed.
     """
     case, given = _case(number, seed), condition(number, seed)
-    runs = 3 if THIRD in added else max(2, given.runs) if RECIPROCAL in added else given.runs
-    inputs = {*MOTION, *(CONTEXT if given.context else ()), *added} - {RECIPROCAL, THIRD}
-    ordered = tuple(name for name in (*MOTION, *CONTEXT, *FURTHER) if name in inputs)
+    inputs = INPUTS if given.context else MOTION
     readings = []
-    for setting in case.settings[:runs]:
-        track = sail(setting)
+    for setting in case.settings[: given.runs]:
         start = EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
-        readings.append(read(track, setting, case.kit, ordered, start))
+        readings.append(read(sail(setting), setting, case.kit, inputs, start))
     return Observation(case.ship, tuple(readings))
 
 
@@ -226,7 +211,7 @@ def true_r(number: int, speed_m_s: Array, run: int = 0, seed: int = SEED) -> Arr
     hull = setting.hull
     still = np.interp(speed, hull.grid_m_s, setting.still_n())
     grid = np.linspace(0.0, 1.2 * hull.speed_m_s, 160)
-    drag = setting.screw.drag_n(grid, _steady(setting))
+    drag = setting.screw.drag_n(grid, steady_of(setting))
     return (still + np.interp(speed, grid, drag)) / setting.mass_kg
 
 
@@ -244,7 +229,10 @@ def first_speed(number: int, run: int = 0, seed: int = SEED) -> float:
     return _case(number, seed).settings[run].speed_m_s
 
 
-def _steady(setting: Setting) -> tuple[float, float]:
+def steady_of(setting: Setting) -> tuple[float, float]:
+    """
+    Return revs and torque before the stop.
+    """
     need = float(np.interp(setting.speed_m_s, setting.hull.grid_m_s, setting.still_n()))
     return steady_point(setting, need)[1:]
 
@@ -270,7 +258,7 @@ def _case(number: int, seed: int) -> _Case:
     weather, kit, moves = calm(bases, kit)
     bases = tuple(replace(base, weather=weather) for base in bases)
     stated = draw_stated(rng)
-    steady = _steady(bases[0])
+    steady = steady_of(bases[0])
     text = ship_file(hull, screw, steady, run_down_s(bases[0]), stated, number)
     key = (seed, number, 1)
     hidden, sizes = [], []
@@ -374,17 +362,29 @@ def _sized(
 ) -> tuple[Hidden, float]:
     """Return an effect that matters, and by how much it moves r."""
     make = LIBRARY[name][0] if name in LIBRARY else OUTSIDE[name]
+
+    def of(size: float) -> Hidden:
+        rng = np.random.default_rng([*key, place])
+        return make(Draw(rng, base.hull, base.screw, size, base.coast_s, steady))
+
+    size, moves = matters(of, base, kit, LEAST)
+    return of(size), moves
+
+
+def matters(
+    of: Callable[[float], Hidden], base: Setting, kit: Kit, least_r: float
+) -> tuple[float, float]:
+    """
+    Return a size, of what `of` makes of one, that moves r by `least_r` to `MOST`, and by how much.
+    """
     size, least, most = 1.0, 0.0, np.inf
     for _ in range(14):
-        rng = np.random.default_rng([*key, place])
-        drawn = Draw(rng, base.hull, base.screw, size, base.coast_s, steady)
-        effect = make(drawn)
-        changed = fresh(base)
-        effect.apply(changed)
+        tried, changed = size, fresh(base)
+        of(size).apply(changed)
         moves = moved(changed, base, kit)
-        if LEAST <= moves <= MOST:
+        if least_r <= moves <= MOST:
             break
-        least, most = (size, most) if moves < LEAST else (least, size)
+        least, most = (size, most) if moves < least_r else (least, size)
         within = least > 0.0 and np.isfinite(most)
         size = float(np.sqrt(least * most)) if within else size * (1.35 if least else 0.7)
-    return effect, moves
+    return tried, moves

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -40,6 +41,18 @@ class Hidden:
     scope: str
     parameters: dict[str, float]
     apply: Callable[[Setting], None]
+
+
+def hidden(name: str, scope: str, parameters: dict[str, float], **laws: Any) -> Hidden:
+    """
+    Return an effect that adds a law to each of some lists of a setting.
+    """
+
+    def apply(setting: Setting) -> None:
+        for field, law in laws.items():
+            getattr(setting, field).append(law)
+
+    return Hidden(name, scope, parameters, apply)
 
 
 @dataclass(frozen=True)
@@ -90,10 +103,9 @@ def fouling(d: Draw) -> Hidden:
     height = float(heights[min(np.searchsorted(factors, wanted), 199)])
     factor = float(added(height, np.array([speed]))[0] / clean)
 
-    def apply(setting: Setting) -> None:
-        setting.still.append(lambda _, v, r: r + added(height, v))
-
-    return Hidden('fouling', 'hull', {'friction_factor': factor}, apply)
+    return hidden(
+        'fouling', 'hull', {'friction_factor': factor}, still=lambda _, v, r: r + added(height, v)
+    )
 
 
 def shallow_water(d: Draw) -> Hidden:
@@ -124,10 +136,7 @@ def towed_cable(d: Draw) -> Hidden:
     def still(_: Hull, v: Array, r: Array) -> Array:
         return r + 0.5 * SEA[0] * area * v**2 * (np.maximum(v, 0.05 * first) / first) ** -0.12
 
-    def apply(setting: Setting) -> None:
-        setting.still.append(still)
-
-    return Hidden('towed_cable', 'hull', {'drag_area_m2': area}, apply)
+    return hidden('towed_cable', 'hull', {'drag_area_m2': area}, still=still)
 
 
 def locked_propeller(d: Draw) -> Hidden:
@@ -231,10 +240,7 @@ def current_change(d: Draw) -> Hidden:
         part = np.clip(t / d.coast_s, 0.0, 1.0)
         return change * (0.85 * part + 0.15 * part**2 * (3.0 - 2.0 * part))
 
-    def apply(setting: Setting) -> None:
-        setting.shear.append(law)
-
-    return Hidden('current_change', 'earth', {'change_m_s': change}, apply)
+    return hidden('current_change', 'earth', {'change_m_s': change}, shear=law)
 
 
 def turning(d: Draw) -> Hidden:
@@ -249,12 +255,12 @@ def turning(d: Draw) -> Hidden:
         up, down = (t - start) / ramp, (start + lasts - t) / ramp
         return np.clip(np.minimum(up, down), 0.0, 1.0)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(lambda t, u: 0.5 * SEA[0] * area * u * np.abs(u) * grown(t))
-        setting.helm.append(lambda t: turned / (0.85 * lasts) * grown(t))
+    def drags(t: Array, u: Array) -> Array:
+        return 0.5 * SEA[0] * area * u * np.abs(u) * grown(t)
 
     found = {'drag_area_m2': area, 'start_s': start, 'duration_s': lasts}
-    return Hidden('turning', 'run', found, apply)
+    helm = turned / (0.85 * lasts)
+    return hidden('turning', 'run', found, timed=drags, helm=lambda t: helm * grown(t))
 
 
 def added_mass(d: Draw) -> Hidden:
@@ -323,3 +329,31 @@ def time_offset(d: Draw) -> Hidden:
     """Clocks of log and radar apart."""
     value = d.sign * d.rng.uniform(0.03, 0.09) * d.size * d.hull.time_s
     return _fault('time_offset', 'offset_s', 'late_s')(value)
+
+
+FREE = ('declutched', 'electric')
+LIBRARY: dict[str, tuple[Callable[[Draw], Hidden], tuple[str, ...]]] = {
+    'fouling': (fouling, ()),
+    'shallow_water': (shallow_water, ()),
+    'towed_cable': (towed_cable, ()),
+    'locked_propeller': (locked_propeller, FREE),
+    'windmilling_propeller': (windmilling_propeller, ('declutched',)),
+    'residual_thrust': (residual_thrust, FREE),
+    'wind': (wind, ()),
+    'waves': (waves, ()),
+    'current': (current, ()),
+    'log_scale': (log_scale, ()),
+    'log_offset': (log_offset, ()),
+    'radar_scale': (radar_scale, ()),
+    'turning': (turning, ()),
+    'log_lag': (log_lag, ()),
+    'log_dead_band': (log_dead_band, ()),
+    'time_offset': (time_offset, ()),
+    'current_change': (current_change, ()),
+    'added_mass': (added_mass, ()),
+    'displacement': (displacement, ()),
+}
+"""Its maker by name, and the drives that it needs."""
+SECOND = ('log_lag', 'log_dead_band', 'time_offset', 'current_change', 'added_mass',
+          'displacement')  # fmt: skip
+"""The rarer ones."""

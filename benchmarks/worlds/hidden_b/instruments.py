@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.worlds.hidden_b.hulls import Array
-from benchmarks.worlds.hidden_b.kit import KNOT, Kit
+from benchmarks.worlds.hidden_b.kit import Kit
 from benchmarks.worlds.hidden_b.setting import Faults, Setting
 from benchmarks.worlds.hidden_b.voyage import Track
 from benchmarks.worlds.hidden_b.weather import Sinusoids, band
 
 EARTH_M = 6_371_000.0
 MOTION = ('speed_through_water', 'position')
-CONTEXT = ('wind_apparent', 'depth', 'heading', 'shaft')
-FURTHER = ('speed_over_ground',)
+INPUTS = (*MOTION, 'wind_apparent', 'depth', 'heading', 'shaft')
 
 
 @dataclass(frozen=True)
@@ -95,14 +94,14 @@ def read(
     ----------
     track, setting, kit
     inputs
-        Of `MOTION`, `CONTEXT` and `FURTHER`; each has random numbers of its own.
+        Of `INPUTS`; each has random numbers of its own.
     start_ns
         Of the first reading.
     """
     found: dict[str, Series] = {}
     for name in inputs:
-        place = (*MOTION, *CONTEXT, *FURTHER).index(name)
-        found |= _READERS[name](track, setting, kit, setting.stream(20, place), start_ns)
+        rng = setting.stream(20, INPUTS.index(name))
+        found |= _READERS[name](track, setting, kit, rng, start_ns)
     return found
 
 
@@ -200,19 +199,6 @@ def _outer(a: Array, b: Array) -> Array:
     return np.stack([np.stack([a * a, a * b], 1), np.stack([a * b, b * b], 1)], 1)
 
 
-def _over_ground(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    velocity = np.gradient(faulty_place(track, kit, setting.faults), track.t, axis=0)
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    lag, sd, step = (8.0, 0.08, 0.1 * KNOT) if kit.fix == 'radar' else (1.0, 0.03, 0.01)
-    lag = min(lag, 0.05 * setting.hull.time_s)
-    t, stamps, arrivals = _series(rng, kit, track, kit.fix_every_s, start_ns)
-    value = np.interp(t, track.t, filtered(track.t, speed, lag))
-    value = value + band(rng, sd, 5.0, 200.0, 20).at(t)
-    return {'speed_over_ground': Series(stamps, _stepped(np.abs(value), step), arrivals)}
-
-
 def _heading(
     track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
 ) -> dict[str, Series]:
@@ -264,7 +250,6 @@ def _depth(
 _READERS = {
     'speed_through_water': _log,
     'position': _position,
-    'speed_over_ground': _over_ground,
     'heading': _heading,
     'shaft': _shaft,
     'wind_apparent': _wind,

@@ -22,7 +22,6 @@ from scipy.linalg import block_diag, solve_triangular
 from benchmarks.worlds.hidden_b.cases import Known, Observation
 from benchmarks.worlds.hidden_b.effects import Hidden
 from benchmarks.worlds.hidden_b.hulls import Array, Hull
-from benchmarks.worlds.hidden_b.oracle_evidence import EDDIES, HELM, Terms, summed
 from benchmarks.worlds.hidden_b.oracle_noise import Scatter
 from benchmarks.worlds.hidden_b.oracle_priors import (
     SIZES,
@@ -31,11 +30,9 @@ from benchmarks.worlds.hidden_b.oracle_priors import (
     free,
     possible,
     shares,
-    would_decide,
 )
 from benchmarks.worlds.hidden_b.oracle_rows import Run
-from benchmarks.worlds.hidden_b.oracle_sail import made, run_of, sailed, stated
-from benchmarks.worlds.hidden_b.oracle_shared import Change, shared
+from benchmarks.worlds.hidden_b.oracle_sail import Change, made, run_of, sailed, shared, stated
 from benchmarks.worlds.hidden_b.plans import PAIRS
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import steady_point
@@ -51,6 +48,74 @@ _SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
 _GUSTY = {'wind', 'waves'}  # what scatters more itself
 _HOPELESS = 3.0  # chi^2 over the best; more gusts will not mend that
 _DEEP = (0.0625, 0.0125)  # draught over depth where the water does not matter
+
+
+EDDIES = (0.055, 0.1, 0.185)  # percent of the speed: middles of thirds of what is drawn
+HELM = (0.35, 0.65)  # degrees: of halves
+Weather = tuple[float, float]  # sizes of eddies and of helm
+
+
+@dataclass(frozen=True)
+class Terms:
+    """
+    What the evidence of a fit is made of.
+
+    Attributes
+    ----------
+    parts
+        Covariances: of all but eddies and helm, of either of size 1.
+    smooth
+        Columns of smooth unknowns, by name.
+    whole
+        What is off at the middle of the prior, linear about the best.
+    slopes
+        By standard normal numbers.
+    less
+        To be taken from the logarithm.
+    """
+
+    parts: Sequence[Array]
+    smooth: dict[str, Array]
+    whole: Array
+    slopes: Array
+    less: float
+
+    def evidence(self, weather: Weather, kind: str | None = None) -> float:
+        """
+        Return the logarithm of the evidence, with an unknown of a kind beside it.
+        """
+        n = len(self.parts[0])
+        covariance = self.slopes @ self.slopes.T + np.eye(len(self.whole))
+        covariance[:n, :n] += summed(self.parts, weather) - np.eye(n)
+        if kind is not None:
+            covariance[:n, :n] += self.smooth[kind] @ self.smooth[kind].T
+        factor = np.linalg.cholesky(covariance)
+        white = solve_triangular(factor, self.whole, lower=True, check_finite=False)
+        return -0.5 * float(white @ white) - float(np.sum(np.log(np.diag(factor)))) - self.less
+
+    def beside(self, weather: Weather) -> dict[str, float]:
+        """
+        Return the same with each kind of unknown.
+        """
+        return {kind: self.evidence(weather, kind) for kind in self.smooth}
+
+    def weather(self) -> Weather:
+        """
+        Return how large eddies and helm are, by what explains most; unknowns are let in.
+        """
+
+        def best(weather: Weather) -> float:
+            kinds = (None, 'force, quick', 'force and helm')
+            return max(self.evidence(weather, kind) for kind in kinds)
+
+        return max(product(EDDIES, HELM), key=best)
+
+
+def summed(parts: Sequence[Array], weather: Weather) -> Array:
+    """
+    Return the covariance of a row in a weather, of its parts.
+    """
+    return parts[0] + weather[0] ** 2 * parts[1] + weather[1] ** 2 * parts[2]
 
 
 @dataclass(frozen=True)
@@ -85,7 +150,7 @@ def diagnose(seen: Observation, known: Known) -> dict[str, Any]:
 
 class _Oracle:
     def __init__(self, seen: Observation, known: Known) -> None:
-        self.known, self.inputs = known, set(seen.runs[0])
+        self.known = known
         self.stated = stated(seen.ship_file, known)
         hull = self.stated.hull
         self.runs = [Run(run, number, known, hull) for number, run in enumerate(seen.runs)]
@@ -378,9 +443,6 @@ class _Oracle:
             'verdict': verdict,
             'effects': effects,
             'candidates': [{'names': list(names), 'probability': p} for p, names in listed],
-            'would_decide': would_decide(
-                [set(names) for _, names in listed], len(self.runs), self.inputs
-            ),
         }
 
     def _stated(self, chance: float, fit: Fit) -> list[dict[str, Any]]:

@@ -16,9 +16,9 @@ import numpy as np
 from benchmarks.worlds.hidden_b.hulls import AIR, GRAVITY, Array
 from benchmarks.worlds.hidden_b.kit import Kit
 from benchmarks.worlds.hidden_b.oracle_rows import Means, Run
-from benchmarks.worlds.hidden_b.oracle_sail import Sailed, quick
+from benchmarks.worlds.hidden_b.oracle_sail import Sailed
 from benchmarks.worlds.hidden_b.setting import Setting
-from benchmarks.worlds.hidden_b.voyage import Track
+from benchmarks.worlds.hidden_b.voyage import Track, sail_at
 
 _START_SD_M = 100.0  # of the place that is counted from
 _SHAFT_SD = 0.01  # of the revs over those before the stop
@@ -294,7 +294,7 @@ class _Reply:
         steady = np.arange(-round(0.5 * setting.hull.time_s / dt), 0) * dt
         logs = []
         for times in (steady, coast):
-            apart = quick(setting, times, push).water_m_s - quick(setting, times).water_m_s
+            apart = sail_at(setting, times, push).water_m_s - sail_at(setting, times).water_m_s
             logs.append(np.log(np.maximum(apart / push, 1e-6)))
         slope = logs[0][-1] / (steady[-1] - steady[0])
         held = np.where(t < 0.0, slope * t, np.interp(t, coast, logs[1]))

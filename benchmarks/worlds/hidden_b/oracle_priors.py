@@ -9,14 +9,14 @@ each kind is hidden is as in the cases.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.cases import RECIPROCAL, SEED, Known
-from benchmarks.worlds.hidden_b.library import FREE, LIBRARY
+from benchmarks.worlds.hidden_b.cases import SEED, Known
+from benchmarks.worlds.hidden_b.effects import FREE, LIBRARY
 from benchmarks.worlds.hidden_b.plans import plans_of
 from benchmarks.worlds.hidden_b.strangers import OUTSIDE
 
@@ -123,19 +123,3 @@ def possible(known: Known) -> Iterator[str]:
             continue
         if name != 'radar_scale' or known.kit.fix == 'radar':
             yield name
-
-
-def would_decide(candidates: Sequence[set[str]], runs: int, inputs: set[str]) -> list[str]:
-    """
-    Recommend by rule what splits candidates, beside the inputs that there are.
-    """
-    names = set().union(*candidates)
-    turned = {'current', 'wind', 'waves', 'log_offset', 'current_change', 'residual_thrust'}
-    wanted: list[tuple[str, set[str]]] = [
-        (RECIPROCAL, turned if runs == 1 else set()),
-        ('shaft', {'locked_propeller', 'windmilling_propeller', 'residual_thrust'}),
-        ('depth', {'shallow_water'}),
-        ('wind_apparent', {'wind'}),
-        ('heading', {'turning', 'current'}),
-    ]
-    return [test for test, of in wanted if names & of and test not in inputs]

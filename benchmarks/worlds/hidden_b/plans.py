@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.library import LIBRARY, SECOND
+from benchmarks.worlds.hidden_b.effects import LIBRARY, SECOND
 from benchmarks.worlds.hidden_b.strangers import OUTSIDE
 
 PAIRS = (

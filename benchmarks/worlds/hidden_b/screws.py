@@ -14,14 +14,12 @@ stand; `folding` folds.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import atan2, cos, exp, hypot, pi, sin, tanh
+from functools import cached_property
 
 import numpy as np
 
 from benchmarks.worlds.hidden_b.hulls import SEA, Array
-
-LIFT, DRAG, SKIN = 3.2, 1.15, 0.013
-BRAKE = 0.8  # largest drag on the disc, by momentum theory
+from benchmarks.worlds.hidden_b.kernel import DRIVES, HOLDS, loads
 
 
 @dataclass(frozen=True)
@@ -70,28 +68,21 @@ class Screw:
     left: float = 0.0
     left_s: float = 1.0
 
+    @cached_property
+    def numbers(self) -> Array:
+        """What `kernel` needs."""
+        return np.array([
+            self.diameter_m, self.pitch, self.blades, self.wake, 0.5 * SEA[0], self.deduction,
+            self.shafts, DRIVES.index(self.drive), HOLDS.index(self.hold), self.inertia_s,
+            self.coulomb, self.viscous, self.ramp_s, self.stopped, self.stagger_s, self.left,
+            self.left_s,
+        ])  # fmt: skip
+
     def loads(self, revs: float, speed: float, pitch: float | None = None) -> tuple[float, float]:
         """
         Return thrust and torque of one propeller at revs [1/s] and ship speed.
         """
-        advance = (1.0 - self.wake) * speed
-        turn = 0.7 * pi * revs * self.diameter_m
-        flow = hypot(advance, turn)
-        if flow < 1e-9:
-            return 0.0, 0.0
-        angle = atan2(advance, turn)
-        attack = atan2(self.pitch if pitch is None else pitch, 0.7 * pi) - angle
-        lift = LIFT * sin(attack) * cos(attack)
-        drag = SKIN + DRAG * sin(attack) ** 2
-        disc = 0.25 * pi * self.diameter_m**2
-        dynamic = 0.5 * SEA[0] * self.blades * disc * flow**2
-        thrust = dynamic * (lift * cos(angle) - drag * sin(angle))
-        torque = dynamic * 0.35 * self.diameter_m * (lift * sin(angle) + drag * cos(angle))
-        if thrust < 0.0:
-            largest = BRAKE * (0.3 if self.drive == 'cpp' else 1.0) * 0.5 * SEA[0] * disc
-            largest *= advance**2 + 1e-9
-            thrust = -largest * tanh(-thrust / largest)
-        return thrust, torque
+        return loads(self.numbers, revs, speed, self.pitch if pitch is None else pitch)
 
     def revs_for(self, thrust: float, speed: float) -> float:
         """
@@ -142,18 +133,6 @@ class Screw:
         Return the drag of all propellers long after the stop.
         """
         return np.array([-self.shafts * self.settled(float(v), steady)[1] for v in speeds])
-
-    def engine(self, t: float, revs: float, steady: tuple[float, float], late: float) -> float:
-        """
-        Return the torque of the engine, t [s] after the stop.
-        """
-        since = t - late
-        if since < 0.0:
-            if self.hold == 'power':
-                return steady[1] * steady[0] / max(revs, 0.3 * steady[0])
-            return steady[1]
-        held = self.left * exp(-since / self.left_s)
-        return steady[1] * max(held, 1.0 - since / self.ramp_s)
 
 
 def draw_screw(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.effects import Draw, Hidden, hidden
 from benchmarks.worlds.hidden_b.hulls import Array
 from benchmarks.worlds.hidden_b.setting import Setting
 
@@ -28,10 +28,7 @@ def swinging_force(d: Draw) -> Hidden:
         swing = np.sin(2 * np.pi * (t - start) / period + phase)
         return share * force * swing * np.clip((t - start) / (0.1 * period), 0.0, 1.0)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden('swinging_force', 'run', {'share': share, 'period_s': period}, apply)
+    return hidden('swinging_force', 'run', {'share': share, 'period_s': period}, timed=law)
 
 
 def dragging_anchor(d: Draw) -> Hidden:
@@ -44,10 +41,7 @@ def dragging_anchor(d: Draw) -> Hidden:
         uneven = 1.0 + 0.35 * np.sin(2 * np.pi * t / jerk + phase)
         return force * uneven * _along(u) * np.clip((t - start) / 10.0, 0.0, 1.0)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden('dragging_anchor', 'run', {'force_n': force, 'start_s': start}, apply)
+    return hidden('dragging_anchor', 'run', {'force_n': force, 'start_s': start}, timed=law)
 
 
 def ice(d: Draw) -> Hidden:
@@ -60,10 +54,7 @@ def ice(d: Draw) -> Hidden:
         inside = ((t > edges[0]) & (t < edges[1])) | ((t > edges[2]) & (t < edges[3]))
         return inside * force * (0.6 * _along(u) + 0.4 * u / first)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden('ice', 'run', {'force_n': force}, apply)
+    return hidden('ice', 'run', {'force_n': force}, timed=law)
 
 
 def bank(d: Draw) -> Hidden:
@@ -95,10 +86,7 @@ def list_change(d: Draw) -> Hidden:
     def law(t: Array, u: Array) -> Array:
         return 512.0 * area * u * np.abs(u) * np.clip((t - start) / takes, 0.0, 1.0)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden('list_change', 'run', {'share': share, 'start_s': start}, apply)
+    return hidden('list_change', 'run', {'share': share, 'start_s': start}, timed=law)
 
 
 def caught_net(d: Draw) -> Hidden:
@@ -109,10 +97,7 @@ def caught_net(d: Draw) -> Hidden:
     def law(t: Array, u: Array) -> Array:
         return 512.0 * area * u * np.abs(u) * ((t > start) & (t < start + lasts))
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden('caught_net', 'run', {'start_s': start, 'duration_s': lasts}, apply)
+    return hidden('caught_net', 'run', {'start_s': start, 'duration_s': lasts}, timed=law)
 
 
 def gyro_ballistic(d: Draw) -> Hidden:

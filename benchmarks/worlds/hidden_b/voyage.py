@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, pi
+from math import pi
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.hulls import AIR, Array, Hull
+from benchmarks.worlds.hidden_b.hulls import AIR, Array
+from benchmarks.worlds.hidden_b.kernel import air, go
 from benchmarks.worlds.hidden_b.screws import Screw
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.weather import band, gusts
@@ -50,20 +51,6 @@ class Track:
     steady: tuple[float, float]
 
 
-def air_force_n(hull: Hull, ahead: float, port: float) -> float:
-    """
-    Return the force of the relative wind along the ship, ahead positive.
-
-    Longitudinal coefficient of a boxy ship: cos(a) with a third harmonic, as in Isherwood's data.
-    """
-    square = ahead * ahead + port * port
-    if square < 1e-12:
-        return 0.0
-    c = ahead / square**0.5
-    shape = c - 0.12 * (4.0 * c**3 - 3.0 * c - c)
-    return 0.5 * AIR * hull.frontal_m2 * hull.air_drag * square * shape
-
-
 def steady_point(setting: Setting, need_n: float) -> tuple[Screw, float, float]:
     """
     Return the propeller, its revs and its torque at the steady speed.
@@ -84,114 +71,71 @@ def sail(setting: Setting) -> Track:
     """
     Sail a run.
     """
-    hull, dt = setting.hull, setting.step_s
+    dt = setting.step_s
     before = 0.0 if setting.quiet else setting.lead_s
     t = np.arange(-round(before / dt), round(setting.coast_s / dt) + 1) * dt
-    n = len(t)
+    return sail_at(setting, t)
+
+
+def sail_at(setting: Setting, t: Array, push_m_s: float = 0.0) -> Track:
+    """
+    Sail a run at given times; the engine stops at 0, whenever the times begin.
+
+    Parameters
+    ----------
+    setting
+    t
+        Even.
+    push_m_s
+        Change of the first speed, for which the engine was not set.
+    """
+    hull, dt, n = setting.hull, setting.step_s, len(t)
     heading, lateral = _heading(setting, t)
     wind, flow, lag = _weather(setting, t, heading)
     c, s = np.cos(heading), np.sin(heading)
-    wind_ahead, wind_port = wind[:, 0] * c + wind[:, 1] * s, -wind[:, 0] * s + wind[:, 1] * c
-    flow_ahead, flow_port = flow[:, 0] * c + flow[:, 1] * s, -flow[:, 0] * s + flow[:, 1] * c
-    waves = np.zeros(n), np.zeros(n)
-    for law in setting.waves:
+    past = wind - flow
+    ahead, port = past[:, 0] * c + past[:, 1] * s, -past[:, 0] * s + past[:, 1] * c
+    at_rest, slope, square = np.zeros(n), np.zeros(n), np.zeros(n)
+    for wave in setting.waves:
         rng = None if setting.quiet else setting.stream(7)
-        at_rest, slope = law(t, heading, setting.period_s, rng)
-        waves = waves[0] + at_rest, waves[1] + slope
-    table, spacing = setting.still_n().tolist(), float(hull.grid_m_s[1])
+        more = wave(t, heading, setting.period_s, rng)
+        at_rest, slope = at_rest + more[0], slope + more[1]
+    others = []  # those that do not go with the square of the speed
+    for timed in setting.timed:
+        one, four = (timed(t, np.full(n, u)) for u in (1.0, 2.0))
+        if np.allclose(four, 4.0 * one, rtol=1e-12, atol=1e-9):
+            square = square + one
+        else:
+            others.append(timed)
+    table, still_air = setting.still_n(), 0.5 * AIR * hull.frontal_m2 * hull.air_drag
+    u, lead = setting.speed_m_s, 1
+    if not setting.quiet:
+        lead = max(1, round(setting.lead_s / dt))
+    mean = float(np.mean([
+        air(ahead[i] - u, port[i], still_air) + still_air * u * u - at_rest[i] - slope[i] * u
+        for i in range(0, lead, 1 + lead // 300)
+    ]))  # fmt: skip
+    at_first = sum(float(f(np.array([-1.0]), np.array([u]))[0]) for f in setting.timed)
+    need = float(np.interp(u, hull.grid_m_s, table)) - mean + at_first
+    screw, *steady = steady_point(setting, need)
     inertia = setting.mass_kg * (1.0 + setting.n_r)
-    still_air = 0.5 * AIR * hull.frontal_m2 * hull.air_drag
-
-    def resistance(u: float) -> float:
-        place = min(abs(u) / spacing, len(table) - 1.001)
-        i = int(place)
-        found = table[i] + (place - i) * (table[i + 1] - table[i])
-        return found if u >= 0.0 else -found
-
-    def outside(i: int, u: float) -> float:
-        ahead, port = wind_ahead[i] - u - flow_ahead[i], wind_port[i] - flow_port[i]
-        air = air_force_n(hull, ahead, port) + still_air * u * abs(u)
-        return air - waves[0][i] - waves[1][i] * u
-
-    u = setting.speed_m_s
-    lead = max(1, round(before / dt))
-    mean = float(np.mean([outside(i, u) for i in range(0, lead, 1 + lead // 300)]))
-    timed = sum(float(f(np.array([-1.0]), np.array([u]))[0]) for f in setting.timed)
-    screw, revs0, torque0 = steady_point(setting, resistance(u) - mean + timed)
-    shafts = _Shafts(screw, (revs0, torque0), setting.quiet)
-    water, force = np.empty(n), np.empty(n)
-    turns, pitch = np.empty((n, screw.shafts)), np.empty(n)
-    one_t, one_u = np.empty(1), np.empty(1)
-    for i in range(n):
-        thrust = shafts.step(float(t[i]), u, dt)
-        water[i], turns[i], pitch[i] = u, shafts.revs, shafts.pitch
-        total = thrust - resistance(u) + outside(i, u)
-        one_t[0], one_u[0] = t[i], u
-        for each in setting.timed:
-            total -= each(one_t, one_u)[0]
-        force[i] = total
-        rate = total / inertia - lag[i] / (1.0 + setting.n_r)
-        after = u + rate * dt
-        u = after - 0.5 * dt * (resistance(after) - resistance(u)) / inertia
+    body = np.array([hull.grid_m_s[1], inertia, 1.0 + setting.n_r, still_air])
+    revs, rows = np.full(screw.shafts, steady[0]), np.empty((3, n))
+    turns, u = np.empty((n, screw.shafts)), u + push_m_s
+    acts = np.stack([ahead, port, at_rest, slope, square, lag])
+    given = (t, acts, table, body, screw.numbers, np.array(steady), revs, rows, turns)
+    for i, j in zip(range(n), range(1, n + 1)) if others else [(0, n)]:
+        other = float(sum(each(t[i:j], np.array([u]))[0] for each in others))
+        u = go(i, j, u, other, *given)
+    water, pitch, force = rows
     sideways = lateral * water
-    ground = np.stack(
-        [water * c - sideways * s + flow[:, 0], water * s + sideways * c + flow[:, 1]], axis=1
-    )
+    ground = np.stack([water * c - sideways * s, water * s + sideways * c], axis=1) + flow
     steps = 0.5 * (ground[1:] + ground[:-1]) * dt
     place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
-    apparent = np.stack([wind_ahead - water - flow_ahead, wind_port - flow_port - sideways], 1)
+    apparent = np.stack([ahead - water, port - sideways], 1)
     return Track(
-        t, water, ground, place, heading, 2 * pi * turns, pitch, apparent, force, (revs0, torque0)
+        t, water, ground, place, heading, 2 * pi * turns, pitch, apparent, force, (*steady,)
     )
-
-
-class _Shafts:
-    """The shafts of a ship, step by step."""
-
-    def __init__(self, screw: Screw, steady: tuple[float, float], quiet: bool) -> None:
-        self.screw, self.steady = screw, steady
-        self.revs = [steady[0]] * screw.shafts
-        self.pitch = screw.pitch
-        self.inertia = screw.inertia_s * steady[1] / max(steady[0], 1e-9)
-        self.quiet = quiet
-
-    def step(self, t: float, u: float, dt: float) -> float:
-        """
-        Return the force of all propellers on the ship, and go on by a step.
-        """
-        screw, total = self.screw, 0.0
-        if screw.drive == 'cpp':
-            gone = min(max(t / screw.ramp_s, 0.0), 1.0)
-            self.pitch = screw.pitch * (1.0 - gone)
-        for k in range(screw.shafts):
-            late = screw.stagger_s * k
-            thrust = screw.loads(self.revs[k], u, self.pitch)[0]
-            if screw.drive == 'folding' and t >= late:
-                thrust = thrust * max(0.0, 1.0 - (t - late) / screw.ramp_s)
-            total += thrust * (1.0 - screw.deduction) if thrust > 0.0 else thrust
-            self.revs[k] = self._turn(self.revs[k], t, u, dt, late)
-        return total
-
-    def _turn(self, revs: float, t: float, u: float, dt: float, late: float) -> float:
-        screw, steady = self.screw, self.steady
-        since = t - late
-        if screw.drive == 'cpp':
-            gone = min(max(since / screw.ramp_s, 0.0), 1.0)
-            return steady[0] * (1.0 - gone * (1.0 - screw.stopped))
-        if screw.drive in ('locked', 'folding') and since >= 0.0:
-            return max(0.0, steady[0] * (1.0 - since / screw.ramp_s))
-        if since < 0.0 and screw.hold == 'revs':
-            return steady[0]
-        parts = ceil(12.0 * dt / screw.inertia_s)
-        for _ in range(parts):
-            drive = screw.engine(t, revs, steady, late)
-            load = screw.loads(revs, u)[1]
-            if since >= 0.0:
-                load += screw.friction(revs, steady)
-            revs += (drive - load) / self.inertia * dt / parts
-            if revs <= 0.0:
-                return 0.0
-        return revs
 
 
 def _heading(setting: Setting, t: Array) -> tuple[Array, Array]:

@@ -240,7 +240,6 @@ OTHERS: dict[str, Callable[[_Draft], None]] = {
     'current changes': _nothing,
     'harbour in steps': _harbour,
 }
-STEADY = 'steady'
 _DRIVES = {
     'direct drive, fuel cut': DIRECT,
     'declutched, shaft locked': CLUTCHED,
@@ -250,7 +249,7 @@ _DRIVES = {
 }
 
 
-def plan(case: Case, random: np.random.Generator, hours: float = 8.0) -> Plan:
+def plan(case: Case, random: np.random.Generator) -> Plan:
     """
     Draw what a case does.
     """
@@ -261,7 +260,7 @@ def plan(case: Case, random: np.random.Generator, hours: float = 8.0) -> Plan:
         hull=hull,
         random=random,
         at=PRE_ROLL_S + lead,
-        seconds=PRE_ROLL_S + (int(hours * 3600) if case.kind == STEADY else lead + after),
+        seconds=PRE_ROLL_S + lead + after,
         drive=_drive(case, random),
         hold=Hold(int(random.integers(3))),
         shafts=_shafts(case, hull, random),
@@ -269,7 +268,7 @@ def plan(case: Case, random: np.random.Generator, hours: float = 8.0) -> Plan:
         pitch_heard=case.kind == 'pitch to zero, pitch heard'
         or (case.kind == 'crash stop' and hull.name == 'ferry'),
     )
-    {**STOPS, **OTHERS, STEADY: _nothing}[case.kind](draft)
+    {**STOPS, **OTHERS}[case.kind](draft)
     return Plan(
         draft.drive,
         draft.hold,
@@ -319,3 +318,24 @@ def disturbed(
         along = np.outer([np.cos(way), np.sin(way)], change)
         return replace(around, current=around.current + along)
     return around
+
+
+def stops(seed: int) -> list[Case]:
+    """
+    Return the coastdowns of a seed: every way and ship, a sea in turn.
+    """
+    return [
+        Case(kind, hull, list(SEAS)[(i + j) % 3], seed)
+        for i, kind in enumerate(STOPS)
+        for j, hull in enumerate(HULLS)
+    ]
+
+
+def others(seed: int) -> list[Case]:
+    """
+    Return the manoeuvres that are no coastdown, each with a ship and a sea in turn.
+    """
+    return [
+        Case(kind, list(HULLS)[i % 3], list(SEAS)[(seed + i) % 3], seed)
+        for i, kind in enumerate(OTHERS)
+    ]

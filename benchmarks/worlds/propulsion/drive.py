@@ -63,7 +63,6 @@ DIRECT = Drive('direct two-stroke', False, 2.5, 0.09, 0.09)
 CLUTCHED = Drive('four-stroke, clutch', True, 1.5, 0.10, 0.012)
 GEARBOX = Drive('outboard or gearbox', True, 0.6, 0.08, 0.010)
 ELECTRIC = Drive('electric', False, 1.0, 0.012, 0.012)
-DRIVES = {drive.name: drive for drive in (DIRECT, CLUTCHED, GEARBOX, ELECTRIC)}
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from benchmarks.worlds.propulsion.cases import Case
 from benchmarks.worlds.propulsion.motion import ROW_S
 from benchmarks.worlds.propulsion.world import Truth, World, build, inputs, seconds
 from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import EndedCoastdown, Onset
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import in_arrival_order
@@ -31,10 +32,6 @@ INPUTS: dict[str, tuple[str, ...]] = {
 SUITES = {
     **INPUTS,
     **{f'{name} + shaft': (*instruments, 'shaft') for name, instruments in INPUTS.items()},
-}
-WITH_HEADING = {
-    'log + heading': ('log', 'heading'),
-    'log + heading + shaft': ('log', 'heading', 'shaft'),
 }
 FEWER = (
     ('log', 'log + shaft'),
@@ -74,12 +71,6 @@ class Row:
     rms, cover
         Of r against the truth over the valid range: relative to r's maximum; share within
         2 sigma. NaN without.
-    refused
-        Coastdowns reported without an estimate.
-    withdrawn
-        Coastdowns taken back when they ended; they count as not reported.
-    said
-        What the program says of candidates that it dismissed.
     sure_s
         Of what it says last of each moment about slow-downs: in how long she glides with a
         probability of 0.7 or more, how much of that it expects, in how much she does, and in how
@@ -99,18 +90,14 @@ class Row:
     wrong_live: int
     rms: float
     cover: float
-    refused: int
-    withdrawn: int
-    record_s: float
-    said: str
     sure_s: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
-def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
+def score(case: Case, suites: dict[str, tuple[str, ...]]) -> list[Row]:
     """
     Make a case and give it to the program under each suite.
     """
-    world = build(case, hours)
+    world = build(case)
     return [_one(world, name, instruments) for name, instruments in suites.items()]
 
 
@@ -125,13 +112,13 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         *monitor.update(in_arrival_order(inputs(world, instruments))),
         *monitor.finish(),
     ]
-    ended = _named(events, 'EndedCoastdown')
-    # a version of the program that takes nothing back says nothing of it
-    standing = [event for event in ended if not getattr(event, 'withdrawn', False)]
-    kept = [event for event in standing if event.estimate is not None]
+    ended = [event for event in events if isinstance(event, EndedCoastdown)]
+    kept = [event for event in ended if not event.withdrawn and event.estimate is not None]
     spans = [(seconds(event.start_ns), seconds(event.end_ns)) for event in kept]
     onsets = [
-        (seconds(event.start_ns), seconds(event.detected_ns)) for event in _named(events, 'Onset')
+        (seconds(event.start_ns), seconds(event.detected_ns))
+        for event in events
+        if isinstance(event, Onset)
     ]
     truth = world.truth
     why, best = _lacks(truth, spans)
@@ -160,10 +147,6 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         sum(_driven_s(truth, span) > DRIVEN_S or _is_idle(truth, span) for span in onsets),
         rms,
         cover,
-        len(standing) - len(kept),
-        len(ended) - len(standing),
-        truth.seconds,
-        _said(truth, events),
         _sure(truth, ended),
     )
 
@@ -172,7 +155,7 @@ def _sure(truth: Truth, ended: list[Any]) -> tuple[float, float, float, float]:
     """Return how long she is said to glide, of that expected and true, and how long besides."""
     said: dict[int, tuple[float, float]] = {}  # each moment once, as it was said last
     for event in ended:
-        regimes = getattr(event, 'regimes', None)
+        regimes = event.regimes
         if regimes is None or len(regimes.time_ns) < 2:
             continue
         rows = np.round(seconds(regimes.time_ns) / ROW_S).astype(int).tolist()
@@ -186,21 +169,6 @@ def _sure(truth: Truth, ended: list[Any]) -> tuple[float, float, float, float]:
             found += step_s * np.array([not idle, not idle and chance, glides, idle])
     said_s, expected_s, true_s, idle_s = found.tolist()
     return said_s, expected_s, true_s, idle_s
-
-
-def _named(events: list[Any], name: str) -> list[Any]:
-    """Events by the name of their class: older versions have fewer."""
-    return [event for event in events if type(event).__name__ == name]
-
-
-def _said(truth: Truth, events: list[Any]) -> str:
-    """Why the program dismissed what overlaps the glide, in its own words."""
-    begin, end = truth.glide or (0.0, truth.seconds)
-    return '; '.join(
-        f'{event.reason.value}: {event.text}'
-        for event in _named(events, 'NotCoastdown')
-        if seconds(event.end_ns) > begin and seconds(event.start_ns) < end
-    )
 
 
 def _driven_s(truth: Truth, span: tuple[float, float]) -> float:

@@ -70,13 +70,13 @@ class World:
     plan: Plan
 
 
-def build(case: Case, hours: float = 8.0) -> World:
+def build(case: Case) -> World:
     """
     Make a case; its seed and name decide everything.
     """
     random = case.random
     hull = case.ship
-    plan_ = plan(case, random, hours)
+    plan_ = plan(case, random)
     seconds = plan_.orders.mode.shape[1]
     course = float(random.uniform(-np.pi, np.pi))
     around, weather = surroundings(hull, case.weather, course, seconds, random)

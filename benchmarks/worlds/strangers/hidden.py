@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.worlds.hidden_b import strangers as b
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.effects import Draw, Hidden, hidden
 from benchmarks.worlds.hidden_b.hulls import SEA, Array
 from benchmarks.worlds.hidden_b.setting import Setting
 
@@ -33,10 +33,7 @@ def _rising(x: Array, width: float) -> Array:
 
 
 def _acting(name: str, law: Callable[[Array, Array], Array], **sizes: float) -> Hidden:
-    def apply(setting: Setting) -> None:
-        setting.timed.append(law)
-
-    return Hidden(name, 'hull', sizes, apply)
+    return hidden(name, 'hull', sizes, timed=law)
 
 
 def _drag(area: float, u: Array) -> Array:

@@ -8,17 +8,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.cases import EPOCH_NS, LEAST, MOST, calm, fresh
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden
+from benchmarks.worlds.hidden_b.cases import EPOCH_NS, LEAST, calm, fresh, matters, steady_of
+from benchmarks.worlds.hidden_b.effects import FREE, Draw, Hidden
 from benchmarks.worlds.hidden_b.hulls import Array, draw_hull
-from benchmarks.worlds.hidden_b.instruments import CONTEXT, MOTION, Recording, read
+from benchmarks.worlds.hidden_b.instruments import INPUTS, Recording, read
 from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.library import FREE
-from benchmarks.worlds.hidden_b.measure import moved, quiet, run_down_s, seen
+from benchmarks.worlds.hidden_b.measure import quiet, run_down_s, seen
 from benchmarks.worlds.hidden_b.screws import draw_screw
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.shipfile import draw_stated, ship_file
-from benchmarks.worlds.hidden_b.voyage import sail, steady_point
+from benchmarks.worlds.hidden_b.voyage import sail
 from benchmarks.worlds.hidden_b.weather import draw_weather
 from benchmarks.worlds.strangers.hidden import STRANGERS
 
@@ -57,7 +56,7 @@ class Case:
         """
         setting = self.settings[run]
         start = EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
-        return read(sail(setting), setting, self.kit, (*MOTION, *CONTEXT), start)
+        return read(sail(setting), setting, self.kit, INPUTS, start)
 
     def shown(self, run: int) -> tuple[Array, Array, Array, Array]:
         """
@@ -111,23 +110,23 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
         legs = tuple(base for base in bases if base.weather is days[which])
         weather, kit, _ = calm(legs[:3], kit)
         bases = [replace(b, weather=weather) if b.weather is days[which] else b for b in bases]
-    steady = _steady(bases[0])
+    key, steady = (seed, number, ship), steady_of(bases[0])
     text = ship_file(hull, screw, steady, run_down_s(bases[0]), draw_stated(rng), ship)
     settings = [fresh(base) for base in bases]
     hidden: Hidden | None = None
     if stranger:
-        size = _size(stranger, bases[0], kit, steady, (seed, number, ship))
+        size, _ = matters(
+            lambda size: _made(stranger, size, bases[0], steady, key, 0),
+            bases[0],
+            kit,
+            1.5 * LEAST,
+        )
         for run, setting in enumerate(settings):
-            made = _made(stranger, size, bases[0], steady, (seed, number, ship), run)
+            made = _made(stranger, size, bases[0], steady, key, run)
             hidden = hidden or made
             made.apply(setting)
     found = {} if hidden is None else hidden.parameters
     return Case(stranger, text, kit, tuple(bases), tuple(settings), found)
-
-
-def _steady(setting: Setting) -> tuple[float, float]:
-    need = float(np.interp(setting.speed_m_s, setting.hull.grid_m_s, setting.still_n()))
-    return steady_point(setting, need)[1:]
 
 
 def _made(
@@ -146,24 +145,3 @@ def _made(
         if found.scope != 'run':
             break
     return found
-
-
-def _size(
-    name: str,
-    base: Setting,
-    kit: Kit,
-    steady: tuple[float, float],
-    key: tuple[int, ...],
-) -> float:
-    """Return a size at which the stranger matters in the first run."""
-    size, least, most = 1.0, 0.0, np.inf
-    for _ in range(14):
-        changed = fresh(base)
-        _made(name, size, base, steady, key, 0).apply(changed)
-        moves = moved(changed, base, kit)
-        if 1.5 * LEAST <= moves <= MOST:
-            break
-        least, most = (size, most) if moves < 1.5 * LEAST else (least, size)
-        within = least > 0.0 and np.isfinite(most)
-        size = float(np.sqrt(least * most)) if within else size * (1.35 if least else 0.7)
-    return size

@@ -17,25 +17,20 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.samples import Channel, concatenate
 
 
-def _found(
-    verdict, *, effects=(), candidates=(), would_decide=None, held_out=None, parameters=None
-):
+def _found(verdict, *, effects=(), candidates=(), held_out=None, parameters=None):
     return {
         'verdict': verdict,
         'effects': [
             {'name': name, 'probability': 0.99, 'parameters': parameters or {}} for name in effects
         ],
         'candidates': [{'names': list(names), 'probability': p} for names, p in candidates],
-        'would_decide': list(would_decide or {}),
-        'resolves': would_decide or {},
         'gap': {'held_out_after': {'chi2_per_sample': held_out}},
     }
 
 
-def _trial(found, *names, kind='one', shelf=1, parameters=None, **more):
+def _trial(found, *names, kind='one', shelf=1, parameters=None):
     truth = cases.Truth(kind, shelf, names, parameters or {}, cases.CONDITIONS[0])
-    answers = {key: scoring.parse(value) for key, value in more.items()}
-    return scoring.Trial(truth, scoring.parse(found), 1.0, **answers)
+    return scoring.Trial(truth, scoring.parse(found), 1.0)
 
 
 def _share(scores, name):
@@ -88,47 +83,6 @@ def test_parameters_and_held_out_runs_count_for_right_names_alone() -> None:
     assert _share(scores, 'held-out chi^2 per sample <= 1.1') == (2, 2)
 
 
-def test_a_recommendation_counts_where_anything_resolves() -> None:
-    one_of = _found(
-        'one_of',
-        candidates=[(['current'], 0.6), (['log_offset'], 0.4)],
-        would_decide={'a run on the reciprocal heading': 0.9},
-    )
-    named = _found('named', effects=['current'])
-    scores = scoring.scores(
-        [
-            _trial(one_of, 'current', followed=named, everything=named),
-            _trial(one_of, 'current', followed=one_of, everything=named),
-            _trial(one_of, 'current', followed=one_of, everything=one_of),
-        ]
-    )
-    name = 'recommended test resolves, of what anything resolves'
-    assert _share(scores, name) == (1, 2)
-    found = scores['error of the predicted probability to resolve']
-    assert found == pytest.approx(0.9 - 1.0 / 3.0)
-    # of three that are right at 0.9: 0.73 x 0.1 + 0.24 x 0.23 + 0.03 x 0.57 (N 200, seed 0)
-    by_chance = scores['the same, by chance, if all were right']
-    assert by_chance == pytest.approx(0.146, abs=0.03)
-
-
-@pytest.mark.parametrize(
-    ('text', 'test'),
-    [
-        ('a run on the reciprocal heading', 'reciprocal_run'),
-        ('an anemometer (wind_apparent)', 'wind_apparent'),
-        ('an echo sounder (depth)', 'depth'),
-        ('a compass (heading)', 'heading'),
-        ('the shaft speed (shaft)', 'shaft'),
-        ('a third source of speed, GNSS beside log and radar', 'speed_over_ground'),
-        ('speed_over_ground', 'speed_over_ground'),
-        ('a run after the hull is cleaned', None),
-    ],
-)
-def test_recommendations_are_understood(text, test) -> None:
-    answer = scoring.parse(_found('one_of', would_decide={text: None}))
-    assert answer.recommended[0].test == test
-
-
 def test_calibration_error_of_honest_and_of_boastful_answers() -> None:
     honest = [(0.75, k % 4 > 0) for k in range(400)]
     boastful = [(0.99, k % 2 > 0) for k in range(400)]
@@ -175,16 +129,9 @@ def test_ten_cases_are_scored_and_a_broken_run_goes_on(
     assert lines[:4] == first
     assert [json.loads(line)['case'] for line in lines] == list(range(10))
     assert '10 of 996 cases, seed 20260601' in printed
-    figures = json.loads(out.with_suffix('.json').read_text())['figures']
-    assert figures['alarm, nothing hidden'] == {'count': 0, 'of': 4}
-    assert figures['unknown, outside the library']['count'] == 0
-
-
-def test_the_oracle_tells_what_is_far_above_the_noise() -> None:
-    # a dead band, a log that sticks, and nothing
-    found = [score.answer('oracle', 'blocks', number)['found'] for number in (2, 3, 4)]
-    assert [one['verdict'] for one in found] == ['named', 'unknown', 'none']
-    assert found[0]['effects'][0]['name'] == 'log_dead_band'
+    figures = scoring.scores(score.trials([json.loads(line) for line in lines]))
+    assert _share(figures, 'alarm, nothing hidden') == (0, 4)
+    assert figures['unknown, outside the library'].count == 0
 
 
 def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
@@ -201,15 +148,15 @@ def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
         return 0
 
     monkeypatch.setattr(cli, 'main', fake)
-    row = score.answer('command', 'bags', 0)
+    row = score.answer('command', 0)
     assert row['found']['verdict'] == 'none'
     assert given[0][0] == 'diagnose'
     assert given[0][-3] == '--ship'
     assert given[0][-1] == '--json'
-    assert 'no baseline' in score._answer(('command', 'bags', 0))['error']
+    assert 'no baseline' in score._answer(('command', 0))['error']
 
 
 def test_an_answer_that_fails_is_told_and_not_counted(tmp_path: Path) -> None:
-    row = score._answer(('no_such_module:diagnose', 'blocks', 0))
+    row = score._answer(('no_such_module:diagnose', 0))
     assert 'ModuleNotFoundError' in row['error']
     assert score.trials([row]) == []

@@ -56,20 +56,6 @@ def test_a_case_is_the_same_whenever_it_is_made() -> None:
             np.testing.assert_array_equal(one[name].stamp_ns, other[name].stamp_ns)
 
 
-def test_what_is_measured_besides_changes_nothing_else() -> None:
-    number = next(
-        number
-        for number in range(cases.count())
-        if cases.reveal(number).condition == cases.CONDITIONS[0]
-    )
-    plain = cases.observe(number)
-    added = cases.observe(number, added=cases.TESTS)
-    assert (len(plain.runs), len(added.runs)) == (1, 2)
-    assert set(added.runs[0]) - set(plain.runs[0]) == set(cases.TESTS) - {cases.RECIPROCAL}
-    for name, series in plain.runs[0].items():
-        np.testing.assert_array_equal(series.value, added.runs[0][name].value)
-
-
 def test_the_ship_file_is_one_and_states_the_baseline_that_sails() -> None:
     seen = cases.observe(1)
     ship = Ship.from_yaml(seen.ship_file, subject='hidden')
@@ -81,7 +67,7 @@ def test_the_ship_file_is_one_and_states_the_baseline_that_sails() -> None:
 
 def test_stamps_ascend_and_never_lie_ahead_of_their_arrival() -> None:
     for number in range(12):
-        for run in cases.observe(number, added=cases.TESTS).runs:
+        for run in cases.observe(number).runs:
             for series in run.values():
                 assert np.all(np.diff(series.stamp_ns) > 0)
                 assert np.all(series.receive_ns >= series.stamp_ns)
@@ -108,7 +94,7 @@ def test_a_case_is_made_quickly() -> None:
 
 
 def test_the_true_r_is_what_slows_the_ship_at_last() -> None:
-    hull = cases.known(7).hull
+    hull = cases._case(7).hull
     leg, world = Leg(hull, 1.0, 1500.0, hull.speed_m_s), World(friction=0.02, shape=(0.01,) * 4)
     motion = sail(
         leg,
@@ -116,7 +102,7 @@ def test_the_true_r_is_what_slows_the_ship_at_last() -> None:
         heading_rad=0.0,
         first_heading_rad=0.0,
         world=world,
-        disturbance=Disturbance.none(leg, step_s=1.0),
+        disturbance=Disturbance.none(leg),
     )
     late = motion.time_s > 20.0 * hull.run_down_s  # of the thrust 2e-9 are left
     speed = motion.surge_m_s[late]

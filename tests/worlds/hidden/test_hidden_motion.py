@@ -33,7 +33,7 @@ def _sail(leg, *effects, sign=1.0, **world):
         heading_rad=HEADING_RAD if sign > 0.0 else HEADING_RAD + np.pi,
         first_heading_rad=HEADING_RAD,
         world=World(**world),
-        disturbance=Disturbance.none(leg, step_s=1.0),
+        disturbance=Disturbance.none(leg),
     )
 
 

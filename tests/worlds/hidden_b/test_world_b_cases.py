@@ -29,15 +29,6 @@ def test_a_seed_and_a_number_make_a_case() -> None:
         assert np.array_equal(series.stamp_ns, again.runs[0][name].stamp_ns)
 
 
-def test_what_is_measured_besides_changes_nothing_else() -> None:
-    number = next(n for n in FEW if cases.condition(n).runs == 1)
-    few, all_of_it = cases.observe(number), cases.observe(number, added=cases.TESTS)
-    assert len(all_of_it.runs) == 2
-    assert set(few.runs[0]) < set(all_of_it.runs[0]) or cases.condition(number).context
-    for name, series in few.runs[0].items():
-        assert np.array_equal(series.value, all_of_it.runs[0][name].value)
-
-
 def test_the_halves_hold_the_same() -> None:
     plans = cases.plans_of(cases.SEED)
     assert Counter(plans[::2]) == Counter(plans[1::2])
@@ -57,7 +48,7 @@ def test_what_is_hidden_matters() -> None:
 
 @pytest.mark.parametrize('number', FEW)
 def test_readings_are_plausible(number) -> None:
-    seen = cases.observe(number, added=cases.TESTS)
+    seen = cases.observe(number)
     ship = yaml.safe_load(seen.ship_file)
     assert {'length_m', 'displaced_volume_m3', 'added_mass', 'baseline'} <= set(ship)
     stops = cases.stops_ns(number)
@@ -77,11 +68,11 @@ def test_readings_are_plausible(number) -> None:
         assert np.median(log.value[lead]) == pytest.approx(first, rel=0.35)
         assert -0.3 * first <= log.value.min() <= log.value[~lead][-20:].mean() < 0.9 * first
         assert log.value.max() < 1.6 * first + 0.3
-        assert np.all(np.abs(recording['heading'].value) <= np.pi)
-        assert np.all(recording['depth'].value > ship['draught_m'])
-        assert np.all(np.abs(recording['wind_apparent'].value) < 45.0)
-        shaft = recording['shaft'].value
-        assert np.median(shaft[:200]) > 1.0
+        if cases.condition(number).context:
+            assert np.all(np.abs(recording['heading'].value) <= np.pi)
+            assert np.all(recording['depth'].value > ship['draught_m'])
+            assert np.all(np.abs(recording['wind_apparent'].value) < 45.0)
+            assert np.median(recording['shaft'].value[:200]) > 1.0
         if 'position' in recording:
             place, t = recording['position'].value, recording['position'].stamp_ns * 1e-9
             over_ground = np.polyfit(t[:100] - t[0], place[:100], 1)[0]
