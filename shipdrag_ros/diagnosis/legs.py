@@ -34,7 +34,7 @@ _LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer o
 _SAMPLES = 6  # of the slower input in a leg; a leg is as long as that needs
 _SHARE = 0.5  # of the samples that a leg should hold, below which it has a dropout
 _YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
-_STRAIGHT = 0.994  # velocity over that of both halves, where there is no heading: as short
+_STRAIGHT = 0.994  # velocity over the speeds of both halves, where there is no heading: no shorter
 _NEAR_S = 10.0  # of a turn the flow at the log is not that of a straight course
 _ZEROS = 0.05  # of the readings of a leg, from where its mean is no speed
 _STOPPED = 0.25  # of the usual speed
@@ -398,19 +398,21 @@ class _LegCutter:
         """Return the leg that begins at a time, or why there is none."""
         middle, end_s = start_s + 0.5 * self.length_s, start_s + self.length_s
         log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
-        halves = ground.part(start_s, middle), ground.part(middle, end_s)
         for part, whole in ((log, self.log), (ground, self.ground)):
             if len(part) < max(_SHARE * self.length_s / whole.step_s, 0.5 * _SAMPLES):
                 return Left.DROPOUT
-        if min(map(len, halves)) < 2:
+        zeros = float(np.mean(np.asarray(log.value) == 0.0))
+        ground, log = self._sound(ground), log.near_median()
+        halves = ground.part(start_s, middle), ground.part(middle, end_s)
+        beside = log.part(float(ground.time_s[0]), float(ground.time_s[-1]))
+        if min(map(len, (beside, *halves))) < 2:
             return Left.DROPOUT
         turned = np.exp(1j * self.heading.part(start_s - _NEAR_S, end_s + _NEAR_S).value)
         yaw = complex(turned.mean()) if len(turned) else 1.0 + 0.0j
         if abs(yaw) < math.exp(-0.5 * _YAW_SD_RAD**2):
             return Left.TURN
-        if float(np.mean(np.asarray(log.value) == 0.0)) > _ZEROS:
+        if zeros > _ZEROS:
             return Left.ZERO
-        ground, log = self._sound(ground), log.near_median()
         weights = _Weights.of(ground.time_s)
         through = weights.mean_of(log).real
         if through <= 0.0:

@@ -236,6 +236,19 @@ def test_log_and_way_of_a_leg_are_means_of_the_same_motion() -> None:
     np.testing.assert_allclose(legs.acceleration_m_s2, rate, rtol=0.0, atol=0.02)
 
 
+def test_a_fix_that_jumps_is_no_turn() -> None:
+    sailing = Sailing(geodetic=True, hours=1.0, courses_deg=(10.0,))
+    block = sailing.block(1)
+    block = block[block.channel != Channel.HEADING]
+    fixes = np.flatnonzero(block.channel == Channel.POSITION_GEODETIC)
+    value = block.value.copy()
+    value[fixes[10::60]] += 2000.0 / METRES_A_DEGREE
+    for read in (block.value, value):
+        legs = Legs.of([SailingRecord('sailing', replace(block, value=read))], PARAMETERS)
+        assert Left.TURN not in legs.left_out
+        assert len(legs) == 60
+
+
 def test_two_at_once() -> None:
     found = found_in(Sailing(scale=-0.06, current_m_s=(0.4, 0.3), geodetic=True))
     assert [effect.name for effect in found.effects] == ['current', 'log_scale']

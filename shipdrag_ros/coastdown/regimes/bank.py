@@ -20,7 +20,7 @@ from shipdrag_ros.coastdown.regimes.births import (
     thin,
 )
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import kept_of, predict, pushes, rest_speed, weigh
+from shipdrag_ros.coastdown.regimes.motion import decay_of, predict, pushes, rest_speed, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.state import (
     A0,
@@ -318,13 +318,13 @@ def step(bank: Bank, setting: BankSetting) -> float:
         bear(all_, setting, both, not (np.isnan(said[RATE]) and np.isnan(said[RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0
-    kept = kept_of(setting, used)
+    decay = decay_of(setting, used)
     rests = abs(advance) < setting.step_s * rest_speed(setting.hull)
     for i in range(all_.used[0]):
         # an engine may drive her astern
         astern = claimed and (rests or all_.whole[i, REGIME] == AMID)
         way = abs(advance) if astern else advance
-        slowing = predict(all_, i, setting, used, kept, way)
+        slowing = predict(all_, i, setting, used, decay, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
     shown = thin(all_, setting)

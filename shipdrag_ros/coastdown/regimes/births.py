@@ -547,17 +547,15 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     for i in range(count):
         bank.number[i, WEIGHT] -= norm
     if bank.clock[0] % _THIN_EVERY == 0:
-        keep(bank, -LOST)
+        _keep(bank, -LOST)
         _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
-    keep(bank, _least_of_the_best(bank))  # or the next births find no room
+    _keep(bank, _least_of_the_best(bank))  # or the next births find no room
     return float(norm)
 
 
 @compiled(uncounted=True)
-def keep(bank: Histories, least: float) -> None:
-    """
-    Drop the histories of less log weight.
-    """
+def _keep(bank: Histories, least: float) -> None:
+    """Drop the histories of less log weight."""
     kept = 0
     for i in range(bank.used[0]):
         if bank.number[i, WEIGHT] > least:

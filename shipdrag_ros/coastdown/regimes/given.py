@@ -12,7 +12,7 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import Bank, step
 from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
-from shipdrag_ros.coastdown.regimes.births import LOST, keep
+from shipdrag_ros.coastdown.regimes.births import LOST
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, rest_speed
 from shipdrag_ros.coastdown.regimes.read_out import (
@@ -133,11 +133,8 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
             shown = step(bank, setting)
             if k >= binned.before:
                 evidence[each] += shown
-        # one so far behind would weigh nothing, as a history that is so behind those of all
-        least = max(evidence) - LOST
-        likely = [each >= least for each in evidence]
-        for bank, mine in zip(banks, evidence, strict=True):
-            keep(bank.histories, least - mine)
+        # one so far behind would weigh nothing, as a history that is so
+        likely = [each >= max(evidence) - LOST for each in evidence]
         banks, evidence = list(compress(banks, likely)), list(compress(evidence, likely))
     if not evidence or not np.isfinite(max(evidence)):  # rounding broke every one
         return None

@@ -207,7 +207,7 @@ def _force(
     return net, -a * left * slope - a * by_u, -a * left, by_open, a
 
 
-class Kept(NamedTuple):
+class Decay(NamedTuple):
     """What is left of gust, slow errors of log and speed over ground, and lag after a part."""
 
     gust: float
@@ -217,12 +217,12 @@ class Kept(NamedTuple):
 
 
 @compiled(uncounted=True)
-def kept_of(setting: BankSetting, noise: Float64) -> Kept:
+def decay_of(setting: BankSetting, noise: Float64) -> Decay:
     """
     Return what is left after a part of a bin.
     """
     dt, pace = setting.step_s / _PARTS, setting.pace
-    return Kept(
+    return Decay(
         math.exp(-dt / (n.GUST_S * pace)),
         math.exp(-dt / (noise[N_WANDER_S] * pace)),
         math.exp(-dt / (noise[N_EDDY_S] * pace)),
@@ -232,7 +232,7 @@ def kept_of(setting: BankSetting, noise: Float64) -> Kept:
 
 @compiled(uncounted=True)
 def predict(
-    bank: Histories, i: int, setting: BankSetting, noise: Float64, kept: Kept, advance: float
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, decay: Decay, advance: float
 ) -> float:
     """
     Carry a history to the end of the bin; return its acceleration there [m/s^2].
@@ -243,7 +243,7 @@ def predict(
     free = f[FREE] if regime == LEVEL and w[KIND] == TORQUE else 0.0
     dt = setting.step_s / _PARTS
     pace = setting.pace
-    keep_g, keep_b, keep_e, keep_f = kept
+    keep_g, keep_b, keep_e, keep_f = decay
     slowing = mean_u = mean_lag = 0.0
     u = math.exp(x[LN_U])
     for part in range(_PARTS):
