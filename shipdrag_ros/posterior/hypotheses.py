@@ -318,39 +318,44 @@ class ShipRuns:
         """
         Return the families of a hypothesis; means count from some unknowns (p,).
         """
-        width, size = self.width(hypothesis), self.size
-        q = len(hypothesis.unknowns)
-        name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
-        families = max((run.model.families for run in self.runs), key=len)
-        # without a baseline the hull is something smooth in any case
-        hulls = [each for each in families if each.name == name] or list(families)
-        total = math.fsum(each.chance for each in hulls)
-        sizes = priors.SMOOTH_SIZES if width > size + q + _FORMS * len(hypothesis.forms) else (1,)
-        components = []
-        place = size
+        size, width = self.size, self.width(hypothesis)
+        smooth = size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
+        hulls = self._hulls[priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING]
+        sizes = np.array(priors.SMOOTH_SIZES if width > smooth else (1.0,))
+        components, place = [], size
         for way in hypothesis.ways:
             if way.components:
                 components.append([place + i for i in way.components])
             place += len(way.unknowns)
-        means, precisions, chances = [], [], []
-        for number, hull in enumerate(hulls):
-            base_mean, base_precision = self._base(name, number)
-            for amount in sizes:
-                for which in range(2 ** len(components)):
-                    mean, precision = np.zeros(width), np.ones(width)
-                    mean[:size], precision[:size] = base_mean, base_precision
-                    k = self.coefficients
-                    mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
-                    if hypothesis.frozen:
-                        precision[self._stated] = EXACT**-2.0
-                    precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
-                    for i, each in enumerate(components):
-                        if which >> i & 1:
-                            precision[each] = priors.SMALL_COMPONENTS.mean**-2.0
-                    means.append(mean)
-                    precisions.append(precision)
-                    chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
-        return Families(np.array(means) - now, np.array(precisions), np.log(chances))
+        alike = len(sizes) * 2 ** len(components)
+        mean, precision = (np.repeat(each, alike, axis=0) for each in hulls[:2])
+        if hypothesis.frozen:
+            precision[:, self._stated] = EXACT**-2.0
+        count, more = len(mean), width - size
+        mean = np.hstack([mean, np.zeros((count, more))])
+        precision = np.hstack([precision, np.ones((count, more))])
+        which = np.arange(count)
+        precision[:, smooth:] = sizes[which // 2 ** len(components) % len(sizes), None] ** -2.0
+        for i, each in enumerate(components):
+            precision[np.ix_(which >> i & 1 == 1, each)] = priors.SMALL_COMPONENTS.mean**-2.0
+        log_chance = np.repeat(hulls.log_chance - math.log(alike), alike)
+        return Families(mean - now, precision, log_chance)
+
+    @cached_property
+    def _hulls(self) -> dict[str, Families]:
+        """By name, the families of the unknowns that every hypothesis has."""
+        families, k = max((run.model.families for run in self.runs), key=len), self.coefficients
+        found = {}
+        for name in (priors.NOTHING, priors.SMOOTH):
+            # without a baseline the hull is something smooth in any case
+            hulls = [each for each in families if each.name == name] or families
+            bases = [self._base(name, number) for number in range(len(hulls))]
+            mean, precision = (np.array(each) for each in zip(*bases))
+            mean[:, :k] = [hull.mean[:k] for hull in hulls]
+            precision[:, :k] = [hull.precision[:k] for hull in hulls]
+            chance = np.array([hull.chance for hull in hulls])
+            found[name] = Families(mean, precision, np.log(chance / chance.sum()))
+        return found
 
     @cached_property
     def _stated(self) -> Int64:
