@@ -471,12 +471,11 @@ class Comparing:
         run, size = self.runs.runs[j], self.runs.size
         z = base.at[size : size + len(base.hypothesis.unknowns)]
         still, steady_m_s = self.runs.still(j, base.at)
-        whole = sum(base.hypothesis.actions(run.frame, j, z), still + self.runs.air(j, base.at))
-        actions = [whole]
-        for each in hypotheses:
-            way = each.ways[-1]
-            more = way.action(run.frame, way.tried()) if way.acts_in(j) else Action()
-            actions.append(whole + more)
+        air = self.runs.air(j, base.at)
+        whole = Action.total(still, *base.hypothesis.actions(run.frame, j, z), air)
+        ways = [each.ways[-1] for each in hypotheses]
+        more = [way.action(run.frame, way.tried(), j) for way in ways]
+        actions = [whole, *(whole + each for each in more)]
         shown = run.simulate(actions, np.full(len(actions), steady_m_s))
         change = np.hstack([shown.along, shown.rest])
         change = change[1:] - change[0]

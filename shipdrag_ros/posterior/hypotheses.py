@@ -115,6 +115,11 @@ class RunSight:
         """What the error of a formula is made of, (4, n)."""
         return bsplines(self.over_run, _FORMS)
 
+    @cached_property
+    def across_bumps(self) -> Float64:
+        """The same at the places to port, (4, a)."""
+        return bsplines(np.linspace(0.0, 1.0, self.across), _FORMS)
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -167,12 +172,9 @@ class Explanation:
 
     def actions(self, frame: Frame, run: int, z: Float64) -> list[Action]:
         """Return what each effect does in a run."""
-        found, place = [], 0
-        for way in self.ways:
-            own = z[place : place + len(way.unknowns)].tolist()
-            place += len(way.unknowns)
-            found.append(way.action(frame, own) if way.acts_in(run) else _NOTHING)
-        return found
+        ends = np.cumsum([len(way.unknowns) for way in self.ways], dtype=int)[:-1]
+        each = zip(self.ways, np.split(z, ends))
+        return [way.action(frame, own.tolist(), run) for way, own in each]
 
     @property
     def forms(self) -> list[int]:
@@ -424,31 +426,33 @@ class ShipRuns:
         return [self._table(j, h, x, plan, shown) for h, x, plan in zip(hypotheses, at, plans)]
 
     def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
-        run = self.runs[j]
+        run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)].tolist()
         still, speed = self.still(j, at)
-        z = at[self.size : self.size + len(hypothesis.unknowns)]
         air = self.air(j, at)
-        actions = [*hypothesis.actions(run.frame, j, z), air]
-        whole = sum(actions, still)
+        actions = [still, *hypothesis.actions(run.frame, j, z), air]
+        whole = Action.total(*actions)
+
+        def instead(i: int, action: Action) -> int:
+            """Ask for a column in which one of the actions is another."""
+            changed = [*actions]
+            changed[i] = action
+            return batch.add(Action.total(*changed), speed)
+
         steps = []
-        for i in range(len(z)):
-            stepped = z.copy()
-            stepped[i] += _STEP_Z
-            more = sum(hypothesis.actions(run.frame, j, stepped), still + air)
-            steps.append(batch.add(more, speed))
-        without = [
-            batch.add(sum((a for i, a in enumerate(actions) if i != form), still), speed)
-            for form in hypothesis.forms
-        ]
+        for i, way in enumerate(hypothesis.ways, 1):
+            own = z[len(steps) : len(steps) + len(way.unknowns)]
+            steps += [
+                instead(i, way.action(run.frame, stepped, j))
+                for stepped in (own + _STEP_Z * np.eye(len(own))).tolist()
+            ]
+        without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
         base, acting = batch.add(still, speed), batch.add(whole, speed)
-        turned = []
-        if run.shaft:
-            stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
-            shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
-            turned = [batch.add(whole + shaft, speed) for shaft in shafts]
+        stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
+        shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
+        turned = [instead(0, still + shaft) for shaft in shafts if run.shaft]
         winds = (_STEP_M_S, 0.0), (0.0, _STEP_M_S)
-        blown = [batch.add(whole + Action(wind_m_s=wind), speed) for wind in winds]
-        return _Places(base, acting, steps, without, turned, blown, sum(actions, _NOTHING))
+        blown = [instead(-1, air + Action(wind_m_s=wind)) for wind in winds]
+        return _Places(base, acting, steps, without, turned, blown, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
         """Return what light air does that blows in a run in every hypothesis."""
@@ -475,11 +479,10 @@ class ShipRuns:
         run, model, place, k = self.runs[j], self.runs[j].model, self.places[j], self.coefficients
         own, q = at[place[_OF_MOTION]], len(hypothesis.unknowns)
         rows, n = model.rows, len(model.rows.time_s)
-        residual, speed = motion.predict(model.forces, own, model.grid_s, rows)
-        forces = _with(model.forces, plan.action, run.frame, self.runs[j])
-        table = residual
-        if forces is not model.forces:
-            table, speed = motion.predict(forces, own, model.grid_s, rows)
+        forces = _with(model.forces, plan.action, run.frame, run)
+        table, speed = motion.predict(forces, own, model.grid_s, rows)
+        alone = motion.settled(model.forces, own[:k])  # without effects
+        residual, _ = motion.predict(alone, own[k:], model.grid_s, rows)
         extra = len(hypothesis.forms) * _FORMS
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
@@ -509,8 +512,7 @@ class ShipRuns:
             along[to : to + _FORMS] = run.form_bumps * trace
             if a:
                 trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
-                even = bsplines(np.linspace(0.0, 1.0, a), _FORMS)
-                rest[to : to + _FORMS, :a] = even * trace
+                rest[to : to + _FORMS, :a] = run.across_bumps * trace
         along[first + q + extra :] = smooth
         # forms and what is smooth stand at some unknowns too
         beyond = at[self.size + q :]

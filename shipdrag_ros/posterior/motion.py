@@ -107,6 +107,14 @@ def total_of(forces: Forces, theta: Float64) -> Float64:
     return total
 
 
+def settled(forces: Forces, theta: Float64) -> Forces:
+    """
+    Return the same forces with nothing unknown, where some coefficients (k,) are the truth.
+    """
+    none = np.zeros((2, 0, forces.known.shape[1]))
+    return forces._replace(known=total_of(forces, theta), columns=none)
+
+
 @compiled
 def _rates(
     forces: Forces,
