@@ -428,8 +428,7 @@ class ShipRuns:
     def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
         run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)].tolist()
         still, speed = self.still(j, at)
-        air = self.air(j, at)
-        actions = [still, *hypothesis.actions(run.frame, j, z), air]
+        actions = [still, *hypothesis.actions(run.frame, j, z), self.air(j, at)]
         whole = Action.total(*actions)
 
         def instead(i: int, action: Action) -> int:
@@ -441,18 +440,18 @@ class ShipRuns:
         steps = []
         for i, way in enumerate(hypothesis.ways, 1):
             own = z[len(steps) : len(steps) + len(way.unknowns)]
-            steps += [
-                instead(i, way.action(run.frame, stepped, j))
-                for stepped in (own + _STEP_Z * np.eye(len(own))).tolist()
-            ]
-        without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
-        base, acting = batch.add(still, speed), batch.add(whole, speed)
+            for stepped in (own + _STEP_Z * np.eye(len(own))).tolist():
+                column = instead(i, way.action(run.frame, stepped, j))
+                steps.append((_LOCAL + len(steps), column, _STEP_Z))
+        for line, wind in zip(_AIR, ((_STEP_M_S, 0.0), (0.0, _STEP_M_S))):
+            steps.append((line, batch.add(whole + Action(wind_m_s=wind), speed), _STEP_M_S))
         stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
         shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
-        turned = [instead(0, still + shaft) for shaft in shafts if run.shaft]
-        winds = (_STEP_M_S, 0.0), (0.0, _STEP_M_S)
-        blown = [instead(-1, air + Action(wind_m_s=wind)) for wind in winds]
-        return _Places(base, acting, steps, without, turned, blown, Action.total(*actions[1:]))
+        for line, shaft in zip((_FREE, _STALL), shafts if run.shaft else ()):
+            steps.append((line, batch.add(whole + shaft, speed), _STEP_Z))
+        without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
+        base, acting = batch.add(still, speed), batch.add(whole, speed)
+        return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
         """Return what light air does that blows in a run in every hypothesis."""
@@ -498,14 +497,9 @@ class ShipRuns:
             distance = shown.distance[plan.acting]
             rest[0, :a] -= at[port] + at[heading] * distance
             rest[1 + k + _PORT, :a], rest[1 + k + _HEADING, :a] = 1.0, distance
-        for i, column in enumerate(plan.steps):
-            along[first + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_Z
-            rest[first + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
-        for i, column in zip(_AIR, plan.blown):
-            along[1 + k + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_M_S
-            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_M_S
-        for i, column in zip((_FREE, _STALL), plan.turned):
-            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
+        line, column, step = (np.array(each) for each in zip(*plan.steps))
+        for found, columns in ((along, shown.along), (rest, shown.rest)):
+            found[1 + k + line] = (columns[column] - columns[plan.acting]) / step[:, None]
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
             trace = sd * (shown.along[plan.acting] - shown.along[column])
@@ -562,14 +556,12 @@ class ShipRuns:
 
 
 class _Places(NamedTuple):
-    """Columns that a hypothesis needs of a run."""
+    """Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much."""
 
     base: int
     acting: int
-    steps: list[int]
+    steps: list[tuple[int, int, float]]
     without: list[int]
-    turned: list[int]
-    blown: list[int]
     action: Action
 
 

@@ -25,7 +25,7 @@ class SurgeLaw(NamedTuple):
     ----------
     low_m_s, cell_m_s
         First speed and spacing of the table of resistance.
-    resistance : (4, m)
+    resistance : (m, 4)
         Cubic of each cell, highest power first [m/s^2].
     extra_cell_m_s
         Spacing of the columns' tables of extra resistance.
@@ -93,11 +93,11 @@ Records = NDArray[np.void]
 def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
-    cell = min(max(cell, 0), law.resistance.shape[1] - 1)
+    cell = min(max(cell, 0), len(law.resistance) - 1)
     offset = magnitude - law.low_m_s - cell * law.cell_m_s
     r = 0.0
     for power in range(4):
-        r = r * offset + float(law.resistance[power, cell])
+        r = r * offset + float(law.resistance[cell, power])
     if len(extra) == 0:
         return r
     # cubic through the four nearest points
