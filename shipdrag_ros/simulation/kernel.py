@@ -89,7 +89,7 @@ LEG = np.dtype(
 Records = NDArray[np.void]
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
@@ -114,7 +114,7 @@ def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     return r + added
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _retardation_m_s2(
     law: SurgeLaw,
     column: Any,
@@ -142,7 +142,7 @@ def _retardation_m_s2(
     return retardation
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     """Return the velocity of the water to the east and to the north."""
     since = max(time_s - column.change_from_s, 0.0)
@@ -152,7 +152,7 @@ def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     )
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _heading(leg: Any, first: tuple[float, float], elapsed: float) -> tuple[float, float]:
     """Return cosine and sine of the heading within a leg; `first` are those at its start."""
     if leg.yaw_rate_rad_s == 0.0 and leg.yaw_rate_rad_s2 == 0.0:
@@ -161,7 +161,7 @@ def _heading(leg: Any, first: tuple[float, float], elapsed: float) -> tuple[floa
     return np.cos(yaw), np.sin(yaw)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _rates(
     law: SurgeLaw,
     column: Any,
