@@ -250,7 +250,7 @@ def probability_of_naming(
     rng = np.random.default_rng(_SEED)
     names, probability = [rival.names for rival in rivals], probabilities(rivals)
     share = np.cumsum([0.0, *(probability[each] for each in names)])
-    counts = np.diff(np.round(_DRAWS * share).astype(int)).tolist()
+    counts = np.diff(np.round(_DRAWS * share).astype(int))
     drawn = [
         (way, settings[way][i].draw(counts[i], rng)) for i, way in enumerate(setting) if counts[i]
     ]
@@ -261,5 +261,5 @@ def probability_of_naming(
             rival.log_evidence + rival.log_odds + one.log_density(seen)
             for rival, one in zip(rivals, settings[way], strict=True)
         ]
-        named += np.count_nonzero(names_one(names, softmax(after, axis=0), inseparable))
-    return named / sum(counts)
+        named += int(names_one(names, softmax(after, axis=0), inseparable).sum())
+    return named / int(counts.sum())

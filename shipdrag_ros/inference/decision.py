@@ -219,8 +219,8 @@ def names_one(
     never = set(UNKNOWN).union(*inseparable)
     effects = sorted({name for each in names for name in each} - never)
     holds = np.array([[effect in each for each in names] for effect in effects])
-    named: NDArray[np.bool_] = (holds.reshape(-1, len(names)) @ probability >= CERTAIN).any(axis=0)
-    return named
+    certain = holds.reshape(-1, len(names)) @ probability >= CERTAIN
+    return np.asarray(certain.any(axis=0), np.bool_)
 
 
 def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:

@@ -87,9 +87,9 @@ class EffectWay:
         """Say whether it does anything in a run."""
         return self.run is None or self.run == run
 
-    def action(self, frame: Frame, z: Sequence[float], run: int = 0) -> Action:
-        """Return what it does in a run at some z."""
-        if not self.acts_in(run):
+    def action(self, frame: Frame, z: Sequence[float], run: int | None = None) -> Action:
+        """Return what it does at some z: in a run, or where it acts."""
+        if run is not None and not self.acts_in(run):
             return Action()
         values = {q.name: q.prior.at(at) for q, at in zip(self.unknowns, z)} | dict(self.fixed)
         return self.effect.action(frame, *(values[q.name] for q in self.effect.parameters))

@@ -437,7 +437,7 @@ class ShipRuns:
             changed[i] = action
             return batch.add(Action.total(*changed), speed)
 
-        steps = []
+        steps: list[tuple[int, int, float]] = []
         for i, way in enumerate(hypothesis.ways, 1):
             own = z[len(steps) : len(steps) + len(way.unknowns)]
             for stepped in (own + _STEP_Z * np.eye(len(own))).tolist():
@@ -497,9 +497,9 @@ class ShipRuns:
             distance = shown.distance[plan.acting]
             rest[0, :a] -= at[port] + at[heading] * distance
             rest[1 + k + _PORT, :a], rest[1 + k + _HEADING, :a] = 1.0, distance
-        line, column, step = (np.array(each) for each in zip(*plan.steps))
+        line, stepped, step = map(np.array, zip(*plan.steps, strict=True))
         for found, columns in ((along, shown.along), (rest, shown.rest)):
-            found[1 + k + line] = (columns[column] - columns[plan.acting]) / step[:, None]
+            found[1 + k + line] = (columns[stepped] - columns[plan.acting]) / step[:, None]
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
             trace = sd * (shown.along[plan.acting] - shown.along[column])
