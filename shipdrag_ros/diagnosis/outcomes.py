@@ -13,8 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
-from shipdrag_ros.inference.decision import Verdict, WeighedHypothesis, decide, probabilities
+from shipdrag_ros.inference.decision import WeighedHypothesis, names_one, probabilities
 from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.samples import Float64
@@ -247,21 +248,18 @@ def probability_of_naming(
         Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
-    probability = probabilities(rivals)
-    share = np.array([probability[rival.names] for rival in rivals])
-    counts = np.diff(np.round(_DRAWS * np.concatenate([[0.0], np.cumsum(share)])).astype(int))
+    names, probability = [rival.names for rival in rivals], probabilities(rivals)
+    share = np.cumsum([0.0, *(probability[each] for each in names)])
+    counts = np.diff(np.round(_DRAWS * share).astype(int))
+    drawn = [
+        (way, settings[way][i].draw(counts[i], rng)) for i, way in enumerate(setting) if counts[i]
+    ]
     named = 0
-    for truth, (way, count) in enumerate(zip(setting, counts, strict=True)):
-        if count == 0:
-            continue
-        outcomes = settings[way][truth].draw(int(count), rng)
-        evidence = [
-            rival.log_evidence + one.log_density(outcomes)
+    for way in {way for way, _ in drawn}:
+        seen = np.concatenate([each for own, each in drawn if own == way])
+        after = [
+            rival.log_evidence + rival.log_odds + one.log_density(seen)
             for rival, one in zip(rivals, settings[way], strict=True)
         ]
-        for log in np.array(evidence).T.tolist():
-            after = [
-                replace(rival, log_evidence=each) for rival, each in zip(rivals, log, strict=True)
-            ]
-            named += decide(probabilities(after), inseparable).verdict is Verdict.NAMED
+        named += int(names_one(names, softmax(after, axis=0), inseparable).sum())
     return named / int(counts.sum())

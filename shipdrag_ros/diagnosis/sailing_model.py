@@ -207,12 +207,7 @@ class SailingModel:
         """
         Return what effects do together at some unknowns.
         """
-        found, place = Action(), 0
-        for way in ways:
-            own = z[place : place + len(way.unknowns)].tolist()
-            place += len(way.unknowns)
-            found += way.action(self._frame, own)
-        return found
+        return Action.total(*Explanation(tuple(ways)).actions(self._frame, 0, z))
 
     def fit(self, hypothesis: Explanation) -> SailingFit:
         """

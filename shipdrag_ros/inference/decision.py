@@ -12,6 +12,11 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.samples import Float64
+
 Names = tuple[str, ...]
 """Of the effects that a hypothesis holds, sorted."""
 
@@ -194,6 +199,28 @@ def decide(
     else:
         verdict = Verdict.ONE_OF
     return Decision(verdict, named, smallest_set(probability, LISTED))
+
+
+def names_one(
+    names: Sequence[Names], probability: Float64, inseparable: Sequence[Collection[str]] = ()
+) -> NDArray[np.bool_]:
+    """
+    Say where `decide` names an effect.
+
+    Parameters
+    ----------
+    names
+        Of hypotheses, each other ones.
+    probability : (h, n)
+        Of each of them, n times.
+    inseparable
+        As there.
+    """
+    never = set(UNKNOWN).union(*inseparable)
+    effects = sorted({name for each in names for name in each} - never)
+    holds = np.array([[effect in each for each in names] for effect in effects])
+    certain = holds.reshape(-1, len(names)) @ probability >= CERTAIN
+    return np.asarray(certain.any(axis=0), np.bool_)
 
 
 def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:

@@ -47,28 +47,6 @@ class SizePosterior(NamedTuple):
     power: float = 1.0
 
 
-def amounts(prior: Prior, power: float, z: Float64) -> tuple[Float64, Float64]:
-    """
-    Return how much there is of a trace at some z, to which it is in proportion.
-
-    Parameters
-    ----------
-    prior
-        Of the size.
-    power
-        Of the size in its trace.
-    z : (m,)
-
-    Returns
-    -------
-    amount, slope : (m,)
-        The slope is its derivative by z.
-    """
-    value, slope = np.array([(prior.at(one), prior.slope(one)) for one in z.tolist()]).T
-    size = np.abs(value)
-    return np.sign(value) * size**power, power * size ** (power - 1.0) * slope
-
-
 def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     """
     Return a quantile of the absolute size of an effect, given that it is there.
@@ -107,12 +85,15 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
         if each.prior.shape is Shape.HALF_NORMAL:
             edge = np.union1d(edge[edge >= 0.0], np.geomspace(1e-6, 10.0, 400))
         z = 0.5 * (edge[1:] + edge[:-1])
-        middle, slope = amounts(each.prior, each.power, np.array([each.z]))
-        apart = (amounts(each.prior, each.power, z)[0] - middle) / slope
+        value = np.array([each.prior.at(one) for one in (each.z, *z.tolist())])
+        size = np.abs(value)
+        amount = np.sign(value) * size**each.power
+        slope = each.power * size[0] ** (each.power - 1.0) * each.prior.slope(each.z)
+        apart = (amount[1:] - amount[0]) / slope
         information = max(sd**-2.0 - 1.0, 0.0)
         log = -0.5 * z**2 + each.z * apart - 0.5 * information * apart**2
         weight = np.exp(log - log.max()) * np.diff(edge)
-        values.append(np.abs([each.prior.at(one) for one in z.tolist()]))
+        values.append(size[1:])
         weights.append(each.weight / weight.sum() * weight)
     value, weight = np.concatenate(values), np.concatenate(weights)
     order = np.argsort(value)

@@ -89,7 +89,7 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 _APART = 1e-4  # of decay rates times the step: closer ones are taken as so far apart
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _response(a: float, b: float, dt: float) -> tuple[float, float, float]:
     """Return speed and distance, by the force that decays at b, after a time; and what is left."""
     left = math.exp(-b * dt)
@@ -109,7 +109,7 @@ def _sizes(slow: GaussMarkovNoise, kinds: Int64) -> Float64:
     return size
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _fill_step(
     slow: GaussMarkovNoise,
     size: Float64,
@@ -146,7 +146,7 @@ def _fill_step(
             step[_XG] += part * way * left
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _move(lines: Float64, step: Float64, place: Int64) -> None:
     """Carry speed and distance, lines of a matrix, over a step."""
     u, x, gust, water = place[_U], place[_X], place[_GUST], place[_WATER]
@@ -158,7 +158,7 @@ def _move(lines: Float64, step: Float64, place: Int64) -> None:
         lines[u, c] = step[_U_BY_U] * speed + step[_U_BY_GUST] * force
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _predict(cov: Float64, mean: Float64, step: Float64, place: Int64, moved: bool) -> None:
     """Carry covariance and means over a step, F P F' + Q."""
     off = len(cov) - 1
@@ -182,7 +182,7 @@ def _predict(cov: Float64, mean: Float64, step: Float64, place: Int64, moved: bo
         _add_force(cov, step, place)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _add_force(cov: Float64, step: Float64, place: Int64) -> None:
     """Add what a force that comes up within the step does to speed and distance."""
     u, x, gust = place[_U], place[_X], place[_GUST]

@@ -471,12 +471,11 @@ class Comparing:
         run, size = self.runs.runs[j], self.runs.size
         z = base.at[size : size + len(base.hypothesis.unknowns)]
         still, steady_m_s = self.runs.still(j, base.at)
-        whole = sum(base.hypothesis.actions(run.frame, j, z), still + self.runs.air(j, base.at))
-        actions = [whole]
-        for each in hypotheses:
-            way = each.ways[-1]
-            more = way.action(run.frame, way.tried()) if way.acts_in(j) else Action()
-            actions.append(whole + more)
+        air = self.runs.air(j, base.at)
+        whole = Action.total(still, *base.hypothesis.actions(run.frame, j, z), air)
+        ways = [each.ways[-1] for each in hypotheses]
+        more = [way.action(run.frame, way.tried(), j) for way in ways]
+        actions = [whole, *(whole + each for each in more)]
         shown = run.simulate(actions, np.full(len(actions), steady_m_s))
         change = np.hstack([shown.along, shown.rest])
         change = change[1:] - change[0]
@@ -641,8 +640,8 @@ class Comparing:
         usual = np.zeros((1 + p, 1 + p))
         typical = []
         for j, table in enumerate(fit.linear):
-            products, log_det = self._of_run(j, table, self._usual_of(fit, j))
-            typical.append((products[0], float(log_det[0])))
+            products, _ = self._of_run(j, table, self._usual_of(fit, j))
+            typical.append(products[0])
             _put(usual, products[0], table.place)
         several = len(fit.linear) > 1
         at_usual = self._evidence(fit, usual[None], families)[0][0] if several else 0.0
@@ -651,8 +650,7 @@ class Comparing:
             noise = self.noise[j]
             products, log_det = self._of_run(j, table, noise.learnt.settings)
             whole = np.repeat(usual[None], len(products), axis=0)
-            for k in range(len(products)):
-                _put(whole[k], products[k] - typical[j][0], table.place)
+            _put(whole, products - typical[j], table.place)
             logs, z, variance = self._evidence(fit, whole, families)
             logs = logs + noise.log_prior - 0.5 * log_det
             total = float(np.logaddexp.reduce(logs))
@@ -812,9 +810,9 @@ def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
 
 
 def _put(total: Float64, products: Float64, place: Int64) -> None:
-    """Add the products of a run to those of all."""
-    at = np.concatenate([[0], 1 + place])
-    total[np.ix_(at, at)] += products
+    """Add the products of a run to those of all, (..., 1 + p, 1 + p)."""
+    at = np.append(0, 1 + place)
+    total[..., at[:, None], at] += products
 
 
 def _amount(way: EffectWay) -> tuple[float, float]:

@@ -87,8 +87,10 @@ class EffectWay:
         """Say whether it does anything in a run."""
         return self.run is None or self.run == run
 
-    def action(self, frame: Frame, z: Sequence[float]) -> Action:
-        """Return what it does at some z."""
+    def action(self, frame: Frame, z: Sequence[float], run: int | None = None) -> Action:
+        """Return what it does at some z: in a run, or where it acts."""
+        if run is not None and not self.acts_in(run):
+            return Action()
         values = {q.name: q.prior.at(at) for q, at in zip(self.unknowns, z)} | dict(self.fixed)
         return self.effect.action(frame, *(values[q.name] for q in self.effect.parameters))
 

@@ -115,6 +115,11 @@ class RunSight:
         """What the error of a formula is made of, (4, n)."""
         return bsplines(self.over_run, _FORMS)
 
+    @cached_property
+    def across_bumps(self) -> Float64:
+        """The same at the places to port, (4, a)."""
+        return bsplines(np.linspace(0.0, 1.0, self.across), _FORMS)
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -167,12 +172,9 @@ class Explanation:
 
     def actions(self, frame: Frame, run: int, z: Float64) -> list[Action]:
         """Return what each effect does in a run."""
-        found, place = [], 0
-        for way in self.ways:
-            own = z[place : place + len(way.unknowns)].tolist()
-            place += len(way.unknowns)
-            found.append(way.action(frame, own) if way.acts_in(run) else _NOTHING)
-        return found
+        ends = np.cumsum([len(way.unknowns) for way in self.ways], dtype=int)[:-1]
+        each = zip(self.ways, np.split(z, ends))
+        return [way.action(frame, own.tolist(), run) for way, own in each]
 
     @property
     def forms(self) -> list[int]:
@@ -318,39 +320,44 @@ class ShipRuns:
         """
         Return the families of a hypothesis; means count from some unknowns (p,).
         """
-        width, size = self.width(hypothesis), self.size
-        q = len(hypothesis.unknowns)
-        name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
-        families = max((run.model.families for run in self.runs), key=len)
-        # without a baseline the hull is something smooth in any case
-        hulls = [each for each in families if each.name == name] or list(families)
-        total = math.fsum(each.chance for each in hulls)
-        sizes = priors.SMOOTH_SIZES if width > size + q + _FORMS * len(hypothesis.forms) else (1,)
-        components = []
-        place = size
+        size, width = self.size, self.width(hypothesis)
+        smooth = size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
+        hulls = self._hulls[priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING]
+        sizes = np.array(priors.SMOOTH_SIZES if width > smooth else (1.0,))
+        components, place = [], size
         for way in hypothesis.ways:
             if way.components:
                 components.append([place + i for i in way.components])
             place += len(way.unknowns)
-        means, precisions, chances = [], [], []
-        for number, hull in enumerate(hulls):
-            base_mean, base_precision = self._base(name, number)
-            for amount in sizes:
-                for which in range(2 ** len(components)):
-                    mean, precision = np.zeros(width), np.ones(width)
-                    mean[:size], precision[:size] = base_mean, base_precision
-                    k = self.coefficients
-                    mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
-                    if hypothesis.frozen:
-                        precision[self._stated] = EXACT**-2.0
-                    precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
-                    for i, each in enumerate(components):
-                        if which >> i & 1:
-                            precision[each] = priors.SMALL_COMPONENTS.mean**-2.0
-                    means.append(mean)
-                    precisions.append(precision)
-                    chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
-        return Families(np.array(means) - now, np.array(precisions), np.log(chances))
+        alike = len(sizes) * 2 ** len(components)
+        mean, precision = (np.repeat(each, alike, axis=0) for each in hulls[:2])
+        if hypothesis.frozen:
+            precision[:, self._stated] = EXACT**-2.0
+        count, more = len(mean), width - size
+        mean = np.hstack([mean, np.zeros((count, more))])
+        precision = np.hstack([precision, np.ones((count, more))])
+        which = np.arange(count)
+        precision[:, smooth:] = sizes[which // 2 ** len(components) % len(sizes), None] ** -2.0
+        for i, each in enumerate(components):
+            precision[np.ix_(which >> i & 1 == 1, each)] = priors.SMALL_COMPONENTS.mean**-2.0
+        log_chance = np.repeat(hulls.log_chance - math.log(alike), alike)
+        return Families(mean - now, precision, log_chance)
+
+    @cached_property
+    def _hulls(self) -> dict[str, Families]:
+        """By name, the families of the unknowns that every hypothesis has."""
+        families, k = max((run.model.families for run in self.runs), key=len), self.coefficients
+        found = {}
+        for name in (priors.NOTHING, priors.SMOOTH):
+            # without a baseline the hull is something smooth in any case
+            hulls = [each for each in families if each.name == name] or families
+            bases = [self._base(name, number) for number in range(len(hulls))]
+            mean, precision = (np.array(each) for each in zip(*bases))
+            mean[:, :k] = [hull.mean[:k] for hull in hulls]
+            precision[:, :k] = [hull.precision[:k] for hull in hulls]
+            chance = np.array([hull.chance for hull in hulls])
+            found[name] = Families(mean, precision, np.log(chance / chance.sum()))
+        return found
 
     @cached_property
     def _stated(self) -> Int64:
@@ -419,31 +426,32 @@ class ShipRuns:
         return [self._table(j, h, x, plan, shown) for h, x, plan in zip(hypotheses, at, plans)]
 
     def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
-        run = self.runs[j]
+        run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)].tolist()
         still, speed = self.still(j, at)
-        z = at[self.size : self.size + len(hypothesis.unknowns)]
-        air = self.air(j, at)
-        actions = [*hypothesis.actions(run.frame, j, z), air]
-        whole = sum(actions, still)
-        steps = []
-        for i in range(len(z)):
-            stepped = z.copy()
-            stepped[i] += _STEP_Z
-            more = sum(hypothesis.actions(run.frame, j, stepped), still + air)
-            steps.append(batch.add(more, speed))
-        without = [
-            batch.add(sum((a for i, a in enumerate(actions) if i != form), still), speed)
-            for form in hypothesis.forms
-        ]
+        actions = [still, *hypothesis.actions(run.frame, j, z), self.air(j, at)]
+        whole = Action.total(*actions)
+
+        def instead(i: int, action: Action) -> int:
+            """Ask for a column in which one of the actions is another."""
+            changed = [*actions]
+            changed[i] = action
+            return batch.add(Action.total(*changed), speed)
+
+        steps: list[tuple[int, int, float]] = []
+        for i, way in enumerate(hypothesis.ways, 1):
+            own = z[len(steps) : len(steps) + len(way.unknowns)]
+            for stepped in (own + _STEP_Z * np.eye(len(own))).tolist():
+                column = instead(i, way.action(run.frame, stepped, j))
+                steps.append((_LOCAL + len(steps), column, _STEP_Z))
+        for line, wind in zip(_AIR, ((_STEP_M_S, 0.0), (0.0, _STEP_M_S))):
+            steps.append((line, batch.add(whole + Action(wind_m_s=wind), speed), _STEP_M_S))
+        stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
+        shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
+        for line, shaft in zip((_FREE, _STALL), shafts if run.shaft else ()):
+            steps.append((line, batch.add(whole + shaft, speed), _STEP_Z))
+        without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
         base, acting = batch.add(still, speed), batch.add(whole, speed)
-        turned = []
-        if run.shaft:
-            stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
-            shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
-            turned = [batch.add(whole + shaft, speed) for shaft in shafts]
-        winds = (_STEP_M_S, 0.0), (0.0, _STEP_M_S)
-        blown = [batch.add(whole + Action(wind_m_s=wind), speed) for wind in winds]
-        return _Places(base, acting, steps, without, turned, blown, sum(actions, _NOTHING))
+        return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
         """Return what light air does that blows in a run in every hypothesis."""
@@ -470,11 +478,10 @@ class ShipRuns:
         run, model, place, k = self.runs[j], self.runs[j].model, self.places[j], self.coefficients
         own, q = at[place[_OF_MOTION]], len(hypothesis.unknowns)
         rows, n = model.rows, len(model.rows.time_s)
-        residual, speed = motion.predict(model.forces, own, model.grid_s, rows)
-        forces = _with(model.forces, plan.action, run.frame, self.runs[j])
-        table = residual
-        if forces is not model.forces:
-            table, speed = motion.predict(forces, own, model.grid_s, rows)
+        forces = _with(model.forces, plan.action, run.frame, run)
+        table, speed = motion.predict(forces, own, model.grid_s, rows)
+        alone = motion.settled(model.forces, own[:k])  # without effects
+        residual, _ = motion.predict(alone, own[k:], model.grid_s, rows)
         extra = len(hypothesis.forms) * _FORMS
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
@@ -490,22 +497,16 @@ class ShipRuns:
             distance = shown.distance[plan.acting]
             rest[0, :a] -= at[port] + at[heading] * distance
             rest[1 + k + _PORT, :a], rest[1 + k + _HEADING, :a] = 1.0, distance
-        for i, column in enumerate(plan.steps):
-            along[first + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_Z
-            rest[first + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
-        for i, column in zip(_AIR, plan.blown):
-            along[1 + k + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_M_S
-            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_M_S
-        for i, column in zip((_FREE, _STALL), plan.turned):
-            rest[1 + k + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
+        line, stepped, step = map(np.array, zip(*plan.steps, strict=True))
+        for found, columns in ((along, shown.along), (rest, shown.rest)):
+            found[1 + k + line] = (columns[stepped] - columns[plan.acting]) / step[:, None]
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
             trace = sd * (shown.along[plan.acting] - shown.along[column])
             along[to : to + _FORMS] = run.form_bumps * trace
             if a:
                 trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
-                even = bsplines(np.linspace(0.0, 1.0, a), _FORMS)
-                rest[to : to + _FORMS, :a] = even * trace
+                rest[to : to + _FORMS, :a] = run.across_bumps * trace
         along[first + q + extra :] = smooth
         # forms and what is smooth stand at some unknowns too
         beyond = at[self.size + q :]
@@ -555,14 +556,12 @@ class ShipRuns:
 
 
 class _Places(NamedTuple):
-    """Columns that a hypothesis needs of a run."""
+    """Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much."""
 
     base: int
     acting: int
-    steps: list[int]
+    steps: list[tuple[int, int, float]]
     without: list[int]
-    turned: list[int]
-    blown: list[int]
     action: Action
 
 

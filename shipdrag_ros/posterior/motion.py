@@ -61,7 +61,7 @@ class Forces(NamedTuple):
     tau_s: float
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _basis(step: float, m: int, u: float) -> tuple[int, float, float, float, float]:
     """Return the cell of a speed and the cubic Hermite weights of values and slopes."""
     place = u / step
@@ -71,7 +71,7 @@ def _basis(step: float, m: int, u: float) -> tuple[int, float, float, float, flo
     return cell, a, 1.0 - a, s * (1.0 - s) * (1.0 - s) * step, s * s * (s - 1.0) * step
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _look(table: Float64, step: float, u: float) -> tuple[float, float]:
     """Return value and slope of a table (2, m) at a speed."""
     m = table.shape[1]
@@ -83,7 +83,7 @@ def _look(table: Float64, step: float, u: float) -> tuple[float, float]:
     return value, (1.0 - s) * table[1, cell] + s * table[1, cell + 1]
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _fill(columns: Float64, step: float, u: float, value: Float64) -> None:
     """Fill in each column at a speed."""
     cell, a, b, c, d = _basis(step, columns.shape[2], u)
@@ -107,7 +107,15 @@ def total_of(forces: Forces, theta: Float64) -> Float64:
     return total
 
 
-@compiled
+def settled(forces: Forces, theta: Float64) -> Forces:
+    """
+    Return the same forces with nothing unknown, where some coefficients (k,) are the truth.
+    """
+    none = np.zeros((2, 0, forces.known.shape[1]))
+    return forces._replace(known=total_of(forces, theta), columns=none)
+
+
+@compiled(inline=True, uncounted=True)
 def _rates(
     forces: Forces,
     total: Float64,
@@ -196,7 +204,7 @@ def integrate(forces: Forces, unknowns: Float64, grid_s: Float64) -> tuple[Float
     return state, rate
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _late(t: float, lag: float) -> tuple[float, float, float]:
     """
     Return the time whose speed a filter shows, its slope by the time and minus that by the lag.

@@ -335,7 +335,8 @@ class DeclaredTerm:
         """
         Return a value of a variable, inside of what is valid.
         """
-        return np.asarray(np.clip(value, *self.term.valid.get(name, _ANY)), np.float64)
+        valid = self.term.valid.get(name)
+        return np.asarray(np.clip(value, *valid) if valid else value, np.float64)
 
 
 def worth(expression: str, names: Mapping[str, Float64 | float]) -> Float64:

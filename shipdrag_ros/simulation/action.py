@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -107,11 +109,23 @@ class Action:
     ground_lag_s: float = 0.0
 
     def __add__(self, other: Action) -> Action:
-        parts = dict(vars(self))
-        for name, value in vars(other).items():
-            if value != _NOTHING[name]:  # most actions have a part or two
-                parts[name] = _ADD.get(name, _sum)(parts[name], value)
-        return Action(**parts)
+        return Action.total(self, other)
+
+    @classmethod
+    def total(cls, *actions: Action) -> Action:
+        """
+        Return what several do together.
+        """
+        parts: dict[str, Any] = {}
+        for action in actions:
+            for name, value in action._parts.items():
+                parts[name] = _ADD.get(name, add)(parts[name], value) if name in parts else value
+        return cls(**parts)
+
+    @cached_property
+    def _parts(self) -> dict[str, Any]:
+        """What it contributes: most actions have a part or two."""
+        return {name: value for name, value in vars(self).items() if value != _NOTHING[name]}
 
     def resistance_n(self, speed_m_s: ArrayLike) -> Float64:
         """
@@ -123,10 +137,6 @@ class Action:
         for function in self.resistance:
             total += function(magnitude)
         return np.sign(speed) * total
-
-
-def _sum(one: Any, other: Any) -> Any:
-    return one + other
 
 
 def _sum_of_vectors(one: Vector, other: Vector) -> Vector:

@@ -242,10 +242,13 @@ def force_n(
 
 
 def _act(term: LearntTerm, frame: effect.Frame, *values: float) -> Action:
-    total = Action()
-    for part, unit in zip(term.parts, term.units, strict=True):
-        total += _action(part, _Acting(part.expression, term, frame, values), unit == PURE)
-    return total
+    parts = zip(term.parts, term.units, strict=True)
+    return Action.total(
+        *(
+            _action(part, _Acting(part.expression, term, frame, values), unit == PURE)
+            for part, unit in parts
+        )
+    )
 
 
 def _action(part: TermPart, acting: _Acting, is_share: bool) -> Action:
@@ -277,10 +280,8 @@ def _moved(part: TermPart, acting: _Acting) -> Action:
     """Return a velocity of water or air, stated along the first run and to port of it."""
     frame = acting.frame
     both = acting, replace(acting, text=part.to_port or '0')
-    at_stop, at_end = (
-        np.array([float(each.at(0.0, time_s)) for each in both])
-        for time_s in (0.0, frame.scenario.duration_s)
-    )
+    time_s = np.array([0.0, frame.scenario.duration_s])
+    at_stop, at_end = np.transpose([np.broadcast_to(each.at(0.0, time_s), 2) for each in both])
     if part.channel == 'air':
         return Action(wind_m_s=frame.earth(*at_stop.tolist()))
     return Action(

@@ -25,7 +25,7 @@ class SurgeLaw(NamedTuple):
     ----------
     low_m_s, cell_m_s
         First speed and spacing of the table of resistance.
-    resistance : (4, m)
+    resistance : (m, 4)
         Cubic of each cell, highest power first [m/s^2].
     extra_cell_m_s
         Spacing of the columns' tables of extra resistance.
@@ -89,15 +89,15 @@ LEG = np.dtype(
 Records = NDArray[np.void]
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
-    cell = min(max(cell, 0), law.resistance.shape[1] - 1)
+    cell = min(max(cell, 0), len(law.resistance) - 1)
     offset = magnitude - law.low_m_s - cell * law.cell_m_s
     r = 0.0
     for power in range(4):
-        r = r * offset + float(law.resistance[power, cell])
+        r = r * offset + float(law.resistance[cell, power])
     if len(extra) == 0:
         return r
     # cubic through the four nearest points
@@ -114,7 +114,7 @@ def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     return r + added
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _retardation_m_s2(
     law: SurgeLaw,
     column: Any,
@@ -142,7 +142,7 @@ def _retardation_m_s2(
     return retardation
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     """Return the velocity of the water to the east and to the north."""
     since = max(time_s - column.change_from_s, 0.0)
@@ -152,7 +152,7 @@ def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     )
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _heading(leg: Any, first: tuple[float, float], elapsed: float) -> tuple[float, float]:
     """Return cosine and sine of the heading within a leg; `first` are those at its start."""
     if leg.yaw_rate_rad_s == 0.0 and leg.yaw_rate_rad_s2 == 0.0:
@@ -161,7 +161,7 @@ def _heading(leg: Any, first: tuple[float, float], elapsed: float) -> tuple[floa
     return np.cos(yaw), np.sin(yaw)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _rates(
     law: SurgeLaw,
     column: Any,

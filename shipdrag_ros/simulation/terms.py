@@ -46,7 +46,7 @@ def law_of(ship: Ship, speed_m_s: float) -> SurgeLaw:
     return SurgeLaw(
         low_m_s=low,
         cell_m_s=span / _CELLS,
-        resistance=np.ascontiguousarray(table.c),
+        resistance=np.ascontiguousarray(table.c.T),
         extra_cell_m_s=span / _EXTRA_CELLS,
         n_r=ship.n_r_polynomial(),
         air_1_m=float(ship.air_drag_n(1.0)) / ship.mass_kg,
@@ -57,7 +57,7 @@ def top_m_s(law: SurgeLaw) -> float:
     """
     Return the highest speed of the table.
     """
-    return law.low_m_s + law.cell_m_s * int(law.resistance.shape[1])
+    return law.low_m_s + law.cell_m_s * len(law.resistance)
 
 
 def outside(law: SurgeLaw, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
