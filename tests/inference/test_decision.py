@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from shipdrag_ros.inference.decision import (
@@ -20,6 +21,7 @@ from shipdrag_ros.inference.decision import (
     decide,
     marginals,
     mixture,
+    names_one,
     probabilities,
     smallest_set,
 )
@@ -73,6 +75,19 @@ def test_every_decision_follows_from_the_probabilities(ways: list[WeighedHypothe
     listed = [p for _, p in found.candidates]
     assert listed == sorted(listed, reverse=True)
     assert sum(listed) >= LISTED - 1e-9 > sum(listed[:-1]) - 1e-9
+
+
+@given(st.lists(WAYS, min_size=1, max_size=5), st.sampled_from([(), [frozenset('ab')]]))
+def test_many_probabilities_at_once_name_where_one_decision_does(
+    several: list[list[WeighedHypothesis]], inseparable: list[frozenset[str]]
+) -> None:
+    each = [probabilities(ways) for ways in several]
+    sums = [p for one in each for p in marginals(one).values()]
+    assume(all(abs(p - CERTAIN) > 1e-9 for p in sums))
+    names = [NONE, UNKNOWN, A, B, BOTH]
+    columns = np.array([[one.get(name, 0.0) for one in each] for name in names])
+    named = [decide(one, inseparable).verdict is Verdict.NAMED for one in each]
+    assert names_one(names, columns, inseparable).tolist() == named
 
 
 @pytest.mark.parametrize(
