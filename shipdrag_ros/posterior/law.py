@@ -40,20 +40,27 @@ _HUMP_FROUDE, _HUMP_POWER = 0.5, 8
 _HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
 
 
-class WeatherState(NamedTuple):
-    """Probability of a state of wind or depth, and what it says of its columns (w,)."""
+class InfluenceState(NamedTuple):
+    """
+    Probability of a state of wind or depth, or of a force, and what it says of its columns (w,).
+
+    With a `name` it is a hypothesis of its own.
+    """
 
     chance: float
     mean: Float64
     sd: Float64
+    name: str = ''
 
 
 class Influence(NamedTuple):
     """
-    What wind or depth adds to r, and is no part of the hull.
+    What wind, depth or a force from outside adds to r, and is no part of the hull.
 
     Attributes
     ----------
+    name
+        Of the cause.
     known : (m,)
         Without an unknown [m/s^2].
     columns : (w, m)
@@ -62,9 +69,10 @@ class Influence(NamedTuple):
         What it adds to 1 + n_r.
     """
 
+    name: str
     known: Float64
     columns: Float64
-    states: tuple[WeatherState, ...]
+    states: tuple[InfluenceState, ...]
     inertia: float = 0.0
 
 

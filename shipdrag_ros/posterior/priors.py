@@ -76,6 +76,17 @@ RUN_DOWN_SHAPE = Declared(
     '',
     _REALITY,
 )
+HELD_FORCE = 'held force'
+HELD_CHANCE = Declared(
+    'h', 'chance of a force from the stop on that no input shows', 0.03, '', _TAKEN
+)
+HELD = Declared(
+    'h',
+    'that force, over r at the stop; it does not fall with the speed',
+    normal(0.5),
+    '',
+    'lines of tugs 0.1 to 0.4, astern power 0.3 to 1, thrust that is left',
+)
 STOP = Declared(
     't_0',
     'time of the stop, of an onset that no shaft shows',

@@ -21,7 +21,7 @@ from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
+from shipdrag_ros.posterior.law import HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
@@ -57,7 +57,8 @@ class Family:
     """
     A prior of all unknowns: mean and precision (p,), and the probability of the family.
 
-    `level` is that of the hull over the generic one, about which the prior is.
+    `level` is that of the hull over the generic one, about which the prior is; `usual` says
+    whether wind and depth are in their first state.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Family:
     mean: Float64
     precision: Float64
     level: float = 1.0
+    usual: bool = True
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ class RunModel:
     low_m_s, speed_m_s
         At the end and at the stop, roughly.
     law
-    weather
-        What wind and depth add to it; their columns are the last ones.
+    influences
+        What else acts, a force, wind and depth: their columns are the last ones.
     """
 
     rows: Rows
@@ -100,12 +102,12 @@ class RunModel:
     low_m_s: float
     speed_m_s: float
     law: HullLaw
-    weather: tuple[Influence, ...] = ()
+    influences: tuple[Influence, ...] = ()
 
     @property
     def of_hull(self) -> int:
-        """How many of the coefficients are of the hull, before those of wind and depth."""
-        return self.coefficients - sum(len(each.columns) for each in self.weather)
+        """How many of the coefficients are of the hull, before those of what else acts."""
+        return self.coefficients - sum(len(each.columns) for each in self.influences)
 
     @property
     def coefficients(self) -> int:
@@ -129,8 +131,7 @@ class RunModel:
     @property
     def usual(self) -> RunModel:
         """The same in the first state of wind and depth: a fit climbs there."""
-        states = math.prod(len(each.states) for each in self.weather)
-        return replace(self, families=self.families[::states])
+        return replace(self, families=tuple(each for each in self.families if each.usual))
 
     @classmethod
     def of(
@@ -167,7 +168,9 @@ class RunModel:
         """
         law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)
-        adds = () if weather is None else weather.influences(ship, law.speed_m_s)
+        adds: tuple[Influence, ...] = ()
+        if weather is not None:
+            adds = _held(law, speed_m_s), *weather.influences(ship, law.speed_m_s)
         forces = law.forces(ship, tau_s, adds)
         end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
         ones = np.ones(len(variance))
@@ -262,31 +265,45 @@ def _extras(
 def _all_families(
     ship: Ship,
     law: HullLaw,
-    weather: Sequence[Influence],
+    influences: Sequence[Influence],
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
-    states = tuple(product(*(each.states for each in weather)))
+    states = tuple(product(*(each.states for each in influences)))
     for (name, chance, scales, size, level, of_dry), (part, lag), state in product(
         _hulls(ship), _lags(kinds), states
     ):
-        of_weather = [each.mean for each in state]
-        mean = np.concatenate([[each[0] for each in scales], zeros, *of_weather, extra_mean])
+        if of_dry and any(each.name for each in state):
+            continue  # such a craft has forces of its own that do not fall with the speed
+        others = [each.mean for each in state]
+        mean = np.concatenate([[each[0] for each in scales], zeros, *others, extra_mean])
         sizes = np.full(len(law.shapes), size)
         humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
         dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY.mean))
-        of_weather = [each.sd for each in state]
-        sd = np.concatenate(
-            [[each[1] for each in scales], sizes, humps, dry, *of_weather, extra_sd]
-        )
+        others = [each.sd for each in state]
+        sd = np.concatenate([[each[1] for each in scales], sizes, humps, dry, *others, extra_sd])
         if lag is not None:
             at = len(mean) - len(start) + motion.LAG
             mean[at], sd[at] = lag.mean, lag.sd
         chance *= part * math.prod(each.chance for each in state)
-        yield Family(name, chance, mean, 1.0 / sd**2, level)
+        name = next((each.name for each in state if each.name), name)
+        usual = all(of.name or of is each.states[0] for of, each in zip(state, influences))
+        yield Family(name, chance, mean, 1.0 / sd**2, level, usual)
+
+
+def _held(law: HullLaw, speed_m_s: float) -> Influence:
+    """Return a force from the stop on that no input shows and that no speed changes."""
+    at_stop = np.interp(speed_m_s, law.speed_m_s, law.parts.sum(axis=0))
+    chance, none = priors.HELD_CHANCE.mean, np.zeros(1)
+    states = (
+        InfluenceState(1.0 - chance, none, none + EXACT),
+        InfluenceState(chance, none, none + priors.HELD.sd, priors.HELD_FORCE),
+    )
+    column = np.full((1, len(law.speed_m_s)), at_stop)
+    return Influence(priors.HELD_FORCE, np.zeros(len(law.speed_m_s)), column, states)
 
 
 def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, Declared | None]]:

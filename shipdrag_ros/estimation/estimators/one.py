@@ -25,6 +25,7 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
+from shipdrag_ros.posterior.priors import HELD_FORCE
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
@@ -32,6 +33,8 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 NAME = 'one'
+_CONDITIONS = (HELD_FORCE,)  # what is taken out of r(v)
+_CALM = (*_CONDITIONS, 'wind', 'depth')
 _CURVE_POINTS = 129
 _WIND_POINTS = 25
 
@@ -246,10 +249,10 @@ def _result(
             f'that lies in a coastdown{", or a smaller froude_min" if too_slow else ""}'
         )
     grid = np.linspace(low, high, _CURVE_POINTS)
-    part = read(found, grid, calm=False)
+    part = read(found, grid, without=_CONDITIONS)
     use = _slowing(part)
     conditions = _curve(part, use, ship)
-    part = read(found, grid, calm=True)
+    part = read(found, grid, without=_CALM)
     calm = _curve(part, use, ship)
     curve = conditions if reference.unknown else calm
     stamps = np.concatenate(list(record.stamps.values()))
@@ -263,7 +266,9 @@ def _result(
     return Estimate(
         NAME,
         **ValidRange.of_branch(curve)._asdict(),
-        **_at_end(found, coast, last, calm=not reference.unknown)._asdict(),
+        **_at_end(
+            found, coast, last, without=_CONDITIONS if reference.unknown else _CALM
+        )._asdict(),
         calm=calm,
         conditions=conditions,
         reference=reference,
@@ -325,10 +330,10 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
     )
 
 
-def _at_end(found: RunPosterior, coast: Rows, last: float, *, calm: bool) -> AtEnd:
+def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str, ...]) -> AtEnd:
     """Return speed and r at the end of the window."""
     problem, k = found.problem, found.problem.coefficients
-    at_end = read(found, np.array([last]), calm=calm)
+    at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
     now = found.mean.copy()
     now[k + motion.SCALE :] = 0.0  # the speed itself, not the log
