@@ -42,15 +42,12 @@ _HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
 
 class InfluenceState(NamedTuple):
     """
-    Probability of a state of wind or depth, or of a force, and what it says of its columns (w,).
-
-    With a `name` it is a hypothesis of its own.
+    Probability of a state of wind or depth, and what it says of its columns (w,).
     """
 
     chance: float
     mean: Float64
     sd: Float64
-    name: str = ''
 
 
 class Influence(NamedTuple):

@@ -80,6 +80,15 @@ HELD_FORCE = 'held force'
 HELD_CHANCE = Declared(
     'h', 'chance of a force from the stop on that no input shows', 0.03, '', _TAKEN
 )
+THRUST_LEFT = 'thrust left'
+LEFT_CHANCE = Declared('l', 'chance that thrust is left after the stop', 0.1, '', _TAKEN)
+LEFT = Declared(
+    'l',
+    'that thrust, over r at the stop',
+    normal(0.25, mean=0.3),
+    '',
+    'lines of tugs 0.1 to 0.4, astern power 0.3 to 1, thrust that is left',
+)
 HELD = Declared(
     'h',
     'that force, over r at the stop; it does not fall with the speed',

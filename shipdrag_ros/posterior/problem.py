@@ -273,11 +273,10 @@ def _all_families(
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
     states = tuple(product(*(each.states for each in influences)))
-    for (name, chance, scales, size, level, of_dry), (part, lag), state in product(
-        _hulls(ship), _lags(kinds), states
+    held = 2 + len(zeros)
+    for (name, chance, scales, size, level, of_dry), (part, lag), (p, acting), state in product(
+        _hulls(ship), _lags(kinds), _acting(stop, bool(influences)), states
     ):
-        if of_dry and any(each.name for each in state):
-            continue  # such a craft has forces of its own that do not fall with the speed
         others = [each.mean for each in state]
         mean = np.concatenate([[each[0] for each in scales], zeros, *others, extra_mean])
         sizes = np.full(len(law.shapes), size)
@@ -288,20 +287,29 @@ def _all_families(
         if lag is not None:
             at = len(mean) - len(start) + motion.LAG
             mean[at], sd[at] = lag.mean, lag.sd
-        chance *= part * math.prod(each.chance for each in state)
-        name = next((each.name for each in state if each.name), name)
-        usual = all(of.name or of is each.states[0] for of, each in zip(state, influences))
+        chance *= part * p * math.prod(each.chance for each in state)
+        if acting is not None:
+            at = len(mean) - len(start) + motion.LEFT if acting == priors.THRUST_LEFT else held
+            of = priors.LEFT if acting == priors.THRUST_LEFT else priors.HELD
+            mean[at], sd[at], name = of.mean, of.sd, acting
+        usual = all(of is each.states[0] for of, each in zip(state, influences))
         yield Family(name, chance, mean, 1.0 / sd**2, level, usual)
+
+
+def _acting(stop: StopPrior, any_acts: bool) -> Iterator[tuple[float, str | None]]:
+    held = priors.HELD_CHANCE.mean if any_acts else 0.0
+    left = priors.LEFT_CHANCE.mean if any_acts and stop.sd_s > 0.0 else 0.0
+    yield 1.0 - held - left, None
+    if held:
+        yield held, priors.HELD_FORCE
+    if left:
+        yield left, priors.THRUST_LEFT
 
 
 def _held(law: HullLaw, speed_m_s: float) -> Influence:
     """Return a force from the stop on that no input shows and that no speed changes."""
     at_stop = np.interp(speed_m_s, law.speed_m_s, law.parts.sum(axis=0))
-    chance, none = priors.HELD_CHANCE.mean, np.zeros(1)
-    states = (
-        InfluenceState(1.0 - chance, none, none + EXACT),
-        InfluenceState(chance, none, none + priors.HELD.sd, priors.HELD_FORCE),
-    )
+    states = (InfluenceState(1.0, np.zeros(1), np.full(1, EXACT)),)
     column = np.full((1, len(law.speed_m_s)), at_stop)
     return Influence(priors.HELD_FORCE, np.zeros(len(law.speed_m_s)), column, states)
 
