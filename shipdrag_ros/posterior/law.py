@@ -38,6 +38,8 @@ _NEGLIGIBLE = 0.03  # size of a column, of the largest
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 _HUMP_FROUDE, _HUMP_POWER = 0.5, 8
 _HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
+HELD, WIND, DEPTH = 'held_force', 'wind', 'depth'
+"""Names of influences."""
 
 
 class InfluenceState(NamedTuple):

@@ -4,8 +4,8 @@ The motion with its derivatives by all unknowns, and what instruments read of it
 
     (1 + n_r(u) + n) du/dt = -r(u) + r(u_0) T(t)
     r(u) = known(u) + sum_j theta_j R_j(u)
-    T = (1 + q) nu^2 - q nu u / u_0 + l exp(-(t - t_0) / LEFT_S),  nu = exp(-(t - t_0) / tau)
-        from t_0 on, 1 before
+    T = (1 + q) nu^2 - q nu u / u_0 + l exp(-(t - t_0) / LEFT_S)  from t_0 on, 1 before
+    nu = exp(-(t - t_0) / tau)
     log = (1 + b_1) u(t - lag) + b_0;  over ground = u(t - lag) + c;  place = x_0 + x + c t
 
 Every force that depends on the speed alone is a column of a table over the speed: parts of the
@@ -20,6 +20,7 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
+from shipdrag_ros.posterior.priors import LEFT_S
 from shipdrag_ros.samples import Float64
 
 # unknowns behind the coefficients theta; the first five change the motion
@@ -27,7 +28,7 @@ SPEED, THRUST, TAU, INERTIA, LEFT, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GRO
 EXTRAS = GROUND_LAG + 1
 OWN = EXTRAS - PLACE  # of each further instrument behind them, from its `PLACE` on
 _MOVING = 5
-LEFT_S = 200.0
+_LEFT_S = LEFT_S.mean
 
 
 def own(code: int) -> int:
@@ -144,7 +145,7 @@ def _rates(
     if forces.tau_s > 0.0:
         q, tau = unknowns[k + THRUST], forces.tau_s * np.exp(unknowns[k + TAU])
         nu, ratio = np.exp(-t / tau), u / u_0
-        left = np.exp(-t / LEFT_S)
+        left = np.exp(-t / _LEFT_S)
         thrust = (1.0 + q) * nu * nu - q * nu * ratio + unknowns[k + LEFT] * left
         by_u, by_u_0 = -q * nu / u_0, q * nu * ratio / u_0
         by_q = nu * nu - nu * ratio

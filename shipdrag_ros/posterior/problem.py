@@ -21,7 +21,7 @@ from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import HullLaw, Influence, InfluenceState, wave_with_friction
+from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
@@ -45,11 +45,14 @@ class StopPrior:
         Of its time; 0: it is before the first row, and no thrust is left.
     run_down_s, run_down_sd_s
         Of the shaft; 0: not known.
+    by_shaft
+        Whether a shaft shows it, and so that no thrust is left.
     """
 
     sd_s: float
     run_down_s: float
     run_down_sd_s: float
+    by_shaft: bool = False
 
 
 @dataclass(frozen=True)
@@ -273,54 +276,60 @@ def _all_families(
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
     states = tuple(product(*(each.states for each in influences)))
-    held = 2 + len(zeros)
-    for (name, chance, scales, size, level, of_dry), (part, lag), (p, acting), state in product(
-        _hulls(ship), _lags(kinds), _acting(stop, bool(influences)), states
-    ):
+    added = sum(len(each.columns) for each in influences)
+    extra = 2 + len(zeros) + added
+    after_stop = tuple(_after_stop(stop, added)) if influences else (_Option(1.0),)
+    for hull, lag, force, state in product(_hulls(ship), _lags(kinds), after_stop, states):
         others = [each.mean for each in state]
-        mean = np.concatenate([[each[0] for each in scales], zeros, *others, extra_mean])
-        sizes = np.full(len(law.shapes), size)
-        humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
-        dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY.mean))
+        mean = np.concatenate([[each[0] for each in hull.scales], zeros, *others, extra_mean])
+        sizes = np.full(len(law.shapes), hull.size)
+        humps = np.full(len(law.humps), hull.level * priors.GENERIC_HUMPS.sd)
+        dry = np.full(len(law.dry), max(hull.dry, priors.SHIP_DRY.mean))
         others = [each.sd for each in state]
-        sd = np.concatenate([[each[1] for each in scales], sizes, humps, dry, *others, extra_sd])
-        if lag is not None:
-            at = len(mean) - len(start) + motion.LAG
-            mean[at], sd[at] = lag.mean, lag.sd
-        chance *= part * p * math.prod(each.chance for each in state)
-        if acting is not None:
-            at = len(mean) - len(start) + motion.LEFT if acting == priors.THRUST_LEFT else held
-            of = priors.LEFT if acting == priors.THRUST_LEFT else priors.HELD
-            mean[at], sd[at], name = of.mean, of.sd, acting
-        usual = all(of is each.states[0] for of, each in zip(state, influences))
-        yield Family(name, chance, mean, 1.0 / sd**2, level, usual)
+        scales = [each[1] for each in hull.scales]
+        sd = np.concatenate([scales, sizes, humps, dry, *others, extra_sd])
+        for place, prior in (*lag.unknown, *force.unknown):
+            mean[extra + place], sd[extra + place] = prior.mean, prior.sd
+        chance = hull.chance * lag.chance * force.chance * math.prod(e.chance for e in state)
+        usual = all(each is of.states[0] for each, of in zip(state, influences))
+        yield Family(force.name or hull.name, chance, mean, 1.0 / sd**2, hull.level, usual)
 
 
-def _acting(stop: StopPrior, any_acts: bool) -> Iterator[tuple[float, str | None]]:
-    held = priors.HELD_CHANCE.mean if any_acts else 0.0
-    left = priors.LEFT_CHANCE.mean if any_acts and stop.sd_s > 0.0 else 0.0
-    yield 1.0 - held - left, None
-    if held:
-        yield held, priors.HELD_FORCE
-    if left:
-        yield left, priors.THRUST_LEFT
+class _Option(NamedTuple):
+    """One of some that exclude each other: an unknown by its place behind the coefficients."""
+
+    chance: float
+    unknown: tuple[tuple[int, Declared], ...] = ()
+    name: str = ''
+
+
+def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
+    """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
+    held, left = priors.HELD_CHANCE.mean, priors.LEFT_CHANCE.mean
+    if stop.by_shaft or stop.sd_s == 0.0:
+        left = 0.0
+    yield _Option(1.0 - held - left)
+    yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)
+    if left > 0.0:
+        yield _Option(left, ((motion.LEFT, priors.LEFT),), priors.THRUST_LEFT)
 
 
 def _held(law: HullLaw, speed_m_s: float) -> Influence:
-    """Return a force from the stop on that no input shows and that no speed changes."""
+    """Return a force that no speed changes, over r at the stop; it acts in few families."""
     at_stop = np.interp(speed_m_s, law.speed_m_s, law.parts.sum(axis=0))
-    states = (InfluenceState(1.0, np.zeros(1), np.full(1, EXACT)),)
-    column = np.full((1, len(law.speed_m_s)), at_stop)
-    return Influence(priors.HELD_FORCE, np.zeros(len(law.speed_m_s)), column, states)
+    none, unit = np.zeros(len(law.speed_m_s)), np.full((1, len(law.speed_m_s)), at_stop)
+    state = InfluenceState(1.0, np.zeros(1), np.full(1, EXACT))
+    return Influence(HELD, none, unit, (state,))
 
 
-def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, Declared | None]]:
-    """Yield probability and prior of the filter of a log: none, or one."""
+def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
+    """Yield the filter of a log: none, or one."""
     if LOG not in kinds:
-        yield 1.0, None
+        yield _Option(1.0)
         return
-    yield priors.UNFILTERED_CHANCE.mean, priors.LOG_UNFILTERED
-    yield 1.0 - priors.UNFILTERED_CHANCE.mean, priors.LOG_LAG
+    unfiltered = priors.UNFILTERED_CHANCE.mean
+    yield _Option(unfiltered, ((motion.LAG, priors.LOG_UNFILTERED),))
+    yield _Option(1.0 - unfiltered, ((motion.LAG, priors.LOG_LAG),))
 
 
 class _Hull(NamedTuple):

@@ -23,7 +23,14 @@ from numpy.polynomial.hermite_e import hermegauss
 
 from shipdrag_ros.parameter import Prior
 from shipdrag_ros.posterior import priors
-from shipdrag_ros.posterior.law import ABOVE, Influence, InfluenceState, usual_baseline
+from shipdrag_ros.posterior.law import (
+    ABOVE,
+    DEPTH,
+    WIND,
+    Influence,
+    InfluenceState,
+    usual_baseline,
+)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import AIR_DENSITY_KG_M3, Ship
 from shipdrag_ros.simulation.effect import Effect, Frame
@@ -163,7 +170,7 @@ def _influence(
     Parameters
     ----------
     name
-        Of what it is.
+        `WIND` or `DEPTH`.
     ensembles
         Of each state: its probability, weights (n,) and forces (n, m).
     inertia
@@ -212,7 +219,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
         ahead = (1.0 + gain * z[:, 1:2]) * (speed + head) + off * z[:, 2:3]
         ahead = ahead + turned * z[:, 3:] * cross
         abeam = (1.0 + gain * z[:, 1:2]) * cross - turned * z[:, 3:] * (speed + head)
-        return _influence('wind', [(1.0, weight, force(z[:, 0], ahead, abeam))])
+        return _influence(WIND, [(1.0, weight, force(z[:, 0], ahead, abeam))])
     effect = _of('wind_apparent')
     blows = _chance(priors.WINDY.mean, effect, ship)
     z, weight = _nodes(3, 5, 3)
@@ -226,7 +233,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
         ahead, abeam = (sheltered * sd * each for sd, each in zip(sds, (z[:, 1:2], z[:, 2:])))
         forces = force(z[:, 0], speed + ahead, abeam)
         ensembles.append((chance, weight, forces))
-    return _influence('wind', ensembles)
+    return _influence(WIND, ensembles)
 
 
 def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
@@ -239,7 +246,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
         forces, inertia = _shallow(ship, tuple(depths.tolist()), speed)
         forces = forces * (1.0 + effect.formula_sd * z[:, 1:])
         # the most probable reading is the middle one
-        return _influence('depth', [(1.0, weight, forces)], float(inertia[len(z) // 2]))
+        return _influence(DEPTH, [(1.0, weight, forces)], float(inertia[len(z) // 2]))
     shallow = _chance(effect.odds / (1.0 + effect.odds), effect, ship)
     z, weight = _nodes(5, 3)
     prior = effect.parameters_of(ship)[0].prior
@@ -250,7 +257,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
     whole = (deep + forces) * own / (own + inertia[:, None]) - deep
     whole = whole * (1.0 + effect.formula_sd * z[:, 1:])
     none = np.zeros((1, len(speed)))
-    return _influence('depth', [(1.0 - shallow, np.ones(1), none), (shallow, weight, whole)])
+    return _influence(DEPTH, [(1.0 - shallow, np.ones(1), none), (shallow, weight, whole)])
 
 
 def with_usual_shape(ship: Ship) -> Ship:

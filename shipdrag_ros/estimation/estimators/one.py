@@ -25,7 +25,8 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
-from shipdrag_ros.posterior.priors import HELD_FORCE
+from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
+from shipdrag_ros.posterior.priors import HELD_FORCE, THRUST_LEFT
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
@@ -33,8 +34,8 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 NAME = 'one'
-_CONDITIONS = (HELD_FORCE,)  # what is taken out of r(v)
-_CALM = (*_CONDITIONS, 'wind', 'depth')
+_CONDITIONS = (HELD,)  # what is taken out of r(v)
+_CALM = (HELD, WIND, DEPTH)
 _CURVE_POINTS = 129
 _WIND_POINTS = 25
 
@@ -150,7 +151,7 @@ def estimate(
         variance,
         len(record.steady.time_s),
         ship,
-        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s),
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.by_shaft),
         speed_m_s=guess.speed_m_s,
         range_m_s=(guess.lowest * guess.speed_m_s, guess.speed_m_s),
         weather=weather,
@@ -188,8 +189,23 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         f'{name} {found.chance(name):.2g}'
         for name in dict.fromkeys(each.name for each in problem.families)
     )
-    yield f'averaged over what the hull may differ by: {chances}'
+    yield f'averaged over what the hull may differ by and what else may act: {chances}'
     sd = np.sqrt(np.diag(found.covariance))
+    acting = (
+        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
+        (
+            THRUST_LEFT,
+            k + motion.LEFT,
+            'thrust is left after the stop,',
+        ),
+    )
+    for name, at, what in acting:
+        if found.chance(name) > 0.5:
+            yield (
+                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the resistance at '
+                f'the stop (probability {found.chance(name):.2g}): it is no part of r; if she was '
+                'towed, braked or driven, give a window without it'
+            )
     logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
     for name, code in logs.items() if len(record.stamps) > 1 else ():
         at = k + motion.own(code) + motion.SCALE
@@ -252,6 +268,7 @@ def _result(
     part = read(found, grid, without=_CONDITIONS)
     use = _slowing(part)
     conditions = _curve(part, use, ship)
+    whole = _curve(read(found, grid), use, ship)
     part = read(found, grid, without=_CALM)
     calm = _curve(part, use, ship)
     curve = conditions if reference.unknown else calm
@@ -271,6 +288,7 @@ def _result(
         )._asdict(),
         calm=calm,
         conditions=conditions,
+        whole=whole,
         reference=reference,
         sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
         sigma_shared_m_s2=part.shared_m_s2[use],
