@@ -191,21 +191,7 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
     )
     yield f'averaged over what the hull may differ by and what else may act: {chances}'
     sd = np.sqrt(np.diag(found.covariance))
-    acting = (
-        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
-        (
-            THRUST_LEFT,
-            k + motion.LEFT,
-            'thrust is left after the stop,',
-        ),
-    )
-    for name, at, what in acting:
-        if found.chance(name) > 0.5:
-            yield (
-                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the resistance at '
-                f'the stop (probability {found.chance(name):.2g}): it is no part of r; if she was '
-                'towed, braked or driven, give a window without it'
-            )
+    yield from _acting_notes(found, sd)
     logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
     for name, code in logs.items() if len(record.stamps) > 1 else ():
         at = k + motion.own(code) + motion.SCALE
@@ -233,6 +219,22 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         f'slow disturbances learnt, averaged over {len(found.noise.settings.weight)} settings: '
         f'about {", ".join(sizes)}'
     )
+
+
+def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
+    """Yield what acts after the stop, where that is more likely than not."""
+    problem = found.problem
+    for name, at, what in (
+        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
+        (THRUST_LEFT, problem.coefficients + motion.LEFT, 'thrust is left after the stop,'),
+    ):
+        chance = found.chance(name)
+        if chance > 0.5:
+            yield (
+                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the '
+                f'resistance at the stop (probability {chance:.2g}): it is no part of r, and '
+                'makes its band wide; give a window in which nothing acts but the water'
+            )
 
 
 def _log_scale_note(scale: float, sd: float, which: str) -> str:
