@@ -306,7 +306,9 @@ class _Option(NamedTuple):
 def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
     """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
     held, left = priors.HELD_CHANCE.mean, priors.LEFT_CHANCE.mean
-    if stop.by_shaft or stop.sd_s == 0.0:
+    if stop.sd_s == 0.0:  # the window is given
+        held, left = priors.TOLD_GLIDE_CHANCE.mean, 0.0
+    if stop.by_shaft:
         left = 0.0
     yield _Option(1.0 - held - left)
     yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)
