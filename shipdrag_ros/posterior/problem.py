@@ -45,14 +45,14 @@ class StopPrior:
         Of its time; 0: it is before the first row, and no thrust is left.
     run_down_s, run_down_sd_s
         Of the shaft; 0: not known.
-    by_shaft
-        Whether a shaft shows it, and so that no thrust is left.
+    stands
+        Whether the shaft is seen to stand after it: then no thrust is left.
     """
 
     sd_s: float
     run_down_s: float
     run_down_sd_s: float
-    by_shaft: bool = False
+    stands: bool = False
 
 
 @dataclass(frozen=True)
@@ -308,7 +308,7 @@ def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
     held, left = priors.HELD_CHANCE.mean, priors.LEFT_CHANCE.mean
     if stop.sd_s == 0.0:  # the window is given
         held, left = priors.TOLD_GLIDE_CHANCE.mean, 0.0
-    if stop.by_shaft:
+    if stop.stands:
         left = 0.0
     yield _Option(1.0 - held - left)
     yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)

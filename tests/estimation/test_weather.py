@@ -112,14 +112,6 @@ def test_the_parts_of_sigma_add_up() -> None:
         found = coast(ship, WINDS[0])
         causes = ['n_r', 'log', 'held_force', 'wind', 'depth', 'law', 'noise']
         assert list(found.sigma_parts) == causes
-            'n_r',
-            'log',
-            'held_force',
-            'wind',
-            'depth',
-            'law',
-            'noise',
-        ]
         total = sum(part**2 for part in found.sigma_parts.values())
         np.testing.assert_allclose(np.sqrt(total), found.calm.sigma_m_s2, rtol=1e-6)
 

@@ -151,7 +151,7 @@ def estimate(
         variance,
         len(record.steady.time_s),
         ship,
-        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.by_shaft),
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
         speed_m_s=guess.speed_m_s,
         range_m_s=(guess.lowest * guess.speed_m_s, guess.speed_m_s),
         weather=weather,
