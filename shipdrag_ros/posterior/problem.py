@@ -279,7 +279,8 @@ def _all_families(
     added = sum(len(each.columns) for each in influences)
     extra = 2 + len(zeros) + added
     after_stop = tuple(_after_stop(stop, added)) if influences else (_Option(1.0),)
-    for hull, lag, force, state in product(_hulls(ship), _lags(kinds), after_stop, states):
+    options = tuple(product(_lags(kinds), after_stop))
+    for hull, state in product(_hulls(ship), states):
         others = [each.mean for each in state]
         mean = np.concatenate([[each[0] for each in hull.scales], zeros, *others, extra_mean])
         sizes = np.full(len(law.shapes), hull.size)
@@ -287,12 +288,15 @@ def _all_families(
         dry = np.full(len(law.dry), max(hull.dry, priors.SHIP_DRY.mean))
         others = [each.sd for each in state]
         scales = [each[1] for each in hull.scales]
-        sd = np.concatenate([scales, sizes, humps, dry, *others, extra_sd])
-        for place, prior in (*lag.unknown, *force.unknown):
-            mean[extra + place], sd[extra + place] = prior.mean, prior.sd
-        chance = hull.chance * lag.chance * force.chance * math.prod(e.chance for e in state)
+        precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
+        chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
-        yield Family(force.name or hull.name, chance, mean, 1.0 / sd**2, hull.level, usual)
+        for lag, force in options:
+            own, known = mean.copy(), precision.copy()
+            for place, prior in (*lag.unknown, *force.unknown):
+                own[extra + place], known[extra + place] = prior.mean, prior.sd**-2.0
+            part = chance * lag.chance * force.chance
+            yield Family(force.name or hull.name, part, own, known, hull.level, usual)
 
 
 class _Option(NamedTuple):
