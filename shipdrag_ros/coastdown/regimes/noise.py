@@ -37,7 +37,6 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
-_WALKS = len(n.TRACK_WALK)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
 _STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
@@ -105,21 +104,13 @@ class NoiseFilters(NamedTuple):
 
 
 @compiled(inline=True, uncounted=True)
-def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
-    """Return gust, slow error and its time, white noise and walk of a filter."""
+def _parts(which: int, k: int) -> tuple[float, float, float, float]:
+    """Return gust, slow error and its time, and white noise of a filter."""
     gust = 0.0 if which == _APART else n.GUST[k % _GUSTS]
     k //= _GUSTS
-    if which == 2:
-        return (
-            gust,
-            float(n.CURRENT[1]),
-            float(n.CURRENT_S),
-            n.WHITE[k % _WHITES],
-            n.TRACK_WALK[k // _WHITES % _WALKS],
-        )
     white = n.WHITE[k % _WHITES]
     k //= _WHITES
-    return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white, 0.0
+    return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white
 
 
 @compiled(uncounted=True)
@@ -201,9 +192,8 @@ def _one(
     spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
-    walks = _WALKS * _GUSTS * _WHITES
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
-    for k in range(0, walks if which == 2 else FILTERS, stride):
+    for k in range(0, FILTERS, stride):
         gained = _filter(noise, setting, which, k, value, spread, a)
         noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
 
@@ -232,7 +222,7 @@ def _filter(
 ) -> float:
     """Carry one filter over a bin; return the log density of the reading."""
     x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
-    gust, wander, wander_s, white, walk = _parts(which, k)
+    gust, wander, wander_s, white = _parts(which, k)
     dt, pace = setting.step_s, setting.pace
     keep = 1.0  # no hull brings back what they differ by
     if which != _APART:
@@ -264,7 +254,6 @@ def _filter(
         p[1, 1] += (n.POWER_DRIFT * x[1]) ** 2 * dt / (600.0 * pace)
     p[2, 2] += (1.0 - keep_g * keep_g) * (gust * a) ** 2
     p[3, 3] += (1.0 - keep_b * keep_b) * wander * wander
-    p[4, 4] += walk * walk * dt
     first, second = (4, 4) if which == 2 else (0, 3)
     variance = (white * spread) ** 2 + _rounding(noise, which) ** 2 + 1e-12
     off = -x[4] if which == 2 else value - x[0] - x[3]
@@ -303,33 +292,33 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
     for which in range(3):
         if noise.seen[which] < 8:
             continue
-        filters = _WALKS * _GUSTS * _WHITES if which == 2 else FILTERS
         best = -np.inf
-        for k in range(filters):
+        for k in range(FILTERS):
             best = max(best, _evidence(noise, which, k))
-        total = g = b = t = w = q = 0.0
-        for k in range(filters):
+        total = g = b = t = w = 0.0
+        for k in range(FILTERS):
             share = math.exp(_evidence(noise, which, k) - best)
-            gust, wander, wander_s, white, walk = _parts(which, k)
+            gust, wander, wander_s, white = _parts(which, k)
             total += share
             g += share * math.log(gust)
             b += share * math.log(wander)
             t += share * math.log(wander_s)
             w += share * math.log(white)
-            q += share * math.log(max(walk, 1e-6))
         spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
         step = setting.step_s if which == 2 else 1.0
         spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
         white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
+        wander, wander_s = math.exp(b / total), math.exp(t / total)
         if which == 0:
-            out[N_WANDER], out[N_WANDER_S] = math.exp(b / total), math.exp(t / total)
-            out[N_LOG] = white
+            out[N_WANDER], out[N_WANDER_S], out[N_LOG] = wander, wander_s, white
         elif which == 1:
-            out[N_EDDY], out[N_EDDY_S] = math.exp(b / total), math.exp(t / total)
-            out[N_GROUND] = white
-        else:
-            out[N_FIX], out[N_WALK] = white, math.exp(q / total)
+            out[N_EDDY], out[N_EDDY_S], out[N_GROUND] = wander, wander_s, white
+        elif noise.seen[1] < 8:
+            out[N_EDDY], out[N_EDDY_S], out[N_FIX], out[N_WALK] = wander, wander_s, white, 0.0
+        else:  # the speed over ground has said what is common
+            out[N_FIX] = white
+            out[N_WALK] = wander * math.sqrt(2.0 * wander_s * setting.pace)
     if noise.rate[1] > 8.0:
         out[N_RATE] = math.sqrt(noise.rate[0]) + 1e-5
