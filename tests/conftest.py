@@ -190,6 +190,7 @@ def estimate(ship: Ship) -> Estimate:
         noise_sd={'speed_through_water': 0.05, 'position': 10.0},
         calm=curve,
         conditions=curve,
+        whole=curve,
         froude_valid=(0.05, 0.18),
         froude_max_by=FroudeMax.INFLECTION,
         froude_max_argmax=0.2,

@@ -24,6 +24,7 @@ from shipdrag_ros.inference.noise import SIZE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.posterior.laplace import infer
+from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
 from shipdrag_ros.posterior.motion import damping_of, predict, shapes_at
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import read
@@ -35,6 +36,7 @@ SPEED_M_S, LOW_M_S, LEAD_S, COAST_S = 8.0, 3.6, 1800.0, 1500.0
 STEADY_BIN_S, BIN_S = 30.0, 15.0
 LOG_SD, POSITION_SD = 0.02, 4.0  # of a row
 STOP = StopPrior(30.0, 8.0, 2.0)
+OUT = (HELD, WIND, DEPTH), (HELD,)  # of the calm curve, and of that in the conditions
 WIDE = 1.96
 SPEEDS = np.linspace(LOW_M_S, 7.8, 50)
 
@@ -98,11 +100,16 @@ def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
     whiten(model.rows, whitener, noise)
     disturbed = np.linalg.solve(whitener.T, rng.standard_normal(len(speed)))
     known, columns = shapes_at(model.forces, SPEEDS)
-    whole = known[0] + unknowns[:k] @ columns[0]
-    of_weather = unknowns[model.of_hull : k] @ columns[0, model.of_hull :]
-    for each in model.weather:
-        of_weather = of_weather + np.interp(SPEEDS, model.law.speed_m_s, each.known)
-    return model_of(disturbed - table[0]), family.name, np.stack([whole - of_weather, whole])
+    conditions = known[0] + unknowns[:k] @ columns[0]
+    calm, place = conditions.copy(), model.of_hull
+    for each in model.influences:
+        own = slice(place, place + len(each.columns))
+        place = own.stop
+        adds = np.interp(SPEEDS, model.law.speed_m_s, each.known) + unknowns[own] @ columns[0, own]
+        calm -= adds
+        if each.name == HELD:
+            conditions -= adds
+    return model_of(disturbed - table[0]), family.name, np.stack([calm, conditions])
 
 
 def place(rng: np.random.Generator) -> Place:
@@ -118,7 +125,7 @@ def place(rng: np.random.Generator) -> Place:
     found = infer(model)
     calm, whole = (
         (part.resistance_m_s2 - each) / part.sigma_m_s2
-        for part, each in zip((read(found, SPEEDS, calm=which) for which in (True, False)), true)
+        for part, each in zip((read(found, SPEEDS, without=out) for out in OUT), true)
     )
     names = list(dict.fromkeys(each.name for each in model.families))
     best = max(names, key=found.chance)

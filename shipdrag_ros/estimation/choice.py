@@ -244,9 +244,9 @@ def averaged(estimator: WindowEstimator) -> WindowEstimator:
 
 
 def _mixed(one: Estimate, other: Estimate, doubt: float, note: str) -> Estimate:
-    calm, conditions = (
+    calm, conditions, whole = (
         _mixture(getattr(one, name), getattr(other, name), doubt)
-        for name in ('calm', 'conditions')
+        for name in ('calm', 'conditions', 'whole')
     )
     low, high = (
         max(one.froude_valid[0], other.froude_valid[0]),
@@ -274,6 +274,7 @@ def _mixed(one: Estimate, other: Estimate, doubt: float, note: str) -> Estimate:
         calm=calm,
         sigma_shared_m_s2=shared,
         conditions=conditions,
+        whole=whole,
         froude_valid=(low, high),
         sigma_parts=parts,
         notes=(*one.notes, note),

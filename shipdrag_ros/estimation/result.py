@@ -125,6 +125,8 @@ class Estimate:
     calm, conditions
         r(v) on the whole monotone branch of v: of the ship in calm deep water by a true log,
         and in the wind and depth of the run. The same where an estimator takes neither out.
+    whole
+        All that slows her in the run: that in its conditions, and a force that no input shows.
     froude_valid
         [Fr_min, Fr_max]: where r(v) may be used.
     froude_max_by
@@ -165,6 +167,7 @@ class Estimate:
     noise_sd: dict[str, float]
     calm: ResistanceCurve
     conditions: ResistanceCurve
+    whole: ResistanceCurve
     froude_valid: tuple[float, float]
     froude_max_by: FroudeMax
     froude_max_argmax: float

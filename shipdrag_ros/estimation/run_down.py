@@ -279,6 +279,8 @@ class RunDown:
         A sentence each.
     by_shaft
         Whether a shaft or pitch dates the stop.
+    stands
+        Whether it stands after that, and drives no more.
     """
 
     stop_ns: int
@@ -287,6 +289,7 @@ class RunDown:
     shaft_sd_s: float
     notes: tuple[str, ...]
     by_shaft: bool = False
+    stands: bool = False
 
     @classmethod
     def of(cls, window: Window, ship: Ship) -> RunDown:
@@ -340,6 +343,7 @@ class RunDown:
             fall.run_down_sd_s,
             (*notes, *others),
             by_shaft=True,
+            stands=fall.kept < TURNS,
         )
 
 

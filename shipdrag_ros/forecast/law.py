@@ -43,14 +43,14 @@ class KnownCurve(NamedTuple):
     @classmethod
     def of(cls, estimate: Estimate) -> KnownCurve:
         """
-        Return what an estimate knows, in the conditions of the run.
+        Return what an estimate knows of all that slows her in the run.
 
         Errors at two speeds are alike over sigma / sd of the slope.
         An error of n_r cancels: r / (1 + n_r) was measured, and is foretold.
         """
-        curve = estimate.valid_conditions
+        curve = estimate.whole.between(*estimate.froude_valid)
         if len(curve) < _POINTS:
-            curve = estimate.conditions
+            curve = estimate.whole
         sd = curve.sigma_repeatable_m_s2
         alike = sd / np.maximum(curve.slope_sigma * curve.froude, 1e-12)
         return cls(curve.speed_m_s, curve.resistance_m_s2, sd, alike)

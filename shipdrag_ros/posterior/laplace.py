@@ -278,6 +278,7 @@ def _moved(problem: RunModel, step: Float64, covariance: Float64) -> float:
     k, speed = problem.coefficients, problem.law.speed_m_s
     inside = (speed >= problem.low_m_s) & (speed <= problem.speed_m_s)
     columns = problem.forces.columns[0][:, inside]
+    columns[problem.of_hull : problem.of_hull + 1] = 0.0  # a held force is no part of r
     variance = np.einsum('km,kl,lm->m', columns, covariance[:k, :k], columns)
     with np.errstate(invalid='ignore', divide='ignore'):
         return float(np.max(np.abs(step[:k] @ columns) / np.sqrt(variance)))

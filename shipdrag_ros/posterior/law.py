@@ -38,10 +38,14 @@ _NEGLIGIBLE = 0.03  # size of a column, of the largest
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 _HUMP_FROUDE, _HUMP_POWER = 0.5, 8
 _HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
+HELD, WIND, DEPTH = 'held_force', 'wind', 'depth'
+"""Names of influences."""
 
 
-class WeatherState(NamedTuple):
-    """Probability of a state of wind or depth, and what it says of its columns (w,)."""
+class InfluenceState(NamedTuple):
+    """
+    Probability of a state of wind or depth, and what it says of its columns (w,).
+    """
 
     chance: float
     mean: Float64
@@ -50,10 +54,12 @@ class WeatherState(NamedTuple):
 
 class Influence(NamedTuple):
     """
-    What wind or depth adds to r, and is no part of the hull.
+    What wind, depth or a force from outside adds to r, and is no part of the hull.
 
     Attributes
     ----------
+    name
+        Of the cause.
     known : (m,)
         Without an unknown [m/s^2].
     columns : (w, m)
@@ -62,9 +68,10 @@ class Influence(NamedTuple):
         What it adds to 1 + n_r.
     """
 
+    name: str
     known: Float64
     columns: Float64
-    states: tuple[WeatherState, ...]
+    states: tuple[InfluenceState, ...]
     inertia: float = 0.0
 
 

@@ -4,7 +4,8 @@ The motion with its derivatives by all unknowns, and what instruments read of it
 
     (1 + n_r(u) + n) du/dt = -r(u) + r(u_0) T(t)
     r(u) = known(u) + sum_j theta_j R_j(u)
-    T = (1 + q) nu^2 - q nu u / u_0,  nu = exp(-(t - t_0) / tau)  from t_0 on, 1 before
+    T = (1 + q) nu^2 - q nu u / u_0 + l exp(-(t - t_0) / LEFT_S)  from t_0 on, 1 before
+    nu = exp(-(t - t_0) / tau)
     log = (1 + b_1) u(t - lag) + b_0;  over ground = u(t - lag) + c;  place = x_0 + x + c t
 
 Every force that depends on the speed alone is a column of a table over the speed: parts of the
@@ -19,13 +20,15 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
+from shipdrag_ros.posterior.priors import LEFT_S
 from shipdrag_ros.samples import Float64
 
-# unknowns behind the coefficients theta; the first four change the motion
-SPEED, THRUST, TAU, INERTIA, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GROUND_LAG = range(11)
+# unknowns behind the coefficients theta; the first five change the motion
+SPEED, THRUST, TAU, INERTIA, LEFT, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GROUND_LAG = range(12)
 EXTRAS = GROUND_LAG + 1
 OWN = EXTRAS - PLACE  # of each further instrument behind them, from its `PLACE` on
-_MOVING = 4
+_MOVING = 5
+_LEFT_S = LEFT_S.mean
 
 
 def own(code: int) -> int:
@@ -138,11 +141,12 @@ def _rates(
     inertia, inertia_slope = _look(forces.inertia, forces.step_m_s, u)
     inertia += unknowns[k + INERTIA]
     _fill(forces.columns, forces.step_m_s, u, at)
-    thrust, by_u, by_u_0, by_q, by_tau = 0.0, 0.0, 0.0, 0.0, 0.0
+    thrust, by_u, by_u_0, by_q, by_tau, left = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if forces.tau_s > 0.0:
         q, tau = unknowns[k + THRUST], forces.tau_s * np.exp(unknowns[k + TAU])
         nu, ratio = np.exp(-t / tau), u / u_0
-        thrust = (1.0 + q) * nu * nu - q * nu * ratio
+        left = np.exp(-t / _LEFT_S)
+        thrust = (1.0 + q) * nu * nu - q * nu * ratio + unknowns[k + LEFT] * left
         by_u, by_u_0 = -q * nu / u_0, q * nu * ratio / u_0
         by_q = nu * nu - nu * ratio
         by_tau = (2.0 * (1.0 + q) * nu - q * ratio) * nu * t / tau
@@ -156,6 +160,7 @@ def _rates(
     rate[1 + k + THRUST] = r_0 * by_q / inertia
     rate[1 + k + TAU] = r_0 * by_tau / inertia
     rate[1 + k + INERTIA] = -a / inertia
+    rate[1 + k + LEFT] = r_0 * left / inertia
     for j in range(p):
         rate[1 + j] += own * state[1 + j]
     for j in range(p + 1):
@@ -169,8 +174,8 @@ def integrate(forces: Forces, unknowns: Float64, grid_s: Float64) -> tuple[Float
 
     Returns
     -------
-    state, rate : (n, 2 (k + 5))
-        (u, du/d unknowns, x, dx/d unknowns) by theta and the first four extras.
+    state, rate : (n, 2 (k + 6))
+        (u, du/d unknowns, x, dx/d unknowns) by theta and the first five extras.
 
     Notes
     -----
@@ -229,7 +234,7 @@ def predict(
     Parameters
     ----------
     forces
-    unknowns : (k + 11,)
+    unknowns : (k + 12,)
         Behind them `OWN` for each further number of instruments: place, scale and so on.
     grid_s : (g,)
         Of the integration, from 0 on.

@@ -76,6 +76,25 @@ RUN_DOWN_SHAPE = Declared(
     '',
     _REALITY,
 )
+# what acts after the stop that no input shows
+HELD_FORCE, THRUST_LEFT = 'held force', 'thrust left'
+HELD = Declared(
+    'h',
+    'a force from the stop on that no speed changes, over r there; none is as usual',
+    normal(0.5),
+    '',
+    'lines of tugs 0.1 to 0.4, astern power 0.3 to 1',
+)
+HELD_CHANCE = Declared('h', 'chance of such a force', 0.03, '', _TAKEN)
+LEFT = Declared(
+    'l',
+    'thrust that is left after the stop, over that before it; none is as usual',
+    normal(0.25, mean=0.3),
+    '',
+    'power taken off in steps; the effect residual_thrust',
+)
+LEFT_CHANCE = Declared('l', 'chance of it, where no shaft is seen to stand', 0.1, '', _TAKEN)
+LEFT_S = Declared('-', 'time in which it falls', 200.0, 's', 'the same')
 STOP = Declared(
     't_0',
     'time of the stop, of an onset that no shaft shows',

@@ -21,7 +21,7 @@ from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import HullLaw, Influence, wave_with_friction
+from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
@@ -45,11 +45,14 @@ class StopPrior:
         Of its time; 0: it is before the first row, and no thrust is left.
     run_down_s, run_down_sd_s
         Of the shaft; 0: not known.
+    stands
+        Whether the shaft is seen to stand after it: then no thrust is left.
     """
 
     sd_s: float
     run_down_s: float
     run_down_sd_s: float
+    stands: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,8 @@ class Family:
     """
     A prior of all unknowns: mean and precision (p,), and the probability of the family.
 
-    `level` is that of the hull over the generic one, about which the prior is.
+    `level` is that of the hull over the generic one, about which the prior is; `usual` says
+    whether wind and depth are in their first state.
     """
 
     name: str
@@ -65,6 +69,7 @@ class Family:
     mean: Float64
     precision: Float64
     level: float = 1.0
+    usual: bool = True
 
 
 @dataclass(frozen=True)
@@ -86,8 +91,8 @@ class RunModel:
     low_m_s, speed_m_s
         At the end and at the stop, roughly.
     law
-    weather
-        What wind and depth add to it; their columns are the last ones.
+    influences
+        What else acts, a force, wind and depth: their columns are the last ones.
     """
 
     rows: Rows
@@ -100,12 +105,12 @@ class RunModel:
     low_m_s: float
     speed_m_s: float
     law: HullLaw
-    weather: tuple[Influence, ...] = ()
+    influences: tuple[Influence, ...] = ()
 
     @property
     def of_hull(self) -> int:
-        """How many of the coefficients are of the hull, before those of wind and depth."""
-        return self.coefficients - sum(len(each.columns) for each in self.weather)
+        """How many of the coefficients are of the hull, before those of what else acts."""
+        return self.coefficients - sum(len(each.columns) for each in self.influences)
 
     @property
     def coefficients(self) -> int:
@@ -129,8 +134,7 @@ class RunModel:
     @property
     def usual(self) -> RunModel:
         """The same in the first state of wind and depth: a fit climbs there."""
-        states = math.prod(len(each.states) for each in self.weather)
-        return replace(self, families=self.families[::states])
+        return replace(self, families=tuple(each for each in self.families if each.usual))
 
     @classmethod
     def of(
@@ -167,7 +171,9 @@ class RunModel:
         """
         law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)
-        adds = () if weather is None else weather.influences(ship, law.speed_m_s)
+        adds: tuple[Influence, ...] = ()
+        if weather is not None:
+            adds = _held(law, speed_m_s), *weather.influences(ship, law.speed_m_s)
         forces = law.forces(ship, tau_s, adds)
         end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
         ones = np.ones(len(variance))
@@ -262,40 +268,73 @@ def _extras(
 def _all_families(
     ship: Ship,
     law: HullLaw,
-    weather: Sequence[Influence],
+    influences: Sequence[Influence],
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
-    states = tuple(product(*(each.states for each in weather)))
-    for (name, chance, scales, size, level, of_dry), (part, lag), state in product(
-        _hulls(ship), _lags(kinds), states
-    ):
-        of_weather = [each.mean for each in state]
-        mean = np.concatenate([[each[0] for each in scales], zeros, *of_weather, extra_mean])
-        sizes = np.full(len(law.shapes), size)
-        humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
-        dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY.mean))
-        of_weather = [each.sd for each in state]
-        sd = np.concatenate(
-            [[each[1] for each in scales], sizes, humps, dry, *of_weather, extra_sd]
-        )
-        if lag is not None:
-            at = len(mean) - len(start) + motion.LAG
-            mean[at], sd[at] = lag.mean, lag.sd
-        chance *= part * math.prod(each.chance for each in state)
-        yield Family(name, chance, mean, 1.0 / sd**2, level)
+    states = tuple(product(*(each.states for each in influences)))
+    added = sum(len(each.columns) for each in influences)
+    extra = 2 + len(zeros) + added
+    after_stop = tuple(_after_stop(stop, added)) if influences else (_Option(1.0),)
+    options = tuple(product(_lags(kinds), after_stop))
+    for hull, state in product(_hulls(ship), states):
+        others = [each.mean for each in state]
+        mean = np.concatenate([[each[0] for each in hull.scales], zeros, *others, extra_mean])
+        sizes = np.full(len(law.shapes), hull.size)
+        humps = np.full(len(law.humps), hull.level * priors.GENERIC_HUMPS.sd)
+        dry = np.full(len(law.dry), max(hull.dry, priors.SHIP_DRY.mean))
+        others = [each.sd for each in state]
+        scales = [each[1] for each in hull.scales]
+        precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
+        chance = hull.chance * math.prod(each.chance for each in state)
+        usual = all(each is of.states[0] for each, of in zip(state, influences))
+        for lag, force in options:
+            own, known = mean.copy(), precision.copy()
+            for place, prior in (*lag.unknown, *force.unknown):
+                own[extra + place], known[extra + place] = prior.mean, prior.sd**-2.0
+            part = chance * lag.chance * force.chance
+            yield Family(force.name or hull.name, part, own, known, hull.level, usual)
 
 
-def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, Declared | None]]:
-    """Yield probability and prior of the filter of a log: none, or one."""
-    if LOG not in kinds:
-        yield 1.0, None
+class _Option(NamedTuple):
+    """One of some that exclude each other: an unknown by its place behind the coefficients."""
+
+    chance: float
+    unknown: tuple[tuple[int, Declared], ...] = ()
+    name: str = ''
+
+
+def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
+    """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
+    if stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
+        yield _Option(1.0)
         return
-    yield priors.UNFILTERED_CHANCE.mean, priors.LOG_UNFILTERED
-    yield 1.0 - priors.UNFILTERED_CHANCE.mean, priors.LOG_LAG
+    held, left = priors.HELD_CHANCE.mean, 0.0 if stop.stands else priors.LEFT_CHANCE.mean
+    yield _Option(1.0 - held - left)
+    yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)
+    if left > 0.0:
+        yield _Option(left, ((motion.LEFT, priors.LEFT),), priors.THRUST_LEFT)
+
+
+def _held(law: HullLaw, speed_m_s: float) -> Influence:
+    """Return a force that no speed changes, over r at the stop; it acts in few families."""
+    at_stop = np.interp(speed_m_s, law.speed_m_s, law.parts.sum(axis=0))
+    none, unit = np.zeros(len(law.speed_m_s)), np.full((1, len(law.speed_m_s)), at_stop)
+    state = InfluenceState(1.0, np.zeros(1), np.full(1, EXACT))
+    return Influence(HELD, none, unit, (state,))
+
+
+def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
+    """Yield the filter of a log: none, or one."""
+    if LOG not in kinds:
+        yield _Option(1.0)
+        return
+    unfiltered = priors.UNFILTERED_CHANCE.mean
+    yield _Option(unfiltered, ((motion.LAG, priors.LOG_UNFILTERED),))
+    yield _Option(1.0 - unfiltered, ((motion.LAG, priors.LOG_LAG),))
 
 
 class _Hull(NamedTuple):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior
-from shipdrag_ros.posterior.weather import Reference
 from shipdrag_ros.samples import Float64
 
 
@@ -48,7 +48,7 @@ class ReadOut:
         return np.sqrt(np.maximum(self.sigma_m_s2**2 - of_n_r**2, 0.0))
 
 
-def read(found: RunPosterior, speed_m_s: Float64, *, calm: bool = True) -> ReadOut:
+def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = ()) -> ReadOut:
     """
     Read r(v) and its band.
 
@@ -57,17 +57,19 @@ def read(found: RunPosterior, speed_m_s: Float64, *, calm: bool = True) -> ReadO
     found
     speed_m_s : (m,)
         Through water.
-    calm
-        Of the ship in calm deep water; else in the wind and depth of the run.
+    without
+        Names of influences that are taken out.
     """
     problem, k = found.problem, found.problem.coefficients
     known, (columns, slopes) = motion.shapes_at(problem.forces, speed_m_s)
-    if calm:
-        grid = problem.law.speed_m_s
-        for each in problem.weather:
+    grid, place = problem.law.speed_m_s, problem.of_hull
+    for each in problem.influences:
+        out = slice(place, place + len(each.columns))
+        place += len(each.columns)
+        if each.name in without:
             slope = np.gradient(each.known, grid, edge_order=2)
             known -= np.array([np.interp(speed_m_s, grid, value) for value in (each.known, slope)])
-        columns[problem.of_hull :] = slopes[problem.of_hull :] = 0.0
+            columns[out] = slopes[out] = 0.0
     theta, covariance = found.mean[:k], found.covariance
     cross = columns.T @ covariance[:k]  # of r with every unknown
     variance = np.einsum('km,mk->m', columns, cross[:, :k])
@@ -107,8 +109,8 @@ def _causes(found: RunPosterior) -> dict[str, list[int]]:
         ],
     }
     first = problem.of_hull
-    for name, each in zip(vars(Reference()), problem.weather):
-        causes[name] = list(range(first, first + len(each.columns)))
+    for each in problem.influences:
+        causes[each.name] = list(range(first, first + len(each.columns)))
         first += len(each.columns)
     causes['law'] = list(range(2, problem.of_hull))
     return causes

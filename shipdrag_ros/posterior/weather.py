@@ -23,7 +23,14 @@ from numpy.polynomial.hermite_e import hermegauss
 
 from shipdrag_ros.parameter import Prior
 from shipdrag_ros.posterior import priors
-from shipdrag_ros.posterior.law import ABOVE, Influence, WeatherState, usual_baseline
+from shipdrag_ros.posterior.law import (
+    ABOVE,
+    DEPTH,
+    WIND,
+    Influence,
+    InfluenceState,
+    usual_baseline,
+)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import AIR_DENSITY_KG_M3, Ship
 from shipdrag_ros.simulation.effect import Effect, Frame
@@ -155,13 +162,15 @@ def _nodes(*counts: int) -> tuple[Float64, Float64]:
 
 
 def _influence(
-    ensembles: Sequence[tuple[float, Float64, Float64]], inertia: float = 0.0
+    name: str, ensembles: Sequence[tuple[float, Float64, Float64]], inertia: float = 0.0
 ) -> Influence:
     """
     Return mean and principal parts of ensembles.
 
     Parameters
     ----------
+    name
+        `WIND` or `DEPTH`.
     ensembles
         Of each state: its probability, weights (n,) and forces (n, m).
     inertia
@@ -178,8 +187,8 @@ def _influence(
         amount = (force - known)[:, ::_EACH] @ columns[:, ::_EACH].T
         mean = weight @ amount
         sd = np.sqrt(weight @ (amount - mean) ** 2)
-        states.append(WeatherState(chance, mean, np.maximum(sd, 1e-9)))
-    return Influence(np.asarray(known), columns, tuple(states), inertia)
+        states.append(InfluenceState(chance, mean, np.maximum(sd, 1e-9)))
+    return Influence(name, np.asarray(known), columns, tuple(states), inertia)
 
 
 def _air_per_mass(ship: Ship, z: Float64) -> Float64:
@@ -210,7 +219,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
         ahead = (1.0 + gain * z[:, 1:2]) * (speed + head) + off * z[:, 2:3]
         ahead = ahead + turned * z[:, 3:] * cross
         abeam = (1.0 + gain * z[:, 1:2]) * cross - turned * z[:, 3:] * (speed + head)
-        return _influence([(1.0, weight, force(z[:, 0], ahead, abeam))])
+        return _influence(WIND, [(1.0, weight, force(z[:, 0], ahead, abeam))])
     effect = _of('wind_apparent')
     blows = _chance(priors.WINDY.mean, effect, ship)
     z, weight = _nodes(3, 5, 3)
@@ -224,7 +233,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
         ahead, abeam = (sheltered * sd * each for sd, each in zip(sds, (z[:, 1:2], z[:, 2:])))
         forces = force(z[:, 0], speed + ahead, abeam)
         ensembles.append((chance, weight, forces))
-    return _influence(ensembles)
+    return _influence(WIND, ensembles)
 
 
 def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
@@ -237,7 +246,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
         forces, inertia = _shallow(ship, tuple(depths.tolist()), speed)
         forces = forces * (1.0 + effect.formula_sd * z[:, 1:])
         # the most probable reading is the middle one
-        return _influence([(1.0, weight, forces)], float(inertia[len(z) // 2]))
+        return _influence(DEPTH, [(1.0, weight, forces)], float(inertia[len(z) // 2]))
     shallow = _chance(effect.odds / (1.0 + effect.odds), effect, ship)
     z, weight = _nodes(5, 3)
     prior = effect.parameters_of(ship)[0].prior
@@ -248,7 +257,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
     whole = (deep + forces) * own / (own + inertia[:, None]) - deep
     whole = whole * (1.0 + effect.formula_sd * z[:, 1:])
     none = np.zeros((1, len(speed)))
-    return _influence([(1.0 - shallow, np.ones(1), none), (shallow, weight, whole)])
+    return _influence(DEPTH, [(1.0 - shallow, np.ones(1), none), (shallow, weight, whole)])
 
 
 def with_usual_shape(ship: Ship) -> Ship:

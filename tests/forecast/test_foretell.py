@@ -96,7 +96,7 @@ def test_a_wider_estimate_gives_a_wider_band(early: Estimate, ship: Ship) -> Non
         sigma_repeatable_m_s2=0.5 * early.curve.resistance_m_s2,
         slope_sigma=early.curve.slope,
     )
-    wide = foretell(replace(early, conditions=curve), ship).milestones[0].time_s
+    wide = foretell(replace(early, whole=curve), ship).milestones[0].time_s
     narrow = foretell(early, ship).milestones[0].time_s
     assert wide.high / wide.low > 1.1 * narrow.high / narrow.low
 

@@ -52,6 +52,7 @@ def estimate() -> Estimate:
         noise_sd={},
         calm=curve,
         conditions=curve,
+        whole=curve,
         froude_valid=(0.05, 0.15),
         froude_max_by=FroudeMax.BRANCH_TOP,
         froude_max_argmax=0.2,

@@ -25,6 +25,8 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
+from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
+from shipdrag_ros.posterior.priors import HELD_FORCE, THRUST_LEFT
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
@@ -32,6 +34,8 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 NAME = 'one'
+_CONDITIONS = (HELD,)  # what is taken out of r(v)
+_CALM = (HELD, WIND, DEPTH)
 _CURVE_POINTS = 129
 _WIND_POINTS = 25
 
@@ -147,7 +151,7 @@ def estimate(
         variance,
         len(record.steady.time_s),
         ship,
-        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s),
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
         speed_m_s=guess.speed_m_s,
         range_m_s=(guess.lowest * guess.speed_m_s, guess.speed_m_s),
         weather=weather,
@@ -185,8 +189,9 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         f'{name} {found.chance(name):.2g}'
         for name in dict.fromkeys(each.name for each in problem.families)
     )
-    yield f'averaged over what the hull may differ by: {chances}'
+    yield f'averaged over what the hull may differ by and what else may act: {chances}'
     sd = np.sqrt(np.diag(found.covariance))
+    yield from _acting_notes(found, sd)
     logs = {name: CODES[name] for name in record.stamps if CODES[name] % KIND_COUNT == LOG}
     for name, code in logs.items() if len(record.stamps) > 1 else ():
         at = k + motion.own(code) + motion.SCALE
@@ -214,6 +219,22 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         f'slow disturbances learnt, averaged over {len(found.noise.settings.weight)} settings: '
         f'about {", ".join(sizes)}'
     )
+
+
+def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
+    """Yield what acts after the stop, where that is more likely than not."""
+    problem = found.problem
+    for name, at, what in (
+        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
+        (THRUST_LEFT, problem.coefficients + motion.LEFT, 'thrust is left after the stop,'),
+    ):
+        chance = found.chance(name)
+        if chance > 0.5:
+            yield (
+                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the '
+                f'resistance at the stop (probability {chance:.2g}): it is no part of r, and '
+                'makes its band wide; give a window in which nothing acts but the water'
+            )
 
 
 def _log_scale_note(scale: float, sd: float, which: str) -> str:
@@ -246,10 +267,11 @@ def _result(
             f'that lies in a coastdown{", or a smaller froude_min" if too_slow else ""}'
         )
     grid = np.linspace(low, high, _CURVE_POINTS)
-    part = read(found, grid, calm=False)
+    part = read(found, grid, without=_CONDITIONS)
     use = _slowing(part)
     conditions = _curve(part, use, ship)
-    part = read(found, grid, calm=True)
+    whole = _curve(read(found, grid), use, ship)
+    part = read(found, grid, without=_CALM)
     calm = _curve(part, use, ship)
     curve = conditions if reference.unknown else calm
     stamps = np.concatenate(list(record.stamps.values()))
@@ -263,9 +285,12 @@ def _result(
     return Estimate(
         NAME,
         **ValidRange.of_branch(curve)._asdict(),
-        **_at_end(found, coast, last, calm=not reference.unknown)._asdict(),
+        **_at_end(
+            found, coast, last, without=_CONDITIONS if reference.unknown else _CALM
+        )._asdict(),
         calm=calm,
         conditions=conditions,
+        whole=whole,
         reference=reference,
         sigma_parts={name: each[use] for name, each in _parts(part, ship).items()},
         sigma_shared_m_s2=part.shared_m_s2[use],
@@ -325,10 +350,10 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
     )
 
 
-def _at_end(found: RunPosterior, coast: Rows, last: float, *, calm: bool) -> AtEnd:
+def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str, ...]) -> AtEnd:
     """Return speed and r at the end of the window."""
     problem, k = found.problem, found.problem.coefficients
-    at_end = read(found, np.array([last]), calm=calm)
+    at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
     now = found.mean.copy()
     now[k + motion.SCALE :] = 0.0  # the speed itself, not the log

@@ -87,6 +87,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         **at_end(motion, ship)._asdict(),
         calm=curve,
         conditions=curve,
+        whole=curve,
         start_ns=fit.scale.first_ns,
         end_ns=fit.scale.first_ns + fit.scale.span_ns,
         order=solution.order,
