@@ -68,8 +68,10 @@ def test_while_the_verdict_waits_no_figure_stands_beside_the_question(
 ) -> None:
     bag = simulated(tmp_path / 'knots.mcap', ship_file, '--effect', 'log_scale=0.944')
     capsys.readouterr()
-    assert main(['diagnose', str(bag)]) == 0
-    said = capsys.readouterr().out
+    document = tmp_path / 'found.json'
+    assert main(['diagnose', str(bag), '--json', str(document)]) == 0
+    found, said = json.loads(document.read_text()), capsys.readouterr().out
+    assert (found['verdict'], found['effects']) == ('one_of', [])
     assert 'is the unit of one of them wrong?' in said.splitlines()[0]
     assert 'The verdict waits for the answer.' in said.splitlines()[0]
     for words in ('over the clean hull', 'resistance', 'Examined', 'How probable'):
@@ -161,17 +163,6 @@ def test_a_bag_without_a_coastdown_beside_one_with_is_told_of(
     said = capsys.readouterr().out
     assert said.startswith('Missing in the model: current')
     assert f"no coastdown was found in '{steady_bag}': by speed_through_water nothing" in said
-
-
-def test_a_ship_without_baseline_gets_no_force_named(
-    in_current: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bare, page = tmp_path / 'bare.yaml', tmp_path / 'bare.html'
-    bare.write_text('name: Bare\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
-    line = ['diagnose', str(in_current), '--ship', str(bare), '--report', str(page)]
-    assert main(line) == 0
-    assert 'the ship file has no baseline' in capsys.readouterr().out
-    assert 'compared with all hulls of her length and volume' in page.read_text(encoding='utf-8')
 
 
 @pytest.mark.parametrize(

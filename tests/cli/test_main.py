@@ -92,13 +92,7 @@ def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> No
     captured = capsys.readouterr().out
     assert f'usage: shipdrag {verb}' in captured
     assert 'None' not in captured
-
-
-@pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
-def test_each_verb_takes_effects(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
-    line = [verb, 'list', '--help'] if verb == 'effect' else [verb, '--help']
-    assert stopped(line) == 0
-    assert '--effects DIR' in capsys.readouterr().out
+    assert '--effects DIR' in captured or verb == 'effect'  # there it is of `list`, which runs
 
 
 @pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])

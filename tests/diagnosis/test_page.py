@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import diagnose, pictures
+from shipdrag_ros.diagnosis import pictures
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.page import write_diagnosis
 from shipdrag_ros.diagnosis.result import (
@@ -24,24 +24,18 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.tables import Score
 from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
-from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Fact, Ship
 from tests.page import Page
 from tests.runs import CARGO as SHIP
-from tests.runs import coasted
 
 SCORE = Score(900, 7, {'precision of a name': (98, 100)}, 0.031)
 
 
-@pytest.fixture(scope='module')
-def found() -> DiagnosisResult:
-    """A run with a current, that the ship file does not have."""
-    run = coasted('current=0.4', name='<outward>', lead_in_s=1800.0, coast_s=1500.0)
-    found = diagnose([run], SHIP, Parameters())
-    return replace(found, estimates=(estimate_final(run.window, SHIP, Parameters()),))
+@pytest.fixture
+def found(in_a_current: DiagnosisResult) -> DiagnosisResult:
+    return in_a_current
 
 
 @pytest.fixture

@@ -126,7 +126,7 @@ def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> No
     code = (
         'import sys; from shipdrag_ros.node.main import run\n'
         f'sys.exit(run({str(ship)!r}, "123", settings={{"keep_days": 2.0}}, '
-        'ros_arguments=["-p", "window_s:=600.0", "-p", "keep_days:=1.0"]))'
+        'ros_arguments=["-p", "window_s:=600", "-p", "keep_days:=1.0"]))'
     )
     log = tmp_path / 'log'
     with (
