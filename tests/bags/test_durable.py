@@ -9,7 +9,6 @@ from pathlib import Path
 from threading import Event
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import durable as module
 from shipdrag_ros.bags import open_runs
@@ -17,6 +16,7 @@ from shipdrag_ros.bags.durable import DurableRecording, LiveFile, PartLimits, Re
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
+from tests.recorded import rows
 
 WITHIN_S = 120.0
 SECOND_NS = 10**9
@@ -50,9 +50,7 @@ def recording(
 
 
 def numbers(path: Path) -> list[int]:
-    with path.open('rb') as stream:
-        messages = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
-        return [m.log_time // SECOND_NS for _, _, m in messages]
+    return [row.log_ns // SECOND_NS for row in rows(path)]
 
 
 def all_numbers(directory: Path) -> list[int]:

@@ -378,7 +378,7 @@ def inside(content: bytes) -> list[tuple[int, int, Counter[bytes]]]:
 
 
 @pytest.mark.parametrize('write', [growing, finished])
-def test_cut_at_every_offset_and_flipped_in_every_byte(
+def test_cut_and_flipped_everywhere(
     write: Callable[[Path, Block], bytes],
     tmp_path: Path,
     block: Block,
@@ -392,7 +392,7 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
     assert len(chunks) >= 3
     rng = random.Random(5)
     begin = chunks[0][0] - 60  # before it are long texts: of these some
-    places = [*range(120, begin, 197), *range(begin, len(content))]
+    places = [*range(120, begin, 197), *range(begin, len(content), 3)]
     for number, at in enumerate(places):
         flipped = number % 2
         damaged = bytearray(content[: None if flipped else at])
@@ -414,7 +414,7 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
 
 
 def test_a_key_without_its_value_is_damage(samples: Samples, tmp_path: Path) -> None:
-    for first in range(0, 600, 3):
+    for first in range(0, 600, 9):
         content = bytearray(samples['zstd'].content)
         content[first : first + 300] = bytes(300)
         path = tmp_path / f'{first}.mcap'

@@ -18,31 +18,12 @@ from rosbags.rosbag2 import CompressionMode
 from shipdrag_ros.bags import BagWriter, Compression, ResetMark, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
+from shipdrag_ros.messages import EventKind, EventNote, encode, event_message
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import assert_same, read_samples, rosbag2
+from tests.bags.conftest import assert_same, foreign, read_samples, rosbag2
 
 WriteBag = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
-
-
-def foreign(path: Path, block: Block, **options: Any) -> Path:
-    """Write a file with the reference writer, any way it can."""
-    with path.open('wb') as file:
-        writer = Writer(file, **options)
-        writer.start(profile='ros2')
-        channels: dict[str, int] = {}
-        for message in encode(block, namespace='/ship'):
-            if message.topic not in channels:
-                schema = writer.register_schema(
-                    message.type, 'ros2msg', types.definition(message.type).encode()
-                )
-                channels[message.topic] = writer.register_channel(message.topic, 'cdr', schema)
-            writer.add_message(
-                channels[message.topic], message.log_ns, message.payload, message.publish_ns
-            )
-        writer.finish()
-    return path
 
 
 @pytest.mark.parametrize('compression', Compression)

@@ -11,7 +11,6 @@ import zlib
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -20,16 +19,17 @@ import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs
 from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode, types
+from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
+from tests.bags.conftest import foreign
 
 EXAMPLES = settings(
     max_examples=120,
@@ -47,20 +47,6 @@ def by_us(path: Path, block: Block, compression: Compression) -> None:
         bag.write_samples(block)
 
 
-def by_another(path: Path, block: Block, **options: Any) -> None:
-    with path.open('wb') as file:
-        writer = Writer(file, **options)
-        writer.start()
-        channels: dict[str, int] = {}
-        for each in encode(block):
-            if each.topic not in channels:
-                text = types.definition(each.type).encode()
-                schema = writer.register_schema(each.type, 'ros2msg', text)
-                channels[each.topic] = writer.register_channel(each.topic, 'cdr', schema)
-            writer.add_message(channels[each.topic], each.log_ns, each.payload, each.publish_ns)
-        writer.finish()
-
-
 def unfinished(path: Path, block: Block) -> None:
     file = LiveFile(path, recording_id='r', part=0, attachments={'ship.yaml': SHIP.to_yaml()})
     messages = list(encode(block))
@@ -75,8 +61,8 @@ MAKERS: dict[str, Callable[[Path, Block], None]] = {
     'lz4': lambda path, block: by_us(path, block, Compression.LZ4),
     'none': lambda path, block: by_us(path, block, Compression.NONE),
     'live': unfinished,
-    'unchunked': lambda path, block: by_another(path, block, use_chunking=False),
-    'no checksums': lambda path, block: by_another(
+    'unchunked': lambda path, block: foreign(path, block, use_chunking=False),
+    'no checksums': lambda path, block: foreign(
         path, block, enable_crcs=False, chunk_size=3000, compression=CompressionType.NONE
     ),
 }
@@ -288,7 +274,7 @@ def test_messages_out_of_order_are_held_back_up_to_a_limit(
     received = np.arange(n) + 1000
     received[::20] = 5  # in every chunk one that came first
     block = Block.of(Channel.SHAFT, np.arange(n), np.arange(n) * 1.0, receive_ns=received)
-    by_another(tmp_path / 'a.mcap', block, chunk_size=2000)
+    foreign(tmp_path / 'a.mcap', block, chunk_size=2000)
     content = (tmp_path / 'a.mcap').read_bytes()
     monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 1)
     found, _ = read(tmp_path / 'a.mcap', content)

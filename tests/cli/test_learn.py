@@ -7,13 +7,14 @@ import json
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import Writer
 
 import shipdrag_ros as sd
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fleet.store import BagResult, Store, bag_row
+from shipdrag_ros.samples import Block, concatenate
+from tests.runs import write_run
 
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 
@@ -80,28 +81,10 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
     """A store of a bag with no ship file attached, kept in the store for each ship."""
     (folder / 'bags').mkdir()
     store = Store(folder / 'store')
-    with (fleet / 'bags' / 'run.mcap').open('rb') as stream:
-        whole = list(make_reader(stream).iter_messages())
+    (run,) = open_runs([fleet / 'bags' / 'run.mcap'])
+    whole = concatenate([item for item in run.inputs() if isinstance(item, Block)])
     for number, ship in enumerate(ships):
-        bag = folder / 'bags' / f'{number}.mcap'
-        with bag.open('wb') as out:
-            writer = Writer(out)
-            writer.start(profile='ros2')
-            schemas: dict[int, int] = {}
-            channels: dict[int, int] = {}
-            for schema, channel, message in whole:
-                assert schema is not None
-                if channel.id not in channels:
-                    schemas[schema.id] = writer.register_schema(
-                        schema.name, schema.encoding, schema.data
-                    )
-                    channels[channel.id] = writer.register_channel(
-                        channel.topic, channel.message_encoding, schemas[schema.id]
-                    )
-                writer.add_message(
-                    channels[channel.id], message.log_time, message.data, message.publish_time
-                )
-            writer.finish()
+        bag = write_run(folder / 'bags' / f'{number}.mcap', whole)
         row = bag_row('bags', bag.name, f'{number}' * 64)
         store.write(BagResult({**row, 'ship': ship, 'coastdowns': 1}))
         store.keep_ship(ship, {'ship.yaml': SHIP.read_text()})

@@ -48,7 +48,6 @@ def odd(speed: Float64, seed: int = 1) -> dict[str, Float64]:
 STOP_S = 360.0
 TIME = np.arange(750.0)
 RECORDS: dict[str, dict[str, Float64]] = {
-    'glide': odd(glide(TIME)),
     'exact': {'speed_through_water': glide(TIME)},
     'positions': {'position': odd(glide(TIME))['position']},
     'at rest': {'speed_through_water': 0.0 * TIME, 'position': np.zeros((len(TIME), 2))},

@@ -39,6 +39,12 @@ def found(in_a_current: DiagnosisResult) -> DiagnosisResult:
 
 
 @pytest.fixture
+def words(found: DiagnosisResult) -> DiagnosisResult:
+    """Without what takes time to draw."""
+    return replace(found, traces=(), estimates=())
+
+
+@pytest.fixture
 def written(tmp_path: Path) -> Callable[..., Any]:
     def write(found: DiagnosisResult, ship: Ship | None = SHIP, score: Score | None = None) -> Any:
         write_diagnosis(tmp_path / 'page.html', found, ship, score=score)
@@ -69,30 +75,30 @@ def test_the_page_says_all_and_needs_no_network(
         'over the clean hull',
         'effective power',
     )
-    for words in said:
-        assert words in page.text, words
+    for each in said:
+        assert each in page.text, each
 
 
 def test_the_score_of_the_method_stands_on_the_page(
-    found: DiagnosisResult, written: Callable[..., Any]
+    words: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
-    page = written(found, score=SCORE)
+    page = written(words, score=SCORE)
     assert 'not scored' not in page.text
     assert '900 simulated cases (seed 7)' in page.text
     assert '98.0 % 100' in page.text
     assert '0.031' in page.text
 
 
-def test_a_set_says_what_would_decide(found: DiagnosisResult, written: Callable[..., Any]) -> None:
+def test_a_set_says_what_would_decide(words: DiagnosisResult, written: Callable[..., Any]) -> None:
     offset = EffectEstimate('log_offset', 0.395, {'offset_m_s': Parameter(0.4321, 0.02)})
     candidates = (
-        Candidate(('current',), 0.6, found.effects),
+        Candidate(('current',), 0.6, words.effects),
         Candidate(('log_offset',), 0.395, (offset,)),
     )
     decide = (Advice('a run on the reciprocal heading', 0.93), Advice('a speed log', None))
     page = written(
         replace(
-            found, verdict=Verdict.ONE_OF, effects=(), candidates=candidates, would_decide=decide
+            words, verdict=Verdict.ONE_OF, effects=(), candidates=candidates, would_decide=decide
         )
     )
     assert 'Missing is one of these: current (60.0 %), log offset (39.5 %).' in page.text
@@ -103,21 +109,21 @@ def test_a_set_says_what_would_decide(found: DiagnosisResult, written: Callable[
 
 
 def test_what_is_unknown_is_none_of_the_candidates(
-    found: DiagnosisResult, written: Callable[..., Any]
+    words: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
-    page = written(replace(found, verdict=Verdict.UNKNOWN, effects=()))
+    page = written(replace(words, verdict=Verdict.UNKNOWN, effects=()))
     assert 'Of each candidate, were it the one' in page.text
     assert 'none of the known effects' in page.text
 
 
 def test_a_fact_that_the_data_contradict_stands_on_the_page(
-    found: DiagnosisResult, written: Callable[..., Any]
+    words: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     told = (
         WeighedFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
         WeighedFact(Fact('shaft', 'free'), 'out', 0.01),
     )
-    page = written(replace(found, facts=told))
+    page = written(replace(words, facts=told))
     assert 'The data contradict the fact `deep_water`' in page.text
     assert 'wrong with probability 97.0 %, most probably shallow water' in page.text
     assert 'contradict the fact `shaft' not in page.text
@@ -125,11 +131,9 @@ def test_a_fact_that_the_data_contradict_stands_on_the_page(
 
 
 def test_a_record_without_coastdown_has_a_page_without_traces(
-    found: DiagnosisResult, written: Callable[..., Any]
+    words: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
-    sailing = replace(
-        found, traces=(), baseline='none', notes=('compared on 40 legs',), estimates=()
-    )
+    sailing = replace(words, baseline='none', notes=('compared on 40 legs',))
     page = written(sailing, ship=None)
     assert len(page.images) == 1
     assert 'compared on 40 legs' in page.text
@@ -151,7 +155,6 @@ def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(
     assert 'is the unit of one of them wrong?' in text
     assert 'over the clean hull' not in text
     assert 'Examined' not in text
-    assert 'over the clean hull' in written(found).text
 
 
 def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:

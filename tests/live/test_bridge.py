@@ -375,19 +375,6 @@ def test_a_folder_that_the_node_has_yet_to_make_is_told(tmp_path: Path) -> None:
     assert 'records: there is no such folder so far' in told
 
 
-def test_a_verdict_whose_document_is_on_its_way_has_every_part() -> None:
-    bridge = Bridge(Ship.load(SHIP))
-    bridge.show_verdict('done', 'Nothing is missing.')
-    found = bridge.parts(0.0)['verdict']
-    assert found == {
-        'state': 'done',
-        'sentence': 'Nothing is missing.',
-        'sizes': [],
-        'probabilities': [],
-        'decide': [],
-    }
-
-
 def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:
     """A coastdown without its beginning, and figures that are none."""
     payload = event_message(EventNote(EventKind.ONSET, 5, 'a coastdown began', {})).payload

@@ -13,6 +13,7 @@ import pytest
 
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 pytest.importorskip('rclpy')
 
@@ -51,7 +52,7 @@ class Ship:
             self._player.publish(speeds(1))
             self.peer.spin_for(1.0)
             status = self.diagnostics.of(INPUT)
-            return status is not None and {x.key: x.value for x in status.values}['used'] != '0'
+            return status is not None and values(status)['used'] != '0'
 
         self.peer.spin_until(used)
 
@@ -60,8 +61,7 @@ class Ship:
         self.diagnostics.wait_for(PART, str(self.sent + 1), value='messages')
 
     def said(self, key: str) -> str:
-        values = {item.key: item.value for item in self.diagnostics.of(PART).values}
-        return values[key]
+        return values(self.diagnostics.of(PART))[key]
 
     def bags(self) -> list[Path]:
         return sorted(self.directory.glob('*.mcap'))

@@ -15,6 +15,7 @@ import pytest
 
 from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 pytest.importorskip('rclpy')
 
@@ -68,11 +69,9 @@ def test_it_harms_neither_the_node_nor_its_recording(
     diagnostics.wait_for('input speed_through_water', '20', value='unreadable too_long')
     diagnostics.wait_for('input shaft', '1', value='unreadable too_long')
     diagnostics.wait_for('input speed_through_water', '1', value='rejected nan')
-    malformed = {
-        item.key: item.value for item in diagnostics.of('input speed_through_water').values
-    }
-    assert int(malformed['unreadable malformed']) >= len(LYING)
-    assert int(malformed['used']) <= 2  # one of the numbers is a speed
+    told = values(diagnostics.of('input speed_through_water'))
+    assert int(told['unreadable malformed']) >= len(LYING)
+    assert int(told['used']) <= 2  # one of the numbers is a speed
     assert peer.state() == 'active'
     assert node.stop() == 0
     assert sum(bag.stat().st_size for bag in (tmp_path / 'bags').glob('*.mcap')) < 2**20

@@ -38,7 +38,9 @@ SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SECOND_NS = 10**9
 LEAD_IN_S = 300.0
 DURATION_S = 340.0
-PARAMETERS = Parameters(steady_s=120.0, slope_window_s=30.0, window_s=600.0, update_s=40.0)
+PARAMETERS = Parameters(
+    steady_s=120.0, slope_window_s=30.0, window_s=600.0, update_s=40.0, estimator='s1_joint'
+)
 
 
 @cache

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.messages.topics import Health, Status
 from shipdrag_ros.node.main import line, terminal_line
+from tests.recorded import attachments, rows, summary
 
 rclpy = pytest.importorskip('rclpy')
 STATE = {
@@ -36,12 +36,6 @@ from shipdrag_ros.node.main import main  # noqa: E402
 from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
 
 START_S = 240.0
-
-
-def attachments(bag: Path) -> dict[str, str]:
-    with bag.open('rb') as stream:
-        reader = make_reader(stream, validate_crcs=True)
-        return {item.name: item.data.decode() for item in reader.iter_attachments()}
 
 
 @pytest.mark.parametrize(
@@ -106,11 +100,7 @@ def test_a_signal_ends_it_with_a_readable_bag(
     assert node.stop(number) == 0
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
-    with bag.open('rb') as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    assert summary.statistics is not None
-    assert summary.statistics.message_count == 3  # two events besides
+    assert summary(bag).statistics.message_count == 3  # two events besides
 
 
 def test_without_an_input_it_leaves_no_file(start_node: Any, tmp_path: Path) -> None:
@@ -167,9 +157,7 @@ def test_a_start_without_compiled_code_hears_records_and_ends_when_asked(
     assert node.stop() == 0
     assert 'ready to estimate' not in node.log
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    with bag.open('rb') as stream:
-        reader = make_reader(stream, validate_crcs=True)
-        assert [m.data for _, _, m in reader.iter_messages(['/speed_through_water'])] == sent
+    assert [row.payload for row in rows(bag, '/speed_through_water')] == sent
 
 
 def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path) -> None:

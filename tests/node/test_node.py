@@ -4,17 +4,19 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import EventKind, encode, read_event
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
+from tests.recorded import rows
 
 pytest.importorskip('rclpy')
 
@@ -32,13 +34,8 @@ def speeds(*, count: int = 5, age_s: float = 0.0) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, stamps, 5.0 + 1e-3 * np.arange(count))
 
 
-def topics_in(bag: Path) -> dict[str, int]:
-    """Messages of each topic."""
-    counts: dict[str, int] = {}
-    with bag.open('rb') as stream:
-        for _, channel, _ in make_reader(stream).iter_messages():
-            counts[channel.topic] = counts.get(channel.topic, 0) + 1
-    return counts
+def topics_in(bag: Path) -> Counter[str]:
+    return Counter(row.topic for row in rows(bag))
 
 
 def the_bag(directory: Path) -> Path:
@@ -68,10 +65,10 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     diagnostics.wait_for(part, '1', value='rejected duplicate')
     diagnostics.wait_for(part, '4', value='rejected out_of_order')
     status = diagnostics.wait_for(part, '1', value='unreadable malformed')
-    values = {item.key: item.value for item in status.values}
-    assert 1.5 < float(values['clock offset [s]']) < 30.0
-    assert float(values['age [s]']) >= 0.0
-    assert values['publishers'] == '2'
+    told = values(status)
+    assert 1.5 < float(told['clock offset [s]']) < 30.0
+    assert float(told['age [s]']) >= 0.0
+    assert told['publishers'] == '2'
     status = diagnostics.wait_for(part, 'of 11 readings used')
     assert status.level == b'\x02'
     assert '5 out of order' in status.message or '4 out of order' in status.message
@@ -92,7 +89,7 @@ def test_inputs_are_recorded_by_their_own_name(
     node = start_node(*(word for each in remapped for word in ('-r', each)))
     # a further log that is remapped to where nobody publishes is spoken of
     status = diagnostics.wait_for('input speed_through_water_2', 'no')
-    assert '/log2/sped' in {item.value for item in status.values}
+    assert '/log2/sped' in values(status).values()
     assert diagnostics.of('input speed_through_water_3') is None
     publisher = peer.advertise('/sounder/depth', 'sensor_msgs/msg/Range')
     peer.wait_for_listener(publisher)
@@ -126,9 +123,8 @@ def test_a_further_log_is_spoken_of_where_somebody_publishes_it_and_a_heading_in
     status = diagnostics.wait_for('input heading', '3', value='used')
     assert status.level == b'\x00'
     assert status.message == 'receiving; its type holds no time: it counts from its arrival'
-    values = {item.key: item.value for item in status.values}
-    assert values['type'] == 'std_msgs/msg/Float64'
-    assert values['clock offset [s]'] == 'none'
+    told = values(status)
+    assert (told['type'], told['clock offset [s]']) == ('std_msgs/msg/Float64', 'none')
     assert node.stop() == 0
     assert topics_in(the_bag(tmp_path))['/speed_through_water_2'] == 5
     (run,) = open_runs([the_bag(tmp_path)])
@@ -205,15 +201,15 @@ def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
     node.go_on()
 
     def counted() -> int:
-        values = {item.key: item.value for item in diagnostics.of(part).values}
-        return int(values['messages']) + int(values['messages lost'])
+        told = values(diagnostics.of(part))
+        return int(told['messages']) + int(told['messages lost'])
 
     peer.spin_until(lambda: counted() > 3)
     one.publish(sent[-1])
     peer.spin_until(lambda: counted() >= 401)
     assert counted() == 401
-    values = {item.key: item.value for item in diagnostics.of(part).values}
-    heard, lost = int(values['messages']), int(values['messages lost'])
+    told = values(diagnostics.of(part))
+    heard, lost = int(told['messages']), int(told['messages lost'])
 
     other = type(peer)()
     try:
@@ -231,9 +227,8 @@ def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
     finally:
         other.close()
     assert node.stop() == 0
-    with the_bag(tmp_path).open('rb') as stream:
-        messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
-        notes = [read_event(message.data) for _, _, message in messages]
+    events = rows(the_bag(tmp_path), '/coastdown_node/events')
+    notes = [read_event(row.payload) for row in events]
     said = [note.text for note in notes if note.kind is EventKind.MESSAGE_LOST]
     assert bool(said) is bool(lost)
     if lost:
@@ -397,9 +392,8 @@ def test_a_clock_that_goes_back_begins_a_new_bag(
     assert node.stop() == 0
     bags = sorted((tmp_path / 'bags').glob('*.mcap'))
     assert [topics_in(bag)['/speed_through_water'] for bag in bags] == [3, 3]
-    with bags[1].open('rb') as stream:
-        messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
-        assert kinds([message.data for _, _, message in messages])[0] is EventKind.CLOCK_JUMP
+    first, *_ = rows(bags[1], '/coastdown_node/events')
+    assert read_event(first.payload).kind is EventKind.CLOCK_JUMP
 
 
 def test_nobody_on_the_network_chooses_files_or_clock(

@@ -11,7 +11,6 @@ from pathlib import Path
 from threading import Event
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags.durable import LiveFile, PartLimits
 from shipdrag_ros.bags.retention import Keep, Removed
@@ -28,6 +27,7 @@ from shipdrag_ros.node.health import recording_status
 from shipdrag_ros.node.recorder import DEFAULT_LIMITS, EVERYTHING, Recorder, RecordingState
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+from tests.recorded import attachments, rows
 
 SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
 PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
@@ -54,17 +54,6 @@ def received(arrival_ns: int) -> EncodedMessage:
 
 def sent(stamp_ns: int) -> OutputMessage:
     return event_message(EventNote(EventKind.LIFECYCLE, stamp_ns, 'active', {}))
-
-
-def rows(path: Path) -> list[tuple[str, int, int]]:
-    with path.open('rb') as stream:
-        messages = make_reader(stream).iter_messages(log_time_order=False)
-        return [(c.topic, m.log_time, m.publish_time) for _, c, m in messages]
-
-
-def attachments(path: Path) -> dict[str, str]:
-    with path.open('rb') as stream:
-        return {item.name: item.data.decode() for item in make_reader(stream).iter_attachments()}
 
 
 def path_of(recorder: Recorder) -> Path:
@@ -96,7 +85,9 @@ def test_writes_inputs_and_outputs_in_order(tmp_path: Path) -> None:
     assert progress is not None
     assert (progress.messages, progress.waiting, progress.lost) == (2, 0, 0)
     path = path_of(it)
-    assert rows(path) == [('/ship/depth', 100, 5), ('/coastdown_node/events', 100, 7)]
+    first, second = rows(path)
+    assert first == ('/ship/depth', 100, 5, b'as received')
+    assert second[:3] == ('/coastdown_node/events', 100, 7)
     assert Ship.from_yaml(attachments(path)['ship.yaml'], subject='bag') == SHIP
     kept = Parameters.from_yaml(attachments(path)['parameters.yaml'], subject='bag')
     assert kept == PARAMETERS
@@ -109,7 +100,7 @@ def test_what_was_said_before_the_first_input_is_recorded(tmp_path: Path) -> Non
         it.output(sent(stamp_ns), 7)
     it.input(received(8))
     it.close()
-    times = [publish_ns for _, _, publish_ns in rows(path_of(it))]
+    times = [row.publish_ns for row in rows(path_of(it))]
     assert times == [*range(200, 300), 5]  # the latest hundred, and the input
 
 
@@ -225,7 +216,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
         assert not freed.is_set()
         freed.set()
     it.close()
-    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [0, 1, 2]
+    assert [row.log_ns for row in rows(path_of(it))] == [0, 1, 2]
     assert not it.status().slow
 
 

@@ -20,14 +20,11 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 PREFERRED = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 PLAIN = 'geometry_msgs/msg/TwistStamped'
 PART = 'input speed_through_water'
-
-
-def values(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
 
 
 def twist(speed_m_s: float) -> Any:

@@ -72,11 +72,7 @@ def test_further_instruments_are_recorded_in_their_order_and_replayed_bit_for_bi
         noise = np.random.default_rng(3).normal(0.0, 0.02, part.value.shape)
         both.append(replace(part, channel=code, value=part.value + noise))
     block = in_arrival_order([block, *both])
-    live = live(ship)
-    live.start(tmp_path / 'live.mcap')
-    for message in encode(block):
-        live.receive(message)
-    live.stop(int(block.receive_ns[-1]))
+    live(ship).record(tmp_path / 'live.mcap', block)
     result = replayed(tmp_path / 'live.mcap')
     assert result.recorded is not None
     assert result.recorded.identical == result.recorded.compared > 50
@@ -253,7 +249,7 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
         session.receive(message)
     now_ns = messages[at - 1].log_ns
     told = EventNote(EventKind.ENGINE_STOPPED, now_ns, 'the engine was stopped')
-    session.write_output(event_message(told), now_ns)
+    session.write(event_message(told), now_ns, now_ns)
     assert session.monitor.engine_stopped(now_ns) == ''
     for message in messages[at:]:
         session.receive(message)
