@@ -47,9 +47,7 @@ def content(path: Path) -> list[tuple[str, str, int, int, bytes]]:
 
 
 @pytest.mark.parametrize('close', [True, False])
-def test_the_same_messages_with_an_index_in_less_room(
-    tmp_path: Path, block: Block, close: bool
-) -> None:
+def test_the_same_messages_with_an_index_in_less_room(tmp_path, block: Block, close: bool) -> None:
     file = grown(tmp_path / 'a.mcap', block, close=close)
     before = file.path.stat().st_size
     compact(file.path, messages=len(block))
@@ -67,9 +65,7 @@ def test_the_same_messages_with_an_index_in_less_room(
     assert metadata.metadata == {'version': __version__, 'recording_id': 'r', 'part': '2'}
 
 
-def test_without_its_first_chunk_the_others_still_know_their_topics(
-    tmp_path: Path, block: Block
-) -> None:
+def test_without_its_first_chunk_the_others_still_know_their_topics(tmp_path, block):
     file = grown(tmp_path / 'a.mcap', block)
     compact(file.path, messages=len(block))
     opcodes = []

@@ -37,9 +37,7 @@ def read_or_refuse(path: Path, content: bytes) -> tuple[Run, Block] | None:
 
 
 @pytest.mark.parametrize('fraction', [0.3, 0.6, 0.9, 0.999])
-def test_what_is_whole_in_a_file_cut_off_is_used_and_the_rest_told(
-    tmp_path: Path, sample_bag: bytes, fraction: float
-) -> None:
+def test_what_is_whole_in_a_file_cut_off_is_used_and_the_rest_told(tmp_path, sample_bag, fraction):
     _, whole = read(tmp_path / 'a.mcap', sample_bag)
     run, block = read(tmp_path / 'a.mcap', sample_bag[: int(fraction * len(sample_bag))])
     assert 0 < len(block) <= len(whole)
@@ -81,9 +79,7 @@ def test_a_damaged_attachment_is_left_out_and_told(tmp_path: Path, sample_bag: b
 
 
 @pytest.mark.parametrize('opcode', [1, 3, 12, 255])
-def test_a_record_of_another_kind_than_indexed(
-    tmp_path: Path, sample_bag: bytes, opcode: int
-) -> None:
+def test_a_record_of_another_kind_than_indexed(tmp_path, sample_bag: bytes, opcode: int) -> None:
     at = sample_bag.index(b'ship.yaml') - 4 - 8 - 8 - 9
     assert sample_bag[at] == 9, 'the place of the attachment'
     damaged = bytearray(sample_bag)

@@ -135,18 +135,14 @@ def mangled(draw: Callable[[st.SearchStrategy[int]], int], content: bytes) -> by
 @pytest.mark.parametrize('name', MAKERS)
 @EXAMPLES
 @given(data=st.data())
-def test_no_damage_makes_a_crash(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_no_damage_makes_a_crash(tmp_path, bags, name, data):
     read_or_refuse(tmp_path / 'a.mcap', mangled(data.draw, bags[name]))
 
 
 @pytest.mark.parametrize('name', CHECKED)
 @EXAMPLES
 @given(data=st.data())
-def test_flipped_bits_lose_nothing_in_silence_and_change_nothing(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_flipped_bits_lose_nothing_in_silence_and_change_nothing(tmp_path, bags, name, data):
     whole, _ = read(tmp_path / 'whole.mcap', bags[name])
     damaged = bytearray(bags[name])
     for place in data.draw(st.lists(st.integers(8, len(damaged) - 1), min_size=1, max_size=3)):
@@ -173,9 +169,7 @@ def without_checksum(content: bytes) -> bytearray:
 @pytest.mark.parametrize('name', ['zstd', 'unchunked', 'no checksums'])
 @EXAMPLES
 @given(data=st.data())
-def test_no_wild_index_makes_a_crash(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_no_wild_index_makes_a_crash(tmp_path, bags, name, data):
     damaged = without_checksum(bags[name])
     (summary_start,) = struct.unpack_from('<Q', damaged, len(damaged) - len(MAGIC) - 20)
     places = st.integers(summary_start, len(damaged) - len(MAGIC) - 8)
@@ -201,9 +195,7 @@ def chunk_indexes(content: bytes) -> list[int]:
         (16, 1 << 60),
     ],
 )
-def test_an_index_that_cannot_be_true_is_not_used(
-    tmp_path: Path, bags: dict[str, bytes], field: int, value: int | str
-) -> None:
+def test_an_index_that_cannot_be_true_is_not_used(tmp_path, bags, field, value):
     whole, _ = read(tmp_path / 'whole.mcap', bags['zstd'])
     damaged = without_checksum(bags['zstd'])
     first, second, *_ = chunk_indexes(bytes(damaged))
@@ -241,9 +233,7 @@ def bombs() -> dict[str, bytes]:
 
 @pytest.mark.parametrize('stated', [1000, BOMB_BYTES, 1 << 60, (1 << 64) - 1])
 @pytest.mark.parametrize('kind', ['zstd', 'zstd without a size', 'lz4'])
-def test_a_chunk_that_unpacks_without_end(
-    tmp_path: Path, bombs: dict[str, bytes], kind: str, stated: int
-) -> None:
+def test_a_chunk_that_unpacks_without_end(tmp_path, bombs, kind, stated):
     bomb = bombs[kind]
     content = MAGIC + chunk(kind.split()[0], bomb, stated)
     assert len(content) < BOMB_BYTES / 100
@@ -256,9 +246,7 @@ def test_a_chunk_that_unpacks_without_end(
     assert peak < 3 * len(bomb) + (1 << 22)
 
 
-def test_a_packed_file_that_unpacks_without_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_packed_file_that_unpacks_without_end(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(mcap_file, 'CHUNK_LIMIT_BYTES', 1 << 20)
     path = tmp_path / 'a.mcap.zstd'
     for size, raised in ((1 << 19, 'is no MCAP file'), (1 << 27, 'cannot be unpacked')):
@@ -267,9 +255,7 @@ def test_a_packed_file_that_unpacks_without_end(
             open_runs([path])
 
 
-def test_messages_out_of_order_are_held_back_up_to_a_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_messages_out_of_order_are_held_back_up_to_a_limit(tmp_path, monkeypatch) -> None:
     n = 3000
     received = np.arange(n) + 1000
     received[::20] = 5  # in every chunk one that came first
@@ -286,9 +272,7 @@ def test_messages_out_of_order_are_held_back_up_to_a_limit(
 
 @EXAMPLES
 @given(data=st.data())
-def test_a_live_file_cut_anywhere_gives_what_came_before(
-    tmp_path: Path, bags: dict[str, bytes], data: st.DataObject
-) -> None:
+def test_a_live_file_cut_anywhere_gives_what_came_before(tmp_path, bags, data):
     whole, _ = read(tmp_path / 'whole.mcap', bags['live'])
     end = data.draw(st.integers(len(MAGIC), len(bags['live'])))
     found, told = read(tmp_path / 'a.mcap', bags['live'][:end])
@@ -298,9 +282,7 @@ def test_a_live_file_cut_anywhere_gives_what_came_before(
 
 
 @pytest.mark.parametrize('fraction', [0.6, 0.9, 1.0])
-def test_a_live_file_is_replayed_and_its_damage_told(
-    tmp_path: Path, bags: dict[str, bytes], fraction: float
-) -> None:
+def test_a_live_file_is_replayed_and_its_damage_told(tmp_path, bags, fraction):
     path = tmp_path / 'a.mcap'
     whole = bags['live']
     path.write_bytes(whole[: int(fraction * len(whole))])

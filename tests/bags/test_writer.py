@@ -22,9 +22,7 @@ from tests.recorded import rows, summary
 
 
 @pytest.mark.parametrize('compression', Compression)
-def test_the_reference_reader_decodes_it(
-    write_bag: Callable[..., Path], block: Block, compression: Compression
-) -> None:
+def test_the_reference_reader_decodes_it(write_bag, block, compression):
     path = write_bag('a.mcap', block, compression=compression, chunk_bytes=10_000)
     with path.open('rb') as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])

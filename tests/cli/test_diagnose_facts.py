@@ -76,9 +76,7 @@ def test_facts_make_a_name_of_a_set_told_by_options_or_by_the_run_file_beside_a_
         (['calm', 'calm'], '--fact calm is given 2 times'),
     ],
 )
-def test_a_fact_that_is_none_is_an_error(
-    facts: list[str], wrong: str, fouled: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fact_that_is_none_is_an_error(facts, wrong, fouled, capsys):
     words = [word for fact in facts for word in ('--fact', fact)]
     assert main(['diagnose', str(fouled), *words]) == 1
     assert wrong in capsys.readouterr().err

@@ -38,9 +38,7 @@ def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize('name', ['fouling', 'Kelp', '../kelp'])
-def test_a_name_that_cannot_be_is_refused_before_the_work(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_that_cannot_be_is_refused_before_the_work(name: str, tmp_path, capsys) -> None:
     line = ['learn', str(tmp_path / 'none.mcap'), '-o', str(tmp_path / 'a.yaml'), '--name', name]
     assert main(line) == 1
     assert 'name' in capsys.readouterr().err
@@ -66,12 +64,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_bags_of_a_store_are_found_from_anywhere(
-    fleet: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_bags_of_a_store_are_found_from_anywhere(fleet, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['runs']) == 1
@@ -91,36 +84,25 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
     return store.path
 
 
-def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(fleet, tmp_path, capsys):
     store = bare(fleet, tmp_path, 'Vitus Bering')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['runs']) == 1
 
 
-def test_a_store_of_two_ships_names_them(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_store_of_two_ships_names_them(fleet: Path, tmp_path, capsys) -> None:
     store = bare(fleet, tmp_path, 'Alder', 'Birch')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
     assert "the store holds 'Alder', 'Birch'" in capsys.readouterr().err
 
 
-def test_a_window_of_a_store_counts(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_window_of_a_store_counts(fleet: Path, tmp_path, capsys) -> None:
     line = ['learn', f'{fleet / "store"}@0:200', '-o', str(tmp_path / 'a.yaml')]
     assert main(line) == 1
     assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err
 
 
-def test_a_bag_of_a_store_that_is_gone_is_named(
-    fleet: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_bag_of_a_store_that_is_gone_is_named(fleet, tmp_path, monkeypatch, capsys):
     store = (fleet / 'store').rename(tmp_path / 'moved')
     try:
         monkeypatch.chdir(tmp_path)
@@ -132,9 +114,7 @@ def test_a_bag_of_a_store_that_is_gone_is_named(
     assert 'give the bags themselves' in said
 
 
-def test_a_store_without_a_coastdown_is_an_error(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_store_without_a_coastdown_is_an_error(tmp_path, capsys) -> None:
     store = tmp_path / 'store'
     (store / 'coastdowns').mkdir(parents=True)
     Store(store).write(BagResult(bag_row('bags', 'run.mcap', 'a' * 64)))

@@ -46,13 +46,7 @@ def stopped(line: list[str]) -> int | str | None:
         (KeyboardInterrupt(), 130, ''),
     ],
 )
-def test_an_end_has_its_status(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    result: int | BaseException,
-    status: int,
-    said: str,
-) -> None:
+def test_an_end_has_its_status(monkeypatch, capsys, result, status, said):
     assert run_verb(monkeypatch, result) == status
     captured = capsys.readouterr()
     assert captured.err.startswith(said)

@@ -81,9 +81,7 @@ def test_watch_plays_the_part_that_is_given(coastdown_bag: Path) -> None:
     assert whole.span_ns[0] + 400 * 10**9 == part.span_ns[0]
 
 
-def test_replay_takes_each_window_and_does_not_combine_what_overlaps(
-    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_replay_takes_each_window_and_does_not_combine_what_overlaps(coastdown_bag, capsys):
     bags = [f'{coastdown_bag}@430:700', f'{coastdown_bag}@500:900']
     capsys.readouterr()
     assert main(['replay', *bags, '--window', '0', '1', '--json']) == 0
@@ -97,9 +95,7 @@ def test_replay_takes_each_window_and_does_not_combine_what_overlaps(
 
 
 @pytest.mark.parametrize('verb', ['diagnose', 'baseline'])
-def test_a_part_that_is_given_twice_is_no_second_run(
-    verb: str, coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_part_that_is_given_twice_is_no_second_run(verb, coastdown_bag, tmp_path, capsys):
     words = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
     if verb == 'baseline':
         ship = str(ROOT / 'config' / 'vitus_bering.yaml')
@@ -117,9 +113,7 @@ def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
     refuse_overlaps([WindowedRun(run, (0.0, 430.0)), part])
 
 
-def test_a_window_may_hold_the_steady_lead(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_window_may_hold_the_steady_lead(tmp_path, capsys) -> None:
     ship = str(ROOT / 'config' / 'vitus_bering.yaml')
     lead = tmp_path / 'lead.mcap'
     assert main(['simulate', '--ship', ship, '-o', str(lead), '--lead-in', '900']) == 0
@@ -128,9 +122,7 @@ def test_a_window_may_hold_the_steady_lead(
     assert json.loads(capsys.readouterr().out)['coastdowns_used'] == 1
 
 
-def test_what_is_cut_is_said_first_in_text_and_report(
-    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_cut_is_said_first_in_text_and_report(coastdown_bag, tmp_path, capsys):
     page, document = tmp_path / 'a.html', tmp_path / 'a.json'
     line = ['replay', f'{coastdown_bag}@100:900', '--report', str(page), '--json', str(document)]
     assert main(line) == 0

@@ -64,9 +64,7 @@ def test_noise_of_positions_begins_no_other_of_a_ship_that_is_too_slow(
 @pytest.mark.parametrize(
     ('second', 'rate_rad_s'), [('compass', 0.02), ('compass', -0.005), ('radar', 0.02)]
 )
-def test_a_turn_ends_it_where_it_begins(
-    watch, record, sensors, second: str, rate_rad_s: float
-) -> None:
+def test_a_turn_ends_it_where_it_begins(watch, record, sensors, second, rate_rad_s):
     block = record(
         sensors=(sensors['log'], sensors[second]), turns=(Turn(300.0, 200.0, rate_rad_s),)
     )
@@ -159,9 +157,7 @@ def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float) -> N
     ('shaft', 'thrust', 'by'),
     [(1.0, 1.0, EndedBy.ENGINE), (0.3, 0.1, EndedBy.ENGINE), (-0.8, 0.1, EndedBy.ASTERN)],
 )
-def test_an_engaged_engine_shows_in_the_shaft_at_once(
-    watch, record, sensors, shaft: float, thrust: float, by: EndedBy
-) -> None:
+def test_an_engaged_engine_shows_in_the_shaft_at_once(watch, record, sensors, shaft, thrust, by):
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
         orders=(STOP, EngineOrder(400.0, shaft=shaft, thrust=thrust)),
@@ -194,9 +190,7 @@ def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn(watch, record, sen
 
 
 @pytest.mark.parametrize('left', [0.3, 0.5])
-def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn_when_it_settles(
-    watch, record, left: float
-) -> None:
+def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn_when_it_settles(watch, record, left):
     order = EngineOrder(0.0, shaft=left**0.5, thrust=left)
     events = watch(record(orders=(order,), duration_s=2400.0))
     assert all(event.withdrawn for event in ended(events))

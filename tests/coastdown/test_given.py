@@ -131,9 +131,7 @@ def test_a_kick_in_the_glide_is_cut_out(kick: float, reason: str) -> None:
 
 
 @pytest.mark.parametrize('before_s', [600.0, 0.0])
-def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(
-    before_s: float,
-) -> None:
+def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(before_s):
     time_s = np.arange(-before_s, LENGTH_S)
     revs = np.where(time_s < 10.0, 1.0, 0.6)
     inputs = [block(LOG, noisy(slowed(revs)), time_s), block(SHAFT, 12.0 * revs, time_s)]

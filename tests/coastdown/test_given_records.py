@@ -179,9 +179,7 @@ def test_a_glide_before_a_hull_is_caught_is_all_that_is_kept() -> None:
         ('whole_5', (2915.0, 2935.0), Dismissal.THRUST),
     ],
 )
-def test_a_propeller_that_turns_leaves_no_coastdown(
-    name: str, window_s: tuple[float, float], reason: Dismissal
-) -> None:
+def test_a_propeller_that_turns_leaves_no_coastdown(name, window_s, reason):
     time_s, values = esso_osaka(name)
     found = examined(ESSO_OSAKA, time_s, window_s, values)
     assert found.refused

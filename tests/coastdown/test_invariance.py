@@ -153,9 +153,7 @@ def thinned(block: Block, every) -> Block:
     globe=st.booleans(),
     silence=st.tuples(st.integers(0, 1200), st.integers(0, 300)),
 )
-def test_where_the_record_is_cut_changes_no_bit(
-    ship, eventful, data, seed: int, every, globe: bool, silence
-) -> None:
+def test_where_the_record_is_cut_changes_no_bit(ship, eventful, data, seed, every, globe, silence):
     block = thinned(eventful, every)
     second = (block.stamp_ns - START_NS) // S
     block = block[(second < silence[0]) | (second >= sum(silence))]
@@ -170,9 +168,7 @@ def test_where_the_record_is_cut_changes_no_bit(
 
 @settings(max_examples=4, deadline=None)
 @given(data=st.data(), into_s=st.integers(1, 200), seed=st.integers(0, 1000))
-def test_a_reset_in_mid_coastdown_is_a_fresh_start(
-    ship, eventful, said, data, into_s: int, seed: int
-) -> None:
+def test_a_reset_in_mid_coastdown_is_a_fresh_start(ship, eventful, said, data, into_s, seed):
     onset = next(event for event in said if isinstance(event, Onset))
     place = int(np.searchsorted(eventful.receive_ns, onset.detected_ns + into_s * S))
     before, after = eventful[:place], spoil(eventful[place:], seed)
@@ -241,9 +237,7 @@ def long_records(ship, long_record) -> list:
 
 
 @pytest.mark.parametrize(('start_s', 'globe'), [(686, False), (500, True)])
-def test_a_monitor_that_starts_later_says_the_same(
-    ship, long_records, start_s: int, globe: bool
-) -> None:
+def test_a_monitor_that_starts_later_says_the_same(ship, long_records, start_s, globe):
     block, whole = long_records[globe]
     part, _ = run(ship, [block[block.stamp_ns >= START_NS + start_s * S]])
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns

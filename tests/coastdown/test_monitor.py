@@ -246,9 +246,7 @@ def test_nothing_is_compiled_once_it_runs(ship, record, sensors) -> None:
     assert [len(kernel.signatures) for kernel in kernels] == compiled
 
 
-def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(
-    ship, record, sensors
-) -> None:
+def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(ship, record, sensors):
     everything = record(sensors=(sensors['log'], sensors['radar'], sensors['compass']))
     silent_ns = START_NS + 1500 * S
     heard = everything[(everything.stamp_ns < silent_ns) | (everything.channel == Channel.HEADING)]

@@ -216,9 +216,7 @@ def test_one_shaft_of_two_is_no_coastdown(watch, record) -> None:
 
 
 @pytest.mark.parametrize('wait_s', [0.0, 30.0])
-def test_of_a_crash_stop_only_the_glide_after_it_is_a_coastdown(
-    watch, record, sensors, wait_s: float
-) -> None:
+def test_of_a_crash_stop_only_the_glide_after_it_is_a_coastdown(watch, record, sensors, wait_s):
     orders = (
         EngineOrder(0.0, shaft=0.0, thrust=0.0),
         EngineOrder(wait_s + 1.0, shaft=-0.6, thrust=-0.6),

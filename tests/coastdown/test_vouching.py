@@ -157,9 +157,7 @@ def test_sound_sailing_in_waves_and_a_tide_raises_no_alarm(length_m: float, inpu
     ('fault', 'ground'),  # beside either in turn; the benchmark has each beside both
     list(zip([fault for fault in WRONG_SCALES if fault != '0.7 times'], cycle(GROUNDS))),
 )
-def test_a_log_in_a_wrong_scale_is_left_out_before_its_glide_ends(
-    fault: str, ground: Channel
-) -> None:
+def test_a_log_in_a_wrong_scale_is_left_out_before_its_glide_ends(fault, ground):
     monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)
     events = [*monitor.update(faulty(fault, ground)), *monitor.finish()]
     assert set(monitor.left_out()) == {'speed_through_water'}

@@ -76,9 +76,7 @@ def test_without_anything_hidden_nothing_is_most_probable() -> None:
 @pytest.mark.parametrize(
     ('text', 'name'), [('fouling=0.5', 'fouling'), ('fouling=2', 'locked_propeller')]
 )
-def test_a_size_that_is_not_named_by_its_limit_is_not_named_in_a_record(
-    text: str, name: str
-) -> None:
+def test_a_size_that_is_not_named_by_its_limit_is_not_named_in_a_record(text, name):
     found = answer(text)
     assert found.candidates[0].names == (name,)
     assert 'fouling' not in [effect.name for effect in found.effects]

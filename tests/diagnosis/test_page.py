@@ -53,9 +53,7 @@ def written(tmp_path: Path) -> Callable[..., Any]:
     return write
 
 
-def test_the_page_says_all_and_needs_no_network(
-    found: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_the_page_says_all_and_needs_no_network(found, written):
     assert found.verdict is Verdict.NAMED
     page = written(found)
     assert page.links == []
@@ -79,9 +77,7 @@ def test_the_page_says_all_and_needs_no_network(
         assert each in page.text, each
 
 
-def test_the_score_of_the_method_stands_on_the_page(
-    words: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_the_score_of_the_method_stands_on_the_page(words, written):
     page = written(words, score=SCORE)
     assert 'not scored' not in page.text
     assert '900 simulated cases (seed 7)' in page.text
@@ -108,17 +104,13 @@ def test_a_set_says_what_would_decide(words: DiagnosisResult, written: Callable[
     assert 'u + offset' in page.text
 
 
-def test_what_is_unknown_is_none_of_the_candidates(
-    words: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_what_is_unknown_is_none_of_the_candidates(words, written):
     page = written(replace(words, verdict=Verdict.UNKNOWN, effects=()))
     assert 'Of each candidate, were it the one' in page.text
     assert 'none of the known effects' in page.text
 
 
-def test_a_fact_that_the_data_contradict_stands_on_the_page(
-    words: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_a_fact_that_the_data_contradict_stands_on_the_page(words, written):
     told = (
         WeighedFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
         WeighedFact(Fact('shaft', 'free'), 'out', 0.01),
@@ -130,9 +122,7 @@ def test_a_fact_that_the_data_contradict_stands_on_the_page(
     assert 'shaft=free out after the stop the shaft was free 1.0 %' in page.text
 
 
-def test_a_record_without_coastdown_has_a_page_without_traces(
-    words: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_a_record_without_coastdown_has_a_page_without_traces(words, written):
     sailing = replace(words, baseline='none', notes=('compared on 40 legs',))
     page = written(sailing, ship=None)
     assert len(page.images) == 1
@@ -145,9 +135,7 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
     assert 'the runs are compared with all hulls of her length and volume' in fitted.text
 
 
-def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(
-    found: DiagnosisResult, written: Callable[..., Any]
-) -> None:
+def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(found, written):
     asks = waiting(
         'is the unit of one of them wrong?', baseline='stated', estimates=found.estimates
     )

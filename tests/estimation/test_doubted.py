@@ -46,9 +46,7 @@ def test_the_band_holds_the_truth_where_the_log_is_doubted_and_it_is_said(window
     assert away(0.7) < 2.0
 
 
-def test_the_parts_of_sigma_still_make_sigma_and_the_speeds_are_those_of_both(
-    window: Window,
-) -> None:
+def test_the_parts_of_sigma_still_make_sigma_and_the_speeds_are_those_of_both(window):
     found = averaged(estimate_final)(replace(window, log_doubt=0.4), SHIP, PARAMETERS)
     squares = sum(np.square(part) for part in found.sigma_parts.values())
     assert np.sqrt(squares) == pytest.approx(found.calm.sigma_m_s2, rel=0.05)

@@ -25,9 +25,7 @@ def _broken(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     raise ZeroDivisionError('division by zero')
 
 
-def test_the_monitor_raises_nothing_and_says_what_failed(
-    caplog: pytest.LogCaptureFixture, defects: set[tuple[str, int]]
-) -> None:
+def test_the_monitor_raises_nothing_and_says_what_failed(caplog, defects):
     block = sense(
         simulate(SHIP, Scenario(speed_m_s=6.0, duration_s=900.0)), standard_sensors(), seed=1
     )
@@ -52,9 +50,7 @@ def test_errors_with_words_keep_them() -> None:
         shielded(refuses)(None, SHIP, Parameters())  # type: ignore[arg-type]
 
 
-def test_a_forecast_that_fails_costs_the_forecast_alone(
-    caplog: pytest.LogCaptureFixture, defects: set[tuple[str, int]]
-) -> None:
+def test_a_forecast_that_fails_costs_the_forecast_alone(caplog, defects):
     block = sense(
         simulate(SHIP, Scenario(speed_m_s=6.0, duration_s=900.0)), standard_sensors(), seed=1
     )

@@ -149,14 +149,7 @@ def test_a_rotation_and_plain_numbers(source: Source, little: bool) -> None:
 @each_source
 @EXAMPLES
 @given(data=st.data(), stamp_ns=stamps, frame=frames, values=eight, little=st.booleans())
-def test_fields_agree_with_rosbags_and_rclpy(
-    source: Source,
-    data: st.DataObject,
-    stamp_ns: int,
-    frame: str,
-    values: list[float],
-    little: bool,
-) -> None:
+def test_fields_agree_with_rosbags_and_rclpy(source, data, stamp_ns, frame, values, little):
     message = reference.message(source.type, stamp_ns, frame, values)
     if 'JointState' in source.type:
         message = reference.make(
@@ -181,9 +174,7 @@ def test_fields_agree_with_rosbags_and_rclpy(
 @each_source
 @EXAMPLES
 @given(data=st.data())
-def test_what_is_malformed_is_malformed_to_the_other_reader(
-    source: Source, data: st.DataObject
-) -> None:
+def test_what_is_malformed_is_malformed_to_the_other_reader(source, data):
     frame = data.draw(frames)
     little = data.draw(st.booleans())
     good = reference.serialize(
@@ -235,9 +226,7 @@ def test_a_frame_id_is_utf8_or_the_message_is_malformed(name: bytes) -> None:
 @each_source
 @settings(max_examples=10, deadline=None)
 @given(data=st.data())
-def test_a_message_reads_the_same_alone_and_behind_others(
-    source: Source, data: st.DataObject
-) -> None:
+def test_a_message_reads_the_same_alone_and_behind_others(source, data):
     """Numbers are read where those of the message before lay, where they lie there again."""
     pool = []
     for frame in ('log', 'gps', 'base', 'ü'):

@@ -82,9 +82,7 @@ def assert_replayed(path: Path, *, at_least: int) -> Any:
     return result
 
 
-def test_live_figures_are_recorded_and_replayed(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_live_figures_are_recorded_and_replayed(start_node, peer, diagnostics, tmp_path):
     from geometry_msgs.msg import AccelWithCovarianceStamped, TwistWithCovarianceStamped
     from nav_msgs.msg import Path as Ahead
     from rclpy.serialization import deserialize_message
@@ -150,9 +148,7 @@ def test_live_figures_are_recorded_and_replayed(
     assert [field.name for field in curve.fields] == ['speed', 'resistance', 'sigma', 'froude']
 
 
-def test_silence_ends_a_coastdown_by_the_clock(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_silence_ends_a_coastdown_by_the_clock(start_node, peer, diagnostics, tmp_path):
     node = start_node(**PARAMETERS, data_stop_s=8.0)
     block = record()
     peer.player.connect(block)
@@ -170,9 +166,7 @@ def test_silence_ends_a_coastdown_by_the_clock(
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.SILENCE]
 
 
-def test_recording_starts_mid_run_and_a_reset_is_replayed(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_recording_starts_mid_run_and_a_reset_is_replayed(start_node, peer, diagnostics, tmp_path):
     node = start_node(record=False, **PARAMETERS)
     block = record()
     peer.player.connect(block)

@@ -9,7 +9,6 @@ import time
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -76,14 +75,7 @@ def result_of(diagnosing: Diagnosing) -> DiagnosisStatus:
         ({}, SHIP_FILE, 'none yet', 'none yet'),
     ],
 )
-def test_node_says_whether_it_can_diagnose(
-    start_node: Any,
-    diagnostics: Any,
-    settings: dict[str, Any],
-    ship: Path,
-    state: str,
-    reason: str,
-) -> None:
+def test_node_says_whether_it_can_diagnose(start_node, diagnostics, settings, ship, state, reason):
     chosen = {} if ship is None else {'ship_file': str(ship)}
     start_node(**chosen, **settings, record=False)
     status = diagnostics.wait_for('diagnosis', reason)
@@ -91,9 +83,7 @@ def test_node_says_whether_it_can_diagnose(
     assert status.level == b'\x00'
 
 
-def test_node_names_what_is_missing_as_the_verb_does(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_node_names_what_is_missing_as_the_verb_does(start_node, peer, diagnostics, tmp_path):
     node = start_node(ship_file=str(SHIP_FILE), use_sim_time=True, **SETTINGS)
     block = record('current=0.5')
     peer.player.connect(block)
@@ -145,9 +135,7 @@ def test_coastdown_without_estimate_is_not_diagnosed() -> None:
     assert 'withdrawn: 1 %' in status.reason
 
 
-def test_process_that_dies_is_a_failure_that_harms_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_process_that_dies_is_a_failure_that_harms_nothing(monkeypatch) -> None:
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
     diagnosing.begin(*a_coastdown())

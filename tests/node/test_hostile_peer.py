@@ -7,7 +7,6 @@ import math
 import random
 import struct
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,9 +45,7 @@ def odd_stamps() -> list[Any]:
     return made
 
 
-def test_it_harms_neither_the_node_nor_its_recording(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_it_harms_neither_the_node_nor_its_recording(start_node, peer, diagnostics, tmp_path):
     from shipdrag_ros.node.inputs import message_class
 
     node = start_node()

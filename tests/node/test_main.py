@@ -51,9 +51,7 @@ START_S = 240.0
         ('use_sim_time', 3, 'use_sim_time: 3, expected true or false'),
     ],
 )
-def test_bad_parameters_are_user_errors(
-    capfd: pytest.CaptureFixture[str], name: str, value: object, said: str
-) -> None:
+def test_bad_parameters_are_user_errors(capfd, name: str, value: object, said: str) -> None:
     line = ['coastdown_node', '--ros-args', '-p', f'{name}:={json.dumps(value)}']
     assert main(line) == 1
     error = capfd.readouterr().err
@@ -71,9 +69,7 @@ def test_bad_parameters_are_user_errors(
         ('/**/coastdown_node', '/big/ship'),
     ],
 )
-def test_parameters_for_this_node_are_read(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, section: str, namespace: str
-) -> None:
+def test_parameters_for_this_node_are_read(capfd, tmp_path, section: str, namespace: str) -> None:
     file = tmp_path / 'ours.yaml'
     file.write_text(f'{section}:\n  ros__parameters: {{windows_s: 600.0}}\n')
     line = ['coastdown_node', '--ros-args', '--params-file', str(file)]
@@ -89,9 +85,7 @@ def test_signal_handlers_are_given_back() -> None:
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_with_a_readable_bag(
-    start_node: Any, peer: Any, tmp_path: Path, number: signal.Signals
-) -> None:
+def test_a_signal_ends_it_with_a_readable_bag(start_node, peer, tmp_path, number):
     node = start_node()
     publisher = peer.advertise('/depth', 'sensor_msgs/msg/Range')
     peer.wait_for_listener(publisher)

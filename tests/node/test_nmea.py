@@ -127,9 +127,7 @@ def test_a_topic_that_is_there_feeds_and_nmea_is_counted(
     assert status.level == b'\x01'
 
 
-def test_a_line_is_not_blamed_for_the_noise_of_another(
-    start_node: Any, diagnostics: Any, peer: Any, instruments: Instruments
-) -> None:
+def test_a_line_is_not_blamed_for_the_noise_of_another(start_node, diagnostics, peer, instruments):
     with socket.create_server(('127.0.0.1', 0)) as server:
         noisy = f'tcp://127.0.0.1:{server.getsockname()[1]}'
         start_node(nmea=f'{instruments.source} {noisy}')

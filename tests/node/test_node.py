@@ -47,9 +47,7 @@ def kinds(events: list[bytes]) -> list[EventKind]:
     return [read_event(payload).kind for payload in events]
 
 
-def test_records_all_it_hears_and_counts_what_is_no_use(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_records_all_it_hears_and_counts_what_is_no_use(start_node, peer, diagnostics, tmp_path):
     node = start_node()
     peer.player.connect(speeds())
     block = speeds(age_s=1.5)
@@ -80,9 +78,7 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     }
 
 
-def test_inputs_are_recorded_by_their_own_name(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_inputs_are_recorded_by_their_own_name(start_node, peer, diagnostics, tmp_path):
     from sensor_msgs.msg import Range
 
     remapped = ('depth:=/sounder/depth', 'speed_through_water_2:=/log2/sped', '__ns:=/ship')
@@ -131,9 +127,7 @@ def test_a_further_log_is_spoken_of_where_somebody_publishes_it_and_a_heading_in
     assert replay(run).inputs['heading'].used == 3
 
 
-def test_hears_a_publisher_of_any_quality_of_service(
-    start_node: Any, peer: Any, diagnostics: Any
-) -> None:
+def test_hears_a_publisher_of_any_quality_of_service(start_node, peer, diagnostics):
     from rclpy.duration import Duration
     from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
@@ -262,9 +256,7 @@ def test_reports_sim_time_without_a_clock(start_node: Any, peer: Any, diagnostic
     diagnostics.wait_for('input speed_through_water', '5', value=UNUSED)
 
 
-def test_estimates_on_when_the_disk_does_not_take_it(
-    start_node: Any, peer: Any, diagnostics: Any
-) -> None:
+def test_estimates_on_when_the_disk_does_not_take_it(start_node, peer, diagnostics):
     start_node(output_directory='/proc/nowhere')
     block = speeds()
     peer.player.connect(block)
@@ -277,9 +269,7 @@ def test_estimates_on_when_the_disk_does_not_take_it(
     assert 'recording failed' in answer.message
 
 
-def test_obeys_transitions_and_refuses_illegal_ones(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_obeys_transitions_and_refuses_illegal_ones(start_node, peer, diagnostics, tmp_path):
     start_node()
     assert not peer.change_state('configure')
     assert not peer.change_state('no_such_transition')
@@ -305,9 +295,7 @@ def test_obeys_transitions_and_refuses_illegal_ones(
     assert peer.state() == 'finalized'
 
 
-def test_waits_to_be_configured_without_autostart(
-    start_node: Any, peer: Any, ship_file: Path
-) -> None:
+def test_waits_to_be_configured_without_autostart(start_node, peer, ship_file):
     from rcl_interfaces.srv import DescribeParameters, SetParameters
     from rclpy.parameter import Parameter
 
@@ -348,9 +336,7 @@ def test_waits_to_be_configured_without_autostart(
     assert peer.state() == 'active'
 
 
-def test_services_record_and_reset(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_services_record_and_reset(start_node: Any, peer: Any, diagnostics: Any, tmp_path) -> None:
     node = start_node()
     events = peer.listen('/coastdown_node/events', EVENT_TYPE, raw=True)
     peer.spin_until(lambda: peer.node.count_publishers('/coastdown_node/events'))
@@ -377,9 +363,7 @@ def test_services_record_and_reset(
     assert topics_in(second)['/speed_through_water'] == 10
 
 
-def test_a_clock_that_goes_back_begins_a_new_bag(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_a_clock_that_goes_back_begins_a_new_bag(start_node, peer, diagnostics, tmp_path):
     node = start_node(use_sim_time=True)
     epoch_ns = 1_700_000_000 * 10**9
     block = Block.of(Channel.SPEED_THROUGH_WATER, epoch_ns + np.arange(3) * 10**8, [5, 6, 7])
@@ -396,9 +380,7 @@ def test_a_clock_that_goes_back_begins_a_new_bag(
     assert read_event(first.payload).kind is EventKind.CLOCK_JUMP
 
 
-def test_nobody_on_the_network_chooses_files_or_clock(
-    start_node: Any, peer: Any, tmp_path: Path
-) -> None:
+def test_nobody_on_the_network_chooses_files_or_clock(start_node, peer, tmp_path):
     from rcl_interfaces.srv import SetParameters
     from rclpy.parameter import Parameter
 

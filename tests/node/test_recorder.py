@@ -10,8 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 
-import pytest
-
 from shipdrag_ros.bags.durable import LiveFile, PartLimits
 from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
@@ -193,9 +191,7 @@ def test_what_was_lost_is_counted_over_all_recordings(tmp_path: Path) -> None:
     assert it.status().text == 'not recording, 1 message(s) lost'
 
 
-def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_hangs_holds_nobody_up_and_is_told(tmp_path, monkeypatch) -> None:
     it = recorder(tmp_path)
     it.start()
     it.input(received(0))
@@ -220,9 +216,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
     assert not it.status().slow
 
 
-def test_old_recordings_that_cannot_be_removed_are_said_until_they_can(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_old_recordings_that_cannot_be_removed_are_said_until_they_can(tmp_path, monkeypatch):
     monkeypatch.setattr('shipdrag_ros.node.recorder.EVERY_S', 0.05)
     old = tmp_path / 'coastdown_20260101T000000Z_000.mcap'
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

@@ -146,9 +146,7 @@ def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
     assert [row.topic for row in bag] == ['/speed_through_water']
 
 
-def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_order(
-    tmp_path: Path,
-) -> None:
+def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_order(tmp_path):
     arrivals = [float(k) for k in range(20)]
     prompt, patient = Desk(tmp_path / 'prompt'), Desk(tmp_path / 'patient')
     patient.ready = False
@@ -170,9 +168,7 @@ def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_ord
     assert sorted(one) == sorted(other)
 
 
-def test_what_waits_is_bounded_by_its_size_too(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_waits_is_bounded_by_its_size_too(desk: Desk, monkeypatch) -> None:
     monkeypatch.setattr(session, 'WAITING_BYTES', 1000)
     desk.ready = False
     desk.feed(speeds([0]))

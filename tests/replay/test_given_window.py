@@ -45,9 +45,7 @@ def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> EndedCoa
     ('swing_deg', 'turn_rad', 'told'),
     [(60.0, 0.35, True), (60.0, 1.2, False), (15.0, 0.35, False)],
 )
-def test_a_turn_at_the_end_of_the_window_is_cut(
-    tmp_path: Path, swing_deg: float, turn_rad: float, told: bool
-) -> None:
+def test_a_turn_at_the_end_of_the_window_is_cut(tmp_path, swing_deg, turn_rad, told):
     # across the cut at 180 degrees, where the reading jumps
     turned = np.radians(swing_deg) * np.clip((np.arange(100.0) - 70.0) / 30.0, 0.0, 1.0)
     coastdown = coasted(tmp_path / 'a.mcap', np.pi - 0.1 + turned, Parameters(turn_rad=turn_rad))
@@ -82,9 +80,7 @@ def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Even
     assert shorter.curve.speed_m_s[0] > coastdown.estimate.curve.speed_m_s[0]
 
 
-def test_the_heading_of_a_window_follows_the_convention(
-    recording: tuple[Path, list[Event]], parameters: Parameters
-) -> None:
+def test_the_heading_of_a_window_follows_the_convention(recording, parameters):
     (run,) = open_runs([recording[0]])
     compass = replace(parameters, heading_convention='compass')
     for window in ((410.0, 1000.0), (0.0, 1000.0)):
@@ -102,9 +98,7 @@ def test_a_window_that_gives_nothing_says_why(recording: tuple[Path, list[Event]
 @pytest.mark.parametrize(
     'window', [(-1.0, 5.0), (5.0, 5.0), (6.0, 5.0), (2000.0, 3000.0), (0.0, np.nan), (0.0, np.inf)]
 )
-def test_a_window_outside_of_the_bag(
-    recording: tuple[Path, list[Event]], window: tuple[float, float]
-) -> None:
+def test_a_window_outside_of_the_bag(recording, window):
     (run,) = open_runs([recording[0]])
     with pytest.raises(BagError, match=r'window .* s: expected 0 <= start < end inside of .*live'):
         replay(run, window=window)
@@ -116,9 +110,7 @@ def test_a_window_ends_with_the_bag_at_the_latest(recording: tuple[Path, list[Ev
     assert ends[0] == ends[1]
 
 
-def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
-) -> None:
+def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(tmp_path, ship, voyage):
     block = voyage()
     later = replace(block, receive_ns=block.receive_ns + 3600 * 10**9)
     results = []
@@ -133,9 +125,7 @@ def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
     )
 
 
-def test_a_clock_set_in_a_window_is_no_estimate(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
-) -> None:
+def test_a_clock_set_in_a_window_is_no_estimate(tmp_path, ship, voyage):
     block = voyage()
     second = replace(block, receive_ns=block.receive_ns + 1200 * 10**9)
     (run,) = open_runs([write_run(tmp_path / 'a.mcap', concatenate([block, second]), ship)])
@@ -149,9 +139,7 @@ def test_a_clock_set_in_a_window_is_no_estimate(
     assert 'a clock was set in the window' in why_no_coastdown(result)
 
 
-def test_what_follows_a_clock_that_was_set_may_have_no_time_of_its_own(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
-) -> None:
+def test_what_follows_a_clock_that_was_set_may_have_no_time_of_its_own(tmp_path, ship, voyage):
     block = voyage()
     at_once = np.full(len(block), block.receive_ns[-1])
     both = concatenate([block, replace(block, receive_ns=at_once)])

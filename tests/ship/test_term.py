@@ -231,9 +231,7 @@ def test_a_formula_is_as_sure_as_it_foretold_runs_left_out() -> None:
         (GROWN, ({'day': 20610.0}, {'day': 20620.0}), 2.0),
     ],
 )
-def test_a_force_by_depth_or_date_is_of_the_run(
-    text: str, runs: tuple[dict[str, float], dict[str, float]], ratio: float
-) -> None:
+def test_a_force_by_depth_or_date_is_of_the_run(text, runs, ratio):
     effect, ship = declared(LearntTerm.from_yaml(text)), Ship.example()
     one, other = (
         effect.action(Frame(ship, Scenario(speed_m_s=6.0, **run), 0.0), 0.02).resistance_n(3.0)
