@@ -139,11 +139,12 @@ def test_another_ship_gives_another_range_of_a_given_window(coastdown_bag, tmp_p
     other.write_text(
         '{length_m: 150, displaced_volume_m3: 20200, added_mass: {model: constant, value: 0.2}}'
     )
-    (own,) = replay(coastdown_bag, *WINDOW)[0]['coastdowns']
-    (given,) = replay(coastdown_bag, *WINDOW, '--ship', other)[0]['coastdowns']
+    window = ('--window', '300', '1800')  # all of it, or her prior is most of the figure
+    (own,) = replay(coastdown_bag, *window)[0]['coastdowns']
+    (given,) = replay(coastdown_bag, *window, '--ship', other)[0]['coastdowns']
     assert (own['ended_by'], own['onset_detected_ns']) == ('given', None)
-    assert own['samples']['speed_through_water'] == own['samples']['position'] > 680
-    np.testing.assert_allclose(given['speed_m_s'][-1], own['speed_m_s'][-1], rtol=0.01)
+    assert own['samples']['speed_through_water'] == own['samples']['position'] > 1480
+    np.testing.assert_allclose(given['speed_m_s'][-1], own['speed_m_s'][-1], rtol=1e-3)
     # 1.2 instead of 1.06 to 1.10
     assert 1.05 < given['resistance_m_s2'][-1] / own['resistance_m_s2'][-1] < 1.15
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +12,10 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
+from tests.runs import CARGO as SHIP
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 PARAMETERS = Parameters()
 STOP_NS = START_NS + 900 * 10**9
 

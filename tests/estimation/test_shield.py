@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-from importlib.resources import files
 
 import pytest
 
@@ -17,8 +16,7 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
-
-SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
+from tests.runs import CARGO as SHIP
 
 
 def _broken(window: Window, ship: Ship, parameters: Parameters) -> Estimate:

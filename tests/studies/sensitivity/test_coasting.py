@@ -15,9 +15,9 @@ from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from tests.runs import CARGO
 
 CONFIG = Path(__file__).resolve().parents[3] / 'config'
-CARGO = Ship.load(CONFIG / 'vitus_bering.yaml')
 
 
 def of(coasted, name):

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,7 @@ from shipdrag_ros.ship import Propulsion, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
-
-CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
+from tests.runs import CARGO
 
 
 def mimics_of(ship: Ship):
