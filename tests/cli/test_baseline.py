@@ -18,8 +18,9 @@ def bags(ship_file: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]
     made = []
     for seed, heading in ((1, '0'), (2, '3.1416')):
         made.append(str(folder / f'{seed}.mcap'))
-        line = ['simulate', '--ship', str(ship_file), '-o', made[-1], '--speed', '8']
-        assert main([*line, '--lead-in', '900', '--heading', heading, '--seed', str(seed)]) == 0
+        line = ['simulate', '--ship', str(ship_file), '-o', made[-1], '--duration', '900']
+        line += ['--speed', '8', '--lead-in', '900', '--heading', heading]
+        assert main([*line, '--seed', str(seed)]) == 0
     return made
 
 

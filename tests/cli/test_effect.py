@@ -140,6 +140,7 @@ def weedy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated run with weed, alone in a folder."""
     bag = tmp_path_factory.mktemp('bags') / 'weed.mcap'
     line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--effect', 'weed=0.002']
+    line += ['--lead-in', '700', '--duration', '1200']
     assert main(line) == 1  # without the folder it is not known
     assert main([*line, *EFFECTS]) == 0
     return bag

@@ -21,7 +21,8 @@ SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 
 def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, out, page = (tmp_path / name for name in ('run.mcap', 'new.yaml', 'page.html'))
-    assert main(['simulate', '--ship', str(SHIP), '-o', str(bag)]) == 0
+    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '700']
+    assert main([*line, '--duration', '900']) == 0
     capsys.readouterr()
     assert main(['learn', str(bag), '-o', str(out), '--report', str(page), '--json']) == 0
     said = capsys.readouterr()
