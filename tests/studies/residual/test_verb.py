@@ -124,14 +124,3 @@ def test_errors_say_what_to_mend(table: Path, tmp_path, capsys) -> None:
     assert "'C_B' is a ratio of the hull; name the column" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         fit(table, form='cubic')
-
-
-def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
-    root = Path(__file__).resolve().parents[3]
-    line = 'residual docs/data/river_ships.csv --form auto --target c_R'
-    assert f'shipdrag {line}' in (root / 'docs' / 'method.md').read_text(encoding='utf-8')
-    verb, data, *rest = line.split()
-    assert main([verb, str(root / data), *rest, '--json']) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['rank'] == 15
-    assert found['hulls'] == 40

@@ -99,12 +99,3 @@ def test_errors_say_what_to_mend(table: Path, tmp_path, capsys) -> None:
     )
     assert "'c-x' is no name in Python" in capsys.readouterr().err
     assert not code.exists()
-
-
-def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
-    root = Path(__file__).resolve().parents[3]
-    line = 'surface docs/data/c_x.csv --inputs alpha,beta --target c_x'
-    assert f'shipdrag {line}' in (root / 'docs' / 'method.md').read_text(encoding='utf-8')
-    verb, data, *rest = line.split()
-    assert main([verb, str(root / data), *rest, '--json']) == 0
-    assert json.loads(capsys.readouterr().out)['degree'] == 4
