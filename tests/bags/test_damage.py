@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.records import MAGIC
-from shipdrag_ros.errors import BagError
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.samples import Block
+from tests.bags.conftest import read_samples
+from tests.bags.test_wild_bags import read_or_refuse
 
 EXAMPLES = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -23,17 +24,9 @@ EXAMPLES = settings(
 def read(path: Path, content: bytes) -> tuple[Run, Block]:
     path.write_bytes(content)
     (run,) = open_runs([path])
-    block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    block = read_samples(run)
     list(run.outputs())
     return run, block
-
-
-def read_or_refuse(path: Path, content: bytes) -> tuple[Run, Block] | None:
-    try:
-        return read(path, content)
-    except BagError as error:
-        assert str(path) in str(error)  # noqa: PT017
-        return None
 
 
 @pytest.mark.parametrize('fraction', [0.3, 0.6, 0.9, 0.999])
