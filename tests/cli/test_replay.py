@@ -211,3 +211,15 @@ def test_wrong_usage_is_explained(coastdown_bag: Path, capsys, line: list[str], 
     assert end.value.code == 2
     assert said in capsys.readouterr().err
     assert coastdown_bag.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ('option', 'said'),
+    [
+        (['--parameters', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
+        (['--out', __file__], 'File exists'),
+    ],
+)
+def test_a_user_error_is_told(coastdown_bag: Path, capsys, option: list[str], said: str) -> None:
+    assert main(['replay', str(coastdown_bag), *option]) == 1
+    assert said in capsys.readouterr().err
