@@ -261,7 +261,12 @@ def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -
 @pytest.mark.parametrize(
     ('files', 'expected'),
     [
-        ({}, r'holds no \.mcap file'),
+        ({}, r'holds no \.mcap file; give a bag'),
+        (
+            {'notes.txt': ''},
+            r"it holds notes\.txt\. Logs are given by their own names: '.*/notes\.txt'",
+        ),
+        ({f'{n}.txt': '' for n in range(5)}, r'it holds 0\.txt, 1\.txt, 2\.txt and 2 more\. Logs'),
         ({'bag_0.db3': 'x'}, 'sqlite3 storage; make a bag of it with .shipdrag import'),
         ({'metadata.yaml': '{'}, 'is no metadata of rosbag2'),
         ({'metadata.yaml': 'a: 1'}, 'is no metadata of rosbag2'),
