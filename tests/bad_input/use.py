@@ -91,6 +91,8 @@ PARAMETERS = (
         'just some words\n',
         "is 'just some words', expected lines `name: value`",
     ),
+    _parameters('not YAML', 'window_s: [600.0\n', 'not YAML: line 2, column 1: expected'),
+    _parameters('a binary file', bytes(range(256)), 'is not a text file', 'save it as UTF-8'),
     _parameters(
         'the file of the node, with its sections',
         '/**:\n  ros__parameters:\n    window_s: 600.0\n',
