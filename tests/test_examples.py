@@ -209,9 +209,7 @@ def run(command: str) -> None:
 
 
 @pytest.mark.parametrize('verb', [verb.name for verb in verbs()])
-def test_the_examples_of_the_help_run(
-    folder: Path, verb: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_examples_of_the_help_run(folder: Path, verb: str, capsys) -> None:
     text = help_text(verb, capsys)
     lines = re.findall(r'^ +(shipdrag .*)$', text, flags=re.MULTILINE)
     assert len(lines) >= 2, 'give two in the docstring of the module of the verb'
@@ -259,9 +257,7 @@ def test_the_pages_have_the_examples_that_they_should() -> None:
 MAP = re.compile(rf'\b(?:{"|".join(INPUTS)})=[a-z0-9]+(?::[a-z/]+)?(?:,[a-z0-9]+(?::[a-z/]+)?)?')
 
 
-def test_the_columns_that_the_help_shows_are_read_as_it_says(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_columns_that_the_help_shows_are_read_as_it_says(folder: Path, capsys) -> None:
     text = re.sub(r'\s+', ' ', help_text('import', capsys))
     shown = MAP.findall(text)
     assert {'position=x,y:km', 'position=x:km,y:km', 'position=lat,lon:deg'} <= set(shown)

@@ -58,9 +58,7 @@ def test_the_table_of_extras_is_that_of_the_package() -> None:
 
 
 @pytest.mark.timeout(300)
-def test_the_base_simulates_replays_diagnoses_and_imports(
-    without: Shipdrag, tmp_path: Path
-) -> None:
+def test_the_base_simulates_replays_diagnoses_and_imports(without: Shipdrag, tmp_path) -> None:
     (tmp_path / 'ship.yaml').symlink_to(SHIP)
     rows = ''.join(f'{second},{8.0 - 0.001 * second}\n' for second in range(60))
     (tmp_path / 'log.csv').write_text('t,stw\n' + rows)
@@ -89,9 +87,7 @@ def test_the_base_simulates_replays_diagnoses_and_imports(
         ('logs', 'import can.log -o can.mcap'),
     ],
 )
-def test_a_verb_without_its_extra_says_which_to_install(
-    without: Shipdrag, tmp_path: Path, extra: str, line: str
-) -> None:
+def test_a_verb_without_its_extra_says_which_to_install(without, tmp_path, extra, line):
     (tmp_path / 'ship.yaml').symlink_to(SHIP)
     (tmp_path / 'can.log').write_text('(1700000000.000000) can0 09F80101#A1B2C3D4E5F60708\n' * 40)
     if 'run.mcap' in line:

@@ -8,7 +8,6 @@ import os
 import re
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,53 +26,43 @@ ROWS = {
     if len(cells := [cell.strip() for cell in line.strip('|').split('|')]) == 5
     and cells[0] not in ('record', '---')
 }
+# nobody asks for the onset of a car, nor twice for that of the model ship
+WHOLE = [name for name in ROWS if not name.startswith('car') and not name.endswith('joint')]
 needs_data = pytest.mark.skipif(
     'SHIPDRAG_DATA' not in os.environ, reason='needs the folder of records in SHIPDRAG_DATA'
 )
 
 
 @pytest.fixture(scope='module')
-def script() -> ModuleType:
-    """The script that prints the page's figures."""
-    return real_records
-
-
-@pytest.fixture(scope='module')
-def results(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `replay --json` says of each record, with the window and without."""
     out = tmp_path_factory.mktemp('records')
     data = Path(os.environ['SHIPDRAG_DATA'])
     found = {}
-    for record in script.RECORDS:
-        script.run_command(record.import_command(), data=data, out=out)
-        # nobody asks for the onset of a car
-        for window in (True,) if record.name.startswith('car') else (True, False):
+    for record in real_records.RECORDS:
+        real_records.run_command(record.import_command(), data=data, out=out)
+        for window in (True, False) if record.name in WHOLE else (True,):
             line = f'{record.replay_command(window=window)} --json one.json'
-            script.run_command(line, data=data, out=out)
+            real_records.run_command(line, data=data, out=out)
             found[record.name, window] = json.loads((out / 'one.json').read_text())
     return found
 
 
-def test_the_page_shows_the_commands_of_the_script(script: ModuleType) -> None:
-    known = {record.import_command() for record in script.RECORDS}
-    known |= {record.replay_command() for record in script.RECORDS}
+def test_the_page_shows_the_commands_of_the_script() -> None:
+    known = {record.import_command() for record in real_records.RECORDS}
+    known |= {record.replay_command() for record in real_records.RECORDS}
     assert len(COMMANDS) == 10
     assert set(COMMANDS) <= known
-    assert list(ROWS) == [record.name for record in script.RECORDS]
+    assert list(ROWS) == [record.name for record in real_records.RECORDS]
     known |= {line for both in real_diagnosis.RECORDS.values() for line in both}
     assert len(SPANS) == 2
     assert {line.replace('log.mcap', 'yacht.mcap') for line in SPANS} <= known
 
 
-def test_without_the_records_the_script_says_so(
-    script: ModuleType,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_without_the_records_the_script_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.delenv('SHIPDRAG_DATA', raising=False)
     monkeypatch.setattr(sys, 'argv', ['real_records.py', '--out', str(tmp_path / 'out')])
-    script.main()
+    real_records.main()
     assert 'skipped: SHIPDRAG_DATA is not set' in capsys.readouterr().out
     assert not (tmp_path / 'out').exists()
 
@@ -108,10 +97,8 @@ def test_the_second_opinion_agrees_where_the_samples_are_many(name: str) -> None
 
 
 @needs_data
-@pytest.mark.parametrize('name', [name for name in ROWS if not name.startswith('car')])
-def test_without_steady_sailing_before_no_onset_is_found(
-    results: dict[str, Any], name: str
-) -> None:
+@pytest.mark.parametrize('name', WHOLE)
+def test_without_steady_sailing_before_no_onset_is_found(results, name):
     assert results[name, False]['coastdowns'] == []
 
 
@@ -126,17 +113,15 @@ def test_the_model_ship_drifts_and_the_joint_fit_shows_it(results: dict[str, Any
 
 
 @needs_data
-def test_the_ferry_path_and_the_ship_at_rest(
-    script: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_ferry_path_and_the_ship_at_rest(tmp_path, capsys) -> None:
     data = Path(os.environ['SHIPDRAG_DATA'])
-    for record in (script.FERRY, script.MODEL_SHIP):
-        script.run_command(record.import_command(), data=data, out=tmp_path)
-    script.show_ferry_path(tmp_path)
+    for record in (real_records.FERRY, real_records.MODEL_SHIP):
+        real_records.run_command(record.import_command(), data=data, out=tmp_path)
+    real_records.show_ferry_path(tmp_path)
     lengths = [float(x) for x in re.findall(r's1_\w+ +([\d.]+)', capsys.readouterr().out)]
     # integral of the speed, then path of the positions, alone and jointly
     np.testing.assert_allclose(lengths, [4.41, 4.29, 4.29], rtol=0.0, atol=0.01)
-    (slow,) = script.replayed(script.MODEL_SHIP, tmp_path, froude_min=0.001).coastdowns
+    (slow,) = real_records.replayed(real_records.MODEL_SHIP, tmp_path, froude_min=0.001).coastdowns
     assert slow.estimate is not None
     curve = slow.estimate.valid_curve
     assert curve.speed_m_s[0] < 0.004
@@ -148,16 +133,16 @@ def test_the_ferry_path_and_the_ship_at_rest(
 @pytest.fixture(scope='module')
 def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `diagnose --json` says of the logs of two yachts."""
-    script = real_diagnosis
     out, data = tmp_path_factory.mktemp('diagnoses'), Path(os.environ['SHIPDRAG_DATA'])
-    return {name: script.diagnosed(name, data=data, out=out) for name in script.RECORDS}
+    return {
+        name: real_diagnosis.diagnosed(name, data=data, out=out) for name in real_diagnosis.RECORDS
+    }
 
 
 @needs_data
 def test_the_page_says_what_the_command_says(diagnoses: dict[str, Any]) -> None:
-    script = real_diagnosis
     for name, found in diagnoses.items():
-        made = f'<!-- {name} -->\n{script.block(found)}\n<!-- end {name} -->'
+        made = f'<!-- {name} -->\n{real_diagnosis.block(found)}\n<!-- end {name} -->'
         assert made in TABLES, 'run: python -m benchmarks.accuracy.real_diagnosis --write'
 
 

@@ -59,9 +59,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def alone(
-    built: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[..., subprocess.CompletedProcess[str]]:
+def alone(built: Path, tmp_path_factory) -> Callable[..., subprocess.CompletedProcess[str]]:
     """Install the wheel by itself; return what runs Python with it, where no ROS can be had."""
     target = tmp_path_factory.mktemp('installed')
     (wheel,) = built.glob('*.whl')
@@ -128,9 +126,7 @@ def test_the_wheel_describes_itself(built: Path) -> None:
         ('## [0.2.0] - 2026-10-01', '', ''),  # of another version
     ],
 )
-def test_a_dated_version_without_a_tag_is_released(
-    heading: str, tag: str, found: str, tmp_path: Path
-) -> None:
+def test_a_dated_version_without_a_tag_is_released(heading, tag, found, tmp_path):
     text = (ROOT / '.github' / 'workflows' / 'release.yml').read_text(encoding='utf-8')
     (job,) = yaml.safe_load(text)['jobs'].values()
     (step,) = (step for step in job['steps'] if step.get('id') == 'version')
@@ -182,9 +178,7 @@ def test_the_sdist_holds_what_colcon_needs(built: Path) -> None:
     assert wanted - held == set()
 
 
-def test_all_but_the_node_runs_without_ros(
-    alone: Callable[..., subprocess.CompletedProcess[str]], built: Path
-) -> None:
+def test_all_but_the_node_runs_without_ros(alone, built):
     where = alone('-c', 'import shipdrag_ros; print(shipdrag_ros.__file__)')
     assert not where.stdout.startswith(str(ROOT))
     ros = alone('-c', 'import rclpy')

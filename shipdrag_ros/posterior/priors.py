@@ -86,9 +86,6 @@ HELD = Declared(
     'lines of tugs 0.1 to 0.4, astern power 0.3 to 1',
 )
 HELD_CHANCE = Declared('h', 'chance of such a force', 0.03, '', _TAKEN)
-TOLD_GLIDE_CHANCE = Declared(
-    'h', 'the same in a window that a person gives as a coastdown', 0.003, '', _TAKEN
-)
 LEFT = Declared(
     'l',
     'thrust that is left after the stop, over that before it; none is as usual',

@@ -309,11 +309,10 @@ class _Option(NamedTuple):
 
 def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
     """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
-    held, left = priors.HELD_CHANCE.mean, priors.LEFT_CHANCE.mean
-    if stop.sd_s == 0.0:  # the window is given
-        held, left = priors.TOLD_GLIDE_CHANCE.mean, 0.0
-    if stop.stands:
-        left = 0.0
+    if stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
+        yield _Option(1.0)
+        return
+    held, left = priors.HELD_CHANCE.mean, 0.0 if stop.stands else priors.LEFT_CHANCE.mean
     yield _Option(1.0 - held - left)
     yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)
     if left > 0.0:

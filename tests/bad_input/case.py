@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from threading import Timer
 from unittest.mock import patch
 
 from shipdrag_ros.bags import BagWriter
@@ -27,8 +23,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SHIP_FILE = ROOT / 'config' / 'vitus_bering.yaml'
 SECOND_NS = 1_000_000_000
 STEADY_S = 300.0
-NODE_S = 60.0  # the first start on a machine compiles for a while
-DOMAIN = 58
 
 
 @dataclass(frozen=True)
@@ -46,8 +40,6 @@ class Case:
         Exit code that is right.
     says
         What the user must read, to the letter.
-    process
-        Run in a process of its own, as a node that starts is; else in this one.
     """
 
     area: str
@@ -55,7 +47,6 @@ class Case:
     line: Callable[[Path], list[str]]
     status: int
     says: tuple[str, ...]
-    process: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,46 +62,14 @@ def run(case: Case, folder: Path) -> Seen:
     Make the bad input and run the command; what is no user error is raised.
     """
     line = case.line(folder)
-    if case.process:
-        status, text = _in_process(line)
-    else:
-        output = StringIO()
-        usage_in_a_line = patch.dict(os.environ, COLUMNS='200')
-        with redirect_stdout(output), redirect_stderr(output), usage_in_a_line:
-            try:
-                status = main(line)
-            except SystemExit as end:
-                status = int(end.code or 0)
-        text = output.getvalue()
-    return Seen(status, text.replace(f'{folder}/', ''))
-
-
-def _in_process(command: list[str]) -> tuple[int, str]:
-    """Run the command; a node that starts all the same is ended as a user does."""
-    environment = {
-        'ROS_DOMAIN_ID': str(DOMAIN),
-        **os.environ,
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] {message}',
-    }
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'shipdrag_ros.cli', *command],
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert process.stdout is not None
-    limit = Timer(NODE_S, process.kill)
-    limit.start()
-    text = ''
-    for line in process.stdout:
-        text += line
-        if '[INFO] active;' in line:
-            process.send_signal(signal.SIGINT)
-    status = process.wait()
-    limit.cancel()
-    return status, text
+    output = StringIO()
+    usage_in_a_line = patch.dict(os.environ, COLUMNS='200')
+    with redirect_stdout(output), redirect_stderr(output), usage_in_a_line:
+        try:
+            status = main(line)
+        except SystemExit as end:
+            status = int(end.code or 0)
+    return Seen(status, output.getvalue().replace(f'{folder}/', ''))
 
 
 @cache

@@ -47,25 +47,14 @@ def _simulate(*more: str) -> Callable[[Path], list[str]]:
     return lambda folder: [*line, str(folder / 'new.mcap'), *more]
 
 
-def _node(
-    kind: str,
-    *says: str,
-    status: int = 1,
-    ship: str = 'length_m: 150.0\ndisplaced_volume_m3: 20200.0\n',
-    out: str = 'records',
-    ros: tuple[str, ...] = (),
-    files: dict[str, str] | None = None,
-) -> Case:
+def _node(kind: str, *says: str, ros: tuple[str, str], text: str = '') -> Case:
     def line(folder: Path) -> list[str]:
-        (folder / 'ship.yaml').write_text(ship)
-        (folder / 'taken').write_text('a file, no folder')
-        for name, text in (files or {}).items():
-            (folder / name).write_text(text)
-        more = [word.replace('@', f'{folder}/') for word in ros]
-        where = ['--ship', str(folder / 'ship.yaml'), '--out', str(folder / out)]
-        return ['node', *where, *(['--ros-args', *more] if more else [])]
+        if text:
+            (folder / 'p.yaml').write_text(text)
+        where = ['--ship', str(SHIP_FILE), '--out', str(folder / 'records')]
+        return ['node', *where, '--ros-args', *(word.replace('@', f'{folder}/') for word in ros)]
 
-    return Case('Node', kind, line, status, says, process=status == 0)
+    return Case('Node', kind, line, 1, says)
 
 
 PARAMETERS = (
@@ -78,7 +67,6 @@ PARAMETERS = (
         'froude_min: 5.0, expected 0.001..1',
         'late_s: -1.0, expected 0.1..3600 s',
     ),
-    _parameters('NaN', 'window_s: .nan\n', 'window_s: nan, expected 60..21600 s'),
     _parameters(
         'an integer for a float',
         'window_s: 600\n',
@@ -103,11 +91,6 @@ PARAMETERS = (
         'just some words\n',
         "is 'just some words', expected lines `name: value`",
     ),
-    _parameters(
-        'a name given twice',
-        'window_s: 600.0\nwindow_s: 1200.0\n',
-        'window_s: given twice, lines 1 and 2; keep one',
-    ),
     _parameters('not YAML', 'window_s: [600.0\n', 'not YAML: line 2, column 1: expected'),
     _parameters('a binary file', bytes(range(256)), 'is not a text file', 'save it as UTF-8'),
     _parameters(
@@ -117,24 +100,6 @@ PARAMETERS = (
     ),
 )
 COMMANDS = (
-    _use('no verb', lambda folder: [], 'the following arguments are required: VERB', status=2),
-    _use(
-        'an unknown verb',
-        lambda folder: ['reply', 'bag.mcap'],
-        "invalid choice: 'reply' (choose from",
-        status=2,
-    ),
-    _use(
-        'an unknown option',
-        _replay('--windw', '0', '100'),
-        'unrecognized arguments: --windw',
-        status=2,
-    ),
-    _use(
-        'a bag that is not there',
-        lambda folder: ['replay', str(folder / 'no.mcap')],
-        "'no.mcap' does not exist; give the path of a bag or a log",
-    ),
     _use(
         'a directory for a ship file',
         lambda f: ['replay', _bag(f), '--ship', _folder(f)],
@@ -156,32 +121,14 @@ COMMANDS = (
         "'/nowhere/new.mcap' cannot be made: No such file or directory; give a name in a folder",
     ),
     _use(
-        'an output where nothing may be written',
-        _simulate('-o', '/proc/new.mcap'),
-        "'/proc/new.mcap' cannot be made",
-        'give a name in a folder',
-    ),
-    _use(
         'a file in the place of the output folder',
         lambda f: ['replay', _bag(f), '--out', str(Path(_bag(f)) / 'results')],
         "'bag.mcap/results': Not a directory; check the path",
     ),
     _use(
-        '--json with the bag behind it',
-        lambda f: ['replay', '--json', _bag(f)],
-        "'bag.mcap' would be overwritten by the JSON",
-        status=2,
-    ),
-    _use(
         'a full disk',
         _replay('--json', '/dev/full'),
         'the result cannot be written: No space left on device; make room',
-    ),
-    _use(
-        'a report that does not end in .html',
-        _replay('--report', 'report.pdf'),
-        "'report.pdf', expected a name that ends in .html",
-        status=2,
     ),
     _use(
         'a window outside of the bag',
@@ -213,12 +160,6 @@ COMMANDS = (
         'give another window',
     ),
     _use(
-        'a window in words',
-        _replay('--window', 'start', 'end'),
-        "'start', expected a number at least 0 [s]",
-        status=2,
-    ),
-    _use(
         '--remap without :=',
         _replay('--remap', '/log=speed_through_water'),
         "'/log=speed_through_water', expected FROM:=TO",
@@ -240,58 +181,13 @@ COMMANDS = (
         'speed_m_s is 35.0, the baseline is stated for',
         'choose a speed inside',
     ),
-    _use(
-        'a negative duration',
-        _simulate('--duration', '-5'),
-        "'-5', expected a number above 0",
-        status=2,
-    ),
 )
 NODE = (
-    _node(
-        'a ship file with a misspelt key',
-        'lenght_m: unknown key; did you mean length_m?',
-        ship='lenght_m: 150.0\ndisplaced_volume_m3: 20200.0\n',
-    ),
-    _node(
-        'an unknown parameter',
-        'windows_s: unknown key; did you mean window_s?',
-        ros=('-p', 'windows_s:=600.0'),
-    ),
-    _node(
-        'an integer for a float',
-        'window_s=600.0',
-        'recording to',
-        ros=('-p', 'window_s:=600'),
-        status=0,
-    ),
-    _node(
-        'a parameter out of range',
-        'froude_min: 5.0, expected 0.001..1',
-        ros=('-p', 'froude_min:=5.0'),
-    ),
-    _node(
-        'a type that the input does not have',
-        "position.type: 'std_msgs/msg/String', expected one of geometry_msgs",
-        ros=('-p', 'position.type:=std_msgs/msg/String'),
-    ),
-    _node(
-        'a wrong choice',
-        "estimator: 'kalman', expected one of one,",
-        ros=('-p', 'estimator:=kalman'),
-    ),
-    _node(
-        'a file in the place of the output folder',
-        '[ERROR] recording failed',
-        "'taken': File exists; check output_directory",
-        out='taken',
-        status=0,
-    ),
     _node(
         'a parameter file for another node',
         "sections are ['/other'], expected one for '/coastdown_node'",
         ros=('--params-file', '@p.yaml'),
-        files={'p.yaml': 'other:\n  ros__parameters:\n    window_s: 600.0\n'},
+        text='other:\n  ros__parameters:\n    window_s: 600.0\n',
     ),
     _node(
         'a parameter file that is not there',
@@ -303,13 +199,7 @@ NODE = (
         "'--params-file p.yaml'",
         'Error at line 1; check what follows --ros-args',
         ros=('--params-file', '@p.yaml'),
-        files={'p.yaml': 'window_s: [600.0\n'},
-    ),
-    _node(
-        'an argument that is none of ROS',
-        'unrecognized arguments: -- extra',
-        ros=('--', 'extra'),
-        status=2,
+        text='window_s: [600.0\n',
     ),
     _node(
         'a bad remapping',

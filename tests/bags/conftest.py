@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.messages import encode
+from shipdrag_ros.messages import encode, types
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from tests.runs import write_run
 
@@ -95,4 +96,23 @@ def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NO
                     message.topic, message.type, typestore=store
                 )
             writer.write(connections[message.topic], message.log_ns, message.payload)
+    return path
+
+
+def foreign(path: Path, block: Block, **options: Any) -> Path:
+    """Write a file with the reference writer, any way it can."""
+    with path.open('wb') as file:
+        writer = Writer(file, **options)
+        writer.start(profile='ros2')
+        channels: dict[str, int] = {}
+        for message in encode(block, namespace='/ship'):
+            if message.topic not in channels:
+                schema = writer.register_schema(
+                    message.type, 'ros2msg', types.definition(message.type).encode()
+                )
+                channels[message.topic] = writer.register_channel(message.topic, 'cdr', schema)
+            writer.add_message(
+                channels[message.topic], message.log_ns, message.payload, message.publish_ns
+            )
+        writer.finish()
     return path

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.records import MAGIC
-from shipdrag_ros.errors import BagError
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.samples import Block
+from tests.bags.conftest import read_samples
+from tests.bags.test_wild_bags import read_or_refuse
 
 EXAMPLES = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -23,23 +24,13 @@ EXAMPLES = settings(
 def read(path: Path, content: bytes) -> tuple[Run, Block]:
     path.write_bytes(content)
     (run,) = open_runs([path])
-    block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    block = read_samples(run)
     list(run.outputs())
     return run, block
 
 
-def read_or_refuse(path: Path, content: bytes) -> tuple[Run, Block] | None:
-    try:
-        return read(path, content)
-    except BagError as error:
-        assert str(path) in str(error)  # noqa: PT017
-        return None
-
-
 @pytest.mark.parametrize('fraction', [0.3, 0.6, 0.9, 0.999])
-def test_what_is_whole_in_a_file_cut_off_is_used_and_the_rest_told(
-    tmp_path: Path, sample_bag: bytes, fraction: float
-) -> None:
+def test_what_is_whole_in_a_file_cut_off_is_used_and_the_rest_told(tmp_path, sample_bag, fraction):
     _, whole = read(tmp_path / 'a.mcap', sample_bag)
     run, block = read(tmp_path / 'a.mcap', sample_bag[: int(fraction * len(sample_bag))])
     assert 0 < len(block) <= len(whole)
@@ -81,9 +72,7 @@ def test_a_damaged_attachment_is_left_out_and_told(tmp_path: Path, sample_bag: b
 
 
 @pytest.mark.parametrize('opcode', [1, 3, 12, 255])
-def test_a_record_of_another_kind_than_indexed(
-    tmp_path: Path, sample_bag: bytes, opcode: int
-) -> None:
+def test_a_record_of_another_kind_than_indexed(tmp_path, sample_bag: bytes, opcode: int) -> None:
     at = sample_bag.index(b'ship.yaml') - 4 - 8 - 8 - 9
     assert sample_bag[at] == 9, 'the place of the attachment'
     damaged = bytearray(sample_bag)

@@ -9,7 +9,6 @@ from pathlib import Path
 from threading import Event
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import durable as module
 from shipdrag_ros.bags import open_runs
@@ -17,6 +16,7 @@ from shipdrag_ros.bags.durable import DurableRecording, LiveFile, PartLimits, Re
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
+from tests.recorded import rows
 
 WITHIN_S = 120.0
 SECOND_NS = 10**9
@@ -50,9 +50,7 @@ def recording(
 
 
 def numbers(path: Path) -> list[int]:
-    with path.open('rb') as stream:
-        messages = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
-        return [m.log_time // SECOND_NS for _, _, m in messages]
+    return [row.log_ns // SECOND_NS for row in rows(path)]
 
 
 def all_numbers(directory: Path) -> list[int]:
@@ -108,9 +106,7 @@ def test_it_is_on_the_disk_within_a_second(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures('quick')
-def test_a_disk_that_is_full_for_a_while_loses_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full_for_a_while_loses_nothing(tmp_path, monkeypatch) -> None:
     it = recording(tmp_path)
     it.put(message(0))
     wait_until(lambda: it.progress().messages == 1)
@@ -140,9 +136,7 @@ def test_a_disk_that_is_full_for_a_while_loses_nothing(
 
 
 @pytest.mark.usefixtures('quick')
-def test_what_was_written_but_not_safe_is_written_again_and_not_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_was_written_but_not_safe_is_written_again_and_not_twice(tmp_path, monkeypatch):
     it = recording(tmp_path)
     it.put(message(0))
     wait_until(lambda: it.progress().messages == 1)
@@ -158,9 +152,7 @@ def test_what_was_written_but_not_safe_is_written_again_and_not_twice(
     assert all_numbers(tmp_path) == [0, 1]
 
 
-def test_a_finished_part_that_is_removed_before_it_is_compact_is_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_finished_part_that_is_removed_before_it_is_compact_is_counted(tmp_path, monkeypatch):
     with monkeypatch.context() as disk:
         disk.setattr(module, 'compact', _full)
         it = recording(tmp_path, limits=PartLimits(size_bytes=10**9, duration_s=5.0))
@@ -207,9 +199,7 @@ def test_memory_is_bounded_and_what_finds_no_room_is_counted(tmp_path: Path) -> 
     assert 'File exists' in progress.error
 
 
-def test_a_part_that_cannot_be_compacted_is_whole_and_counted_and_it_is_said_why(
-    tmp_path: Path,
-) -> None:
+def test_a_part_that_cannot_be_compacted_is_whole_and_counted_and_it_is_said_why(tmp_path) -> None:
     (tmp_path / 'a_000.mcap.compacting').mkdir()  # where it would be written
     it = recording(tmp_path, earlier=map(message, range(10)))
     progress = end(it)
@@ -219,9 +209,7 @@ def test_a_part_that_cannot_be_compacted_is_whole_and_counted_and_it_is_said_why
     assert all_numbers(tmp_path) == list(range(10))
 
 
-def test_it_goes_on_while_a_part_is_compacted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_goes_on_while_a_part_is_compacted(tmp_path, monkeypatch) -> None:
     released = Event()
 
     def slow(path: Path, *, messages: int) -> None:

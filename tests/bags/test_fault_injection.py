@@ -200,9 +200,7 @@ def damage_of(tmp_path: Path) -> Callable[[bytes], set[tuple[str, str]]]:
 
 
 @pytest.mark.parametrize('writer', WRITERS)
-def test_a_sound_file_is_sound_and_comes_out_whole(
-    writer: str, samples: Samples, save: Save, damage_of: DamageOf
-) -> None:
+def test_a_sound_file_is_sound_and_comes_out_whole(writer, samples, save, damage_of):
     sample = samples[writer]
     assert damage_of(sample.content) == set()
     assert save(sample.content) == (sample.messages, frozenset())
@@ -223,9 +221,7 @@ def test_a_sound_file_is_sound_and_comes_out_whole(
 
 
 @pytest.mark.parametrize('writer', WRITERS)
-def test_cut_at_every_record_and_inside(
-    writer: str, samples: Samples, save: Save, damage_of: DamageOf
-) -> None:
+def test_cut_at_every_record_and_inside(writer, samples, save, damage_of):
     sample = samples[writer]
     for record in _each_kind(sample):
         for cut in (record.offset, record.offset + 5, record.end - 9):
@@ -247,9 +243,7 @@ def test_cut_at_every_record_and_inside(
 
 
 @pytest.mark.parametrize('writer', WRITERS)
-def test_a_bit_flipped_in_every_kind_of_record(
-    writer: str, samples: Samples, save: Save, damage_of: DamageOf
-) -> None:
+def test_a_bit_flipped_in_every_kind_of_record(writer, samples, save, damage_of):
     sample = samples[writer]
     rng = random.Random(1)
     for record in _each_kind(sample):
@@ -279,9 +273,7 @@ def test_a_bit_flipped_in_every_kind_of_record(
 
 @pytest.mark.parametrize('writer', WRITERS)
 @pytest.mark.parametrize('fault', ['delete', 'duplicate', 'garbage before', 'zeros before'])
-def test_a_record_deleted_doubled_or_after_garbage(
-    writer: str, fault: str, samples: Samples, save: Save, damage_of: DamageOf
-) -> None:
+def test_a_record_deleted_doubled_or_after_garbage(writer, fault, samples, save, damage_of):
     sample = samples[writer]
     rng = random.Random(2)
     for record in _each_kind(sample):
@@ -331,9 +323,7 @@ def test_damage_is_named_by_place_and_kind(writer: str, samples: Samples, tmp_pa
         assert (record.offset, name(record.opcode), 'length') in named
 
 
-def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(
-    samples: Samples, save: Save
-) -> None:
+def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(samples, save):
     sample = samples['zstd']
     first = next(record for record in sample.records if record.opcode == Opcode.CHUNK)
     content = bytearray(sample.content)
@@ -378,13 +368,7 @@ def inside(content: bytes) -> list[tuple[int, int, Counter[bytes]]]:
 
 
 @pytest.mark.parametrize('write', [growing, finished])
-def test_cut_at_every_offset_and_flipped_in_every_byte(
-    write: Callable[[Path, Block], bytes],
-    tmp_path: Path,
-    block: Block,
-    save: Save,
-    damage_of: DamageOf,
-) -> None:
+def test_cut_and_flipped_everywhere(write, tmp_path, block, save, damage_of):
     """A chunk that is whole is saved whole; nothing that is not is taken for sound."""
     content = write(tmp_path / 'a.mcap', block[np.isin(block.channel, SMALL)][:9])
     chunks = inside(content)
@@ -392,7 +376,7 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
     assert len(chunks) >= 3
     rng = random.Random(5)
     begin = chunks[0][0] - 60  # before it are long texts: of these some
-    places = [*range(120, begin, 197), *range(begin, len(content))]
+    places = [*range(120, begin, 197), *range(begin, len(content), 3)]
     for number, at in enumerate(places):
         flipped = number % 2
         damaged = bytearray(content[: None if flipped else at])
@@ -414,7 +398,7 @@ def test_cut_at_every_offset_and_flipped_in_every_byte(
 
 
 def test_a_key_without_its_value_is_damage(samples: Samples, tmp_path: Path) -> None:
-    for first in range(0, 600, 3):
+    for first in range(0, 600, 9):
         content = bytearray(samples['zstd'].content)
         content[first : first + 300] = bytes(300)
         path = tmp_path / f'{first}.mcap'
@@ -429,9 +413,7 @@ def test_a_key_without_its_value_is_damage(samples: Samples, tmp_path: Path) -> 
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(data=st.data())
-def test_no_damage_makes_a_crash(
-    data: st.DataObject, samples: Samples, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_no_damage_makes_a_crash(data: st.DataObject, samples: Samples, tmp_path_factory) -> None:
     content = _mangled(data, samples)
     path = tmp_path_factory.mktemp('fuzz') / 'bag.mcap'
     path.write_bytes(content)

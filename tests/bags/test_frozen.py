@@ -27,9 +27,7 @@ FOLDER = Path(__file__).parent / 'frozen'
 
 
 @pytest.mark.parametrize('version', ['0.1.0', '0.2.0'])
-def test_a_bag_of_an_earlier_version_is_read_and_replayed(
-    version: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bag_of_an_earlier_version_is_read_and_replayed(version: str, capsys) -> None:
     path = FOLDER / f'recorded_by_{version}.mcap'
     assert check([path])[0].sound
     (run,) = open_runs([path])
@@ -46,9 +44,7 @@ def test_a_bag_of_an_earlier_version_is_read_and_replayed(
     assert json.loads(capsys.readouterr().out)['recorded']['by'] == version
 
 
-def test_a_parameter_that_is_gone_is_left_out_of_a_bag_and_an_error_in_a_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_parameter_that_is_gone_is_left_out_of_a_bag_and_an_error_in_a_file(tmp_path, capsys):
     """The bag of 0.1.0 again, with a key and a value that this version does not have."""
     path = tmp_path / 'a.mcap'
     (run,) = open_runs([FOLDER / 'recorded_by_0.1.0.mcap'])

@@ -45,9 +45,7 @@ def numbers(found: list[object]) -> list[int]:
     return [record.log_time for record in found if isinstance(record, Message)]
 
 
-def test_attachments_stand_before_the_first_message_and_topics_before_their_own(
-    tmp_path: Path,
-) -> None:
+def test_attachments_stand_before_the_first_message_and_topics_before_their_own(tmp_path) -> None:
     file = live(tmp_path / 'a.mcap')
     file.append([message(1)])
     file.append([message(2, topic='/shaft')])

@@ -8,7 +8,6 @@ import tracemalloc
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,37 +17,16 @@ from rosbags.rosbag2 import CompressionMode
 from shipdrag_ros.bags import BagWriter, Compression, ResetMark, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
+from shipdrag_ros.messages import EventKind, EventNote, encode, event_message
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import assert_same, read_samples, rosbag2
+from tests.bags.conftest import assert_same, foreign, read_samples, rosbag2
 
 WriteBag = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
 
 
-def foreign(path: Path, block: Block, **options: Any) -> Path:
-    """Write a file with the reference writer, any way it can."""
-    with path.open('wb') as file:
-        writer = Writer(file, **options)
-        writer.start(profile='ros2')
-        channels: dict[str, int] = {}
-        for message in encode(block, namespace='/ship'):
-            if message.topic not in channels:
-                schema = writer.register_schema(
-                    message.type, 'ros2msg', types.definition(message.type).encode()
-                )
-                channels[message.topic] = writer.register_channel(message.topic, 'cdr', schema)
-            writer.add_message(
-                channels[message.topic], message.log_ns, message.payload, message.publish_ns
-            )
-        writer.finish()
-    return path
-
-
 @pytest.mark.parametrize('compression', Compression)
-def test_what_was_written_is_read(
-    write_bag: WriteBag, block: Block, compression: Compression
-) -> None:
+def test_what_was_written_is_read(write_bag, block, compression):
     path = write_bag('a.mcap', block, compression=compression, chunk_bytes=5000)
     (run,) = open_runs([path])
     assert_same(read_samples(run), block)
@@ -81,9 +59,7 @@ def test_what_was_written_is_read(
     ],
     ids=lambda options: '-'.join(options),
 )
-def test_files_without_an_index_are_read_too(
-    tmp_path: Path, block: Block, options: dict[str, Any]
-) -> None:
+def test_files_without_an_index_are_read_too(tmp_path, block, options):
     (run,) = open_runs([foreign(tmp_path / 'a.mcap', block, **options)])
     assert_same(read_samples(run), block)
     assert run.warnings == ()
@@ -91,9 +67,7 @@ def test_files_without_an_index_are_read_too(
 
 
 @pytest.mark.parametrize('mode', CompressionMode)
-def test_bags_of_rosbag2_by_another_tool(
-    tmp_path: Path, block: Block, mode: CompressionMode
-) -> None:
+def test_bags_of_rosbag2_by_another_tool(tmp_path, block: Block, mode: CompressionMode) -> None:
     path = rosbag2(tmp_path / 'bag', block, mode)
     (run,) = open_runs([path])
     assert_same(read_samples(run), block)
@@ -117,9 +91,7 @@ def test_arrival_decides_the_order_and_then_the_place(tmp_path: Path, chunked: b
     assert_same(read_samples(run), block[np.argsort(received, kind='stable')])
 
 
-def test_a_batch_is_bounded_and_its_size_changes_nothing(
-    write_bag: WriteBag, block: Block, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_batch_is_bounded_and_its_size_changes_nothing(write_bag, block, monkeypatch):
     (run,) = open_runs([write_bag('a.mcap', block, chunk_bytes=3000)])
     monkeypatch.setattr(run_module, 'BATCH', 7)
     blocks = [item for item in run.inputs() if isinstance(item, Block)]
@@ -127,9 +99,7 @@ def test_a_batch_is_bounded_and_its_size_changes_nothing(
     assert_same(concatenate(blocks), block)
 
 
-def test_memory_does_not_grow_with_the_bag(
-    write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_does_not_grow_with_the_bag(write_bag: WriteBag, monkeypatch) -> None:
     monkeypatch.setattr(run_module, 'BATCH', 256)
     monkeypatch.setattr(mcap_file, '_AHEAD_BYTES', 60_000)  # less than either bag holds
     monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 20_000)
@@ -155,9 +125,7 @@ def test_a_range_of_time(write_bag: WriteBag, block: Block) -> None:
     assert run.warnings == ()
 
 
-def test_parts_of_one_recording_are_joined_in_their_order(
-    write_bag: WriteBag, block: Block
-) -> None:
+def test_parts_of_one_recording_are_joined_in_their_order(write_bag, block):
     paths = [
         write_bag(f'{name}.mcap', block[start : start + 100], recording_id='r', part=part)
         for name, part, start in (('c', 0, 0), ('a', 2, 200), ('b', 1, 100))
@@ -173,9 +141,7 @@ def test_parts_of_one_recording_are_joined_in_their_order(
         open_runs([paths[0], paths[0]])
 
 
-def test_parts_follow_each_other_even_if_the_clock_went_back(
-    write_bag: WriteBag, block: Block
-) -> None:
+def test_parts_follow_each_other_even_if_the_clock_went_back(write_bag, block):
     paths = [
         write_bag('0.mcap', block[100:200], recording_id='r', part=0),
         write_bag('1.mcap', block[:100], recording_id='r', part=1),
@@ -193,9 +159,7 @@ def test_bags_given_together_are_runs_of_their_own(write_bag: WriteBag, block: B
     assert [run.paths for run in open_runs([paths[0].parent])] == [run.paths for run in runs]
 
 
-def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(
-    tmp_path: Path, block: Block
-) -> None:
+def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(tmp_path, block: Block) -> None:
     folder = tmp_path / 'split'
     folder.mkdir()
     for i in range(11):
@@ -297,7 +261,12 @@ def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -
 @pytest.mark.parametrize(
     ('files', 'expected'),
     [
-        ({}, r'holds no \.mcap file'),
+        ({}, r'holds no \.mcap file; give a bag'),
+        (
+            {'notes.txt': ''},
+            r"it holds notes\.txt\. Logs are given by their own names: '.*/notes\.txt'",
+        ),
+        ({f'{n}.txt': '' for n in range(5)}, r'it holds 0\.txt, 1\.txt, 2\.txt and 2 more\. Logs'),
         ({'bag_0.db3': 'x'}, 'sqlite3 storage; make a bag of it with .shipdrag import'),
         ({'metadata.yaml': '{'}, 'is no metadata of rosbag2'),
         ({'metadata.yaml': 'a: 1'}, 'is no metadata of rosbag2'),

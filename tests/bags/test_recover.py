@@ -62,9 +62,7 @@ def test_a_directory_of_rosbag2(tmp_path: Path, block: Block, mode: CompressionM
     assert about.messages == cut.messages_recovered
 
 
-def test_a_message_that_is_packed_by_itself_and_damaged_is_lost_and_told(
-    tmp_path: Path, block: Block
-) -> None:
+def test_a_message_that_is_packed_by_itself_and_damaged_is_lost_and_told(tmp_path, block):
     source = rosbag2(tmp_path / 'bag', block[:50], CompressionMode.MESSAGE)
     (file,) = source.glob('*.mcap')
     content = file.read_bytes()
@@ -76,9 +74,7 @@ def test_a_message_that_is_packed_by_itself_and_damaged_is_lost_and_told(
     assert ('message', 'compression') in {(d.record, d.kind.value) for d in result.damage}
 
 
-def test_a_split_bag_is_joined_and_each_damage_names_its_file(
-    tmp_path: Path, write_bag: WriteBag, block: Block
-) -> None:
+def test_a_split_bag_is_joined_and_each_damage_names_its_file(tmp_path, write_bag, block):
     folder = tmp_path / 'split'
     folder.mkdir()
     for part in range(3):
@@ -118,9 +114,7 @@ def test_several_bags_are_not_joined(tmp_path: Path, write_bag: WriteBag, block:
         recover(folder, tmp_path / 'saved.mcap')
 
 
-def test_nothing_is_overwritten_and_nothing_is_left_behind(
-    tmp_path: Path, sample_bag: bytes
-) -> None:
+def test_nothing_is_overwritten_and_nothing_is_left_behind(tmp_path, sample_bag: bytes) -> None:
     source = tmp_path / 'source.mcap'
     source.write_bytes(sample_bag)
     for taken in ('saved.mcap', 'saved.quarantine.mcap'):
@@ -155,9 +149,7 @@ def test_nothing_is_overwritten_and_nothing_is_left_behind(
         ),
     ],
 )
-def test_what_the_summary_leaves_out_is_named_and_recovered(
-    tmp_path: Path, options: dict[str, Any], expected: set[str]
-) -> None:
+def test_what_the_summary_leaves_out_is_named_and_recovered(tmp_path, options, expected):
     path = tmp_path / 'bag.mcap'
     with path.open('wb') as file:
         writer = Writer(file, **options)
@@ -245,9 +237,7 @@ def in_a_process(use: Callable[[], Any]) -> tuple[Any, int]:
 
 
 @pytest.mark.parametrize('stated', [1000, 1 << 29])
-def test_a_bomb_is_named_and_takes_neither_memory_nor_time(
-    tmp_path: Path, bomb: tuple[str, bytes], stated: int
-) -> None:
+def test_a_bomb_is_named_and_takes_neither_memory_nor_time(tmp_path, bomb, stated):
     (named,), grown = used(tmp_path, chunk(*bomb, stated))
     kinds = {'too_large'} if stated > 1000 else {'compression', 'size'}
     assert named & {('chunk', kind) for kind in kinds}

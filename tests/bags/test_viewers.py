@@ -7,10 +7,10 @@ import re
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
+from tests.recorded import summary
 
 TYPES = sorted(
     {type_name for accepted in TOPICS.values() for type_name in accepted}
@@ -31,11 +31,8 @@ def definition(directory: Path, type_name: str) -> tuple[str, dict[str, str]]:
     path = directory / 'a.mcap'
     with BagWriter(path) as bag:
         bag.write('/topic', type_name, b'\0\1\0\0', log_ns=1, publish_ns=1)
-    with path.open('rb') as file:
-        summary = make_reader(file).get_summary()
+    (schema,) = summary(path).schemas.values()
     path.unlink()
-    assert summary is not None
-    (schema,) = summary.schemas.values()
     assert (schema.name, schema.encoding) == (type_name, 'ros2msg')
     main, *others = re.split(r'\n=+\nMSG: ', schema.data.decode())
     return main, {text.split('\n')[0]: text.partition('\n')[2] for text in others}

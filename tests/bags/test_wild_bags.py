@@ -11,7 +11,6 @@ import zlib
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -20,16 +19,17 @@ import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs
 from shipdrag_ros.bags.durable import LiveFile
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import encode, types
+from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
+from tests.bags.conftest import foreign
 
 EXAMPLES = settings(
     max_examples=120,
@@ -47,20 +47,6 @@ def by_us(path: Path, block: Block, compression: Compression) -> None:
         bag.write_samples(block)
 
 
-def by_another(path: Path, block: Block, **options: Any) -> None:
-    with path.open('wb') as file:
-        writer = Writer(file, **options)
-        writer.start()
-        channels: dict[str, int] = {}
-        for each in encode(block):
-            if each.topic not in channels:
-                text = types.definition(each.type).encode()
-                schema = writer.register_schema(each.type, 'ros2msg', text)
-                channels[each.topic] = writer.register_channel(each.topic, 'cdr', schema)
-            writer.add_message(channels[each.topic], each.log_ns, each.payload, each.publish_ns)
-        writer.finish()
-
-
 def unfinished(path: Path, block: Block) -> None:
     file = LiveFile(path, recording_id='r', part=0, attachments={'ship.yaml': SHIP.to_yaml()})
     messages = list(encode(block))
@@ -75,8 +61,8 @@ MAKERS: dict[str, Callable[[Path, Block], None]] = {
     'lz4': lambda path, block: by_us(path, block, Compression.LZ4),
     'none': lambda path, block: by_us(path, block, Compression.NONE),
     'live': unfinished,
-    'unchunked': lambda path, block: by_another(path, block, use_chunking=False),
-    'no checksums': lambda path, block: by_another(
+    'unchunked': lambda path, block: foreign(path, block, use_chunking=False),
+    'no checksums': lambda path, block: foreign(
         path, block, enable_crcs=False, chunk_size=3000, compression=CompressionType.NONE
     ),
 }
@@ -149,18 +135,14 @@ def mangled(draw: Callable[[st.SearchStrategy[int]], int], content: bytes) -> by
 @pytest.mark.parametrize('name', MAKERS)
 @EXAMPLES
 @given(data=st.data())
-def test_no_damage_makes_a_crash(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_no_damage_makes_a_crash(tmp_path, bags, name, data):
     read_or_refuse(tmp_path / 'a.mcap', mangled(data.draw, bags[name]))
 
 
 @pytest.mark.parametrize('name', CHECKED)
 @EXAMPLES
 @given(data=st.data())
-def test_flipped_bits_lose_nothing_in_silence_and_change_nothing(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_flipped_bits_lose_nothing_in_silence_and_change_nothing(tmp_path, bags, name, data):
     whole, _ = read(tmp_path / 'whole.mcap', bags[name])
     damaged = bytearray(bags[name])
     for place in data.draw(st.lists(st.integers(8, len(damaged) - 1), min_size=1, max_size=3)):
@@ -187,9 +169,7 @@ def without_checksum(content: bytes) -> bytearray:
 @pytest.mark.parametrize('name', ['zstd', 'unchunked', 'no checksums'])
 @EXAMPLES
 @given(data=st.data())
-def test_no_wild_index_makes_a_crash(
-    tmp_path: Path, bags: dict[str, bytes], name: str, data: st.DataObject
-) -> None:
+def test_no_wild_index_makes_a_crash(tmp_path, bags, name, data):
     damaged = without_checksum(bags[name])
     (summary_start,) = struct.unpack_from('<Q', damaged, len(damaged) - len(MAGIC) - 20)
     places = st.integers(summary_start, len(damaged) - len(MAGIC) - 8)
@@ -215,9 +195,7 @@ def chunk_indexes(content: bytes) -> list[int]:
         (16, 1 << 60),
     ],
 )
-def test_an_index_that_cannot_be_true_is_not_used(
-    tmp_path: Path, bags: dict[str, bytes], field: int, value: int | str
-) -> None:
+def test_an_index_that_cannot_be_true_is_not_used(tmp_path, bags, field, value):
     whole, _ = read(tmp_path / 'whole.mcap', bags['zstd'])
     damaged = without_checksum(bags['zstd'])
     first, second, *_ = chunk_indexes(bytes(damaged))
@@ -255,9 +233,7 @@ def bombs() -> dict[str, bytes]:
 
 @pytest.mark.parametrize('stated', [1000, BOMB_BYTES, 1 << 60, (1 << 64) - 1])
 @pytest.mark.parametrize('kind', ['zstd', 'zstd without a size', 'lz4'])
-def test_a_chunk_that_unpacks_without_end(
-    tmp_path: Path, bombs: dict[str, bytes], kind: str, stated: int
-) -> None:
+def test_a_chunk_that_unpacks_without_end(tmp_path, bombs, kind, stated):
     bomb = bombs[kind]
     content = MAGIC + chunk(kind.split()[0], bomb, stated)
     assert len(content) < BOMB_BYTES / 100
@@ -270,9 +246,7 @@ def test_a_chunk_that_unpacks_without_end(
     assert peak < 3 * len(bomb) + (1 << 22)
 
 
-def test_a_packed_file_that_unpacks_without_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_packed_file_that_unpacks_without_end(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(mcap_file, 'CHUNK_LIMIT_BYTES', 1 << 20)
     path = tmp_path / 'a.mcap.zstd'
     for size, raised in ((1 << 19, 'is no MCAP file'), (1 << 27, 'cannot be unpacked')):
@@ -281,14 +255,12 @@ def test_a_packed_file_that_unpacks_without_end(
             open_runs([path])
 
 
-def test_messages_out_of_order_are_held_back_up_to_a_limit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_messages_out_of_order_are_held_back_up_to_a_limit(tmp_path, monkeypatch) -> None:
     n = 3000
     received = np.arange(n) + 1000
     received[::20] = 5  # in every chunk one that came first
     block = Block.of(Channel.SHAFT, np.arange(n), np.arange(n) * 1.0, receive_ns=received)
-    by_another(tmp_path / 'a.mcap', block, chunk_size=2000)
+    foreign(tmp_path / 'a.mcap', block, chunk_size=2000)
     content = (tmp_path / 'a.mcap').read_bytes()
     monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 1)
     found, _ = read(tmp_path / 'a.mcap', content)
@@ -300,9 +272,7 @@ def test_messages_out_of_order_are_held_back_up_to_a_limit(
 
 @EXAMPLES
 @given(data=st.data())
-def test_a_live_file_cut_anywhere_gives_what_came_before(
-    tmp_path: Path, bags: dict[str, bytes], data: st.DataObject
-) -> None:
+def test_a_live_file_cut_anywhere_gives_what_came_before(tmp_path, bags, data):
     whole, _ = read(tmp_path / 'whole.mcap', bags['live'])
     end = data.draw(st.integers(len(MAGIC), len(bags['live'])))
     found, told = read(tmp_path / 'a.mcap', bags['live'][:end])
@@ -312,9 +282,7 @@ def test_a_live_file_cut_anywhere_gives_what_came_before(
 
 
 @pytest.mark.parametrize('fraction', [0.6, 0.9, 1.0])
-def test_a_live_file_is_replayed_and_its_damage_told(
-    tmp_path: Path, bags: dict[str, bytes], fraction: float
-) -> None:
+def test_a_live_file_is_replayed_and_its_damage_told(tmp_path, bags, fraction):
     path = tmp_path / 'a.mcap'
     whole = bags['live']
     path.write_bytes(whole[: int(fraction * len(whole))])

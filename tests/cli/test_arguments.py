@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,9 +26,7 @@ def test_a_number_outside_its_range_is_refused(text: str) -> None:
         (arguments.number(-float('inf')), '-1e9', -1e9),
     ],
 )
-def test_a_number_inside_its_range_is_taken(
-    read: Callable[[str], float], text: str, value: float
-) -> None:
+def test_a_number_inside_its_range_is_taken(read, text, value):
     assert read(text) == value
 
 
@@ -66,9 +63,7 @@ def test_json_goes_to_stdout_or_to_a_file(parser: argparse.ArgumentParser, tmp_p
     assert parser.parse_args(['--json', '/dev/null']).json == '/dev/null'
 
 
-def test_json_does_not_overwrite_what_is_no_json(
-    parser: argparse.ArgumentParser, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_does_not_overwrite_what_is_no_json(parser, tmp_path, capsys):
     (tmp_path / 'ship.yaml').write_text('')
     for name in ('new.mcap', 'ship.yaml', '.'):
         with pytest.raises(SystemExit):

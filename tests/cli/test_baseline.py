@@ -18,14 +18,13 @@ def bags(ship_file: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]
     made = []
     for seed, heading in ((1, '0'), (2, '3.1416')):
         made.append(str(folder / f'{seed}.mcap'))
-        line = ['simulate', '--ship', str(ship_file), '-o', made[-1], '--speed', '8']
-        assert main([*line, '--lead-in', '900', '--heading', heading, '--seed', str(seed)]) == 0
+        line = ['simulate', '--ship', str(ship_file), '-o', made[-1], '--duration', '900']
+        line += ['--speed', '8', '--lead-in', '900', '--heading', heading]
+        assert main([*line, '--seed', str(seed)]) == 0
     return made
 
 
-def test_learns_from_two_bags_what_simulate_and_diagnose_take(
-    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_learns_from_two_bags_what_simulate_and_diagnose_take(bags, ship_file, tmp_path, capsys):
     out = tmp_path / 'learnt.yaml'
     capsys.readouterr()
     assert main(['baseline', *bags, '--ship', str(ship_file), '-o', str(out), '--json']) == 0
@@ -46,9 +45,7 @@ def test_learns_from_two_bags_what_simulate_and_diagnose_take(
     assert main(['simulate', '--ship', str(out), '-o', str(bag), '--duration', '60']) == 0
 
 
-def test_a_ship_without_a_baseline_gets_a_table(
-    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_without_a_baseline_gets_a_table(bags, ship_file, tmp_path, capsys):
     bare, out = tmp_path / 'bare.yaml', tmp_path / 'learnt.yaml'
     stated = Ship.load(ship_file)
     bare.write_text(
@@ -59,18 +56,14 @@ def test_a_ship_without_a_baseline_gets_a_table(
     assert isinstance(Ship.load(out).baseline, TableBaseline)
 
 
-def test_refuses_to_write_over_the_ship_file(
-    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_refuses_to_write_over_the_ship_file(bags, ship_file, tmp_path, capsys):
     same = tmp_path / 'ship.yaml'
     same.write_text(ship_file.read_text())
     assert main(['baseline', *bags, '--ship', str(same), '-o', str(same)]) == 1
     assert 'write to another file' in capsys.readouterr().err
 
 
-def test_a_record_without_a_coastdown_is_refused(
-    steady_bag: Path, ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_record_without_a_coastdown_is_refused(steady_bag, ship_file, tmp_path, capsys):
     out = tmp_path / 'learnt.yaml'
     assert main(['baseline', str(steady_bag), '--ship', str(ship_file), '-o', str(out)]) == 1
     assert 'no coastdown' in capsys.readouterr().err

@@ -53,9 +53,7 @@ def test_a_sound_bag(steady_bag: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert replayed[0]['inputs'] == replayed[1]['inputs']
 
 
-def test_a_damaged_bag_is_told_by_offset_and_what_is_saved_is_sound(
-    damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_bag_is_told_by_offset_and_what_is_saved_is_sound(damaged, tmp_path, capsys):
     about = told(['check', str(damaged)], capsys, status=1)
     assert about['sound'] is False
     (file,) = about['files']
@@ -90,9 +88,7 @@ def test_the_words(damaged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert 'chunk' in words
 
 
-def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(
-    steady_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(steady_bag, tmp_path, capsys):
     content = bytearray(steady_bag.read_bytes())
     content[-12] ^= 4  # the checksum of the summary
     path, output = tmp_path / 'index.mcap', tmp_path / 'saved.mcap'
@@ -110,12 +106,7 @@ def test_of_a_damaged_index_it_is_said_that_the_data_are_whole(
 
 
 @pytest.mark.parametrize('verb', [['check'], ['recover', '-o', 'saved.mcap']])
-def test_no_bag_is_an_error(
-    verb: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_no_bag_is_an_error(verb: list[str], tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'text.mcap').write_text('no bag at all')
     for name in ('nowhere.mcap', 'text.mcap'):

@@ -53,9 +53,7 @@ def sailing(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], psutil.Proc
         demo.communicate()
 
 
-def test_it_ends_at_once_and_takes_its_node_along(
-    sailing: tuple[subprocess.Popen[str], psutil.Process],
-) -> None:
+def test_it_ends_at_once_and_takes_its_node_along(sailing):
     demo, node = sailing
     demo.send_signal(signal.SIGINT)
     _, errors = demo.communicate(timeout=LIMIT_S)

@@ -30,7 +30,7 @@ def found(tmp_path: Path, *arguments: str) -> dict[str, Any]:
     return answer
 
 
-def test_facts_make_a_name_of_a_set(
+def test_facts_make_a_name_of_a_set_told_by_options_or_by_the_run_file_beside_a_bag(
     fouled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bare = found(tmp_path, str(fouled))
@@ -51,11 +51,8 @@ def test_facts_make_a_name_of_a_set(
     said = capsys.readouterr().out
     assert 'Facts that were given' in said
     assert 'no cable, net or line was in the water' in said
+    (lighter,) = told['effects']
 
-
-def test_the_run_file_beside_a_bag_tells_facts_and_particulars(
-    fouled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
     sheet = fouled.with_name('run.mcap.run.yaml')
     sheet.write_text(f'facts: [{", ".join(KNOWN)}]\ndisplaced_volume_m3: 21000.0\n')
     try:
@@ -67,8 +64,6 @@ def test_the_run_file_beside_a_bag_tells_facts_and_particulars(
     assert {each['bag'] for each in told['facts']} == {str(fouled)}
     # a ship that is 4 % heavier stops as much later: as much more resistance is missing
     (effect,) = told['effects']
-    facts = [word for fact in KNOWN for word in ('--fact', fact)]
-    (lighter,) = found(tmp_path, str(fouled), *facts)['effects']
     factor = 'friction_factor'
     assert effect['parameters'][factor]['value'] > lighter['parameters'][factor]['value'] + 0.02
 
@@ -81,9 +76,7 @@ def test_the_run_file_beside_a_bag_tells_facts_and_particulars(
         (['calm', 'calm'], '--fact calm is given 2 times'),
     ],
 )
-def test_a_fact_that_is_none_is_an_error(
-    facts: list[str], wrong: str, fouled: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fact_that_is_none_is_an_error(facts, wrong, fouled, capsys):
     words = [word for fact in facts for word in ('--fact', fact)]
     assert main(['diagnose', str(fouled), *words]) == 1
     assert wrong in capsys.readouterr().err

@@ -40,9 +40,7 @@ def sailing(tmp_path: Path) -> Path:
     return bag(tmp_path / 'sailing.mcap', time, speed_through_water=log, position=place)
 
 
-def test_without_coastdown_and_ship_file_log_and_positions_are_compared(
-    sailing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_coastdown_and_ship_file_log_and_positions_are_compared(sailing, tmp_path, capsys):
     document = tmp_path / 'diagnosis.json'
     assert main(['diagnose', str(sailing), '--json', str(document)]) == 0
     found = json.loads(document.read_text())
@@ -74,9 +72,7 @@ def sound(path: Path, slowing: bool) -> Path:
 
 
 @pytest.mark.parametrize('slowing', [False, True])
-def test_the_first_word_is_that_there_is_no_coastdown_and_why(
-    slowing: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_first_word_is_that_there_is_no_coastdown_and_why(slowing, tmp_path, capsys):
     sailed = sound(tmp_path / 'sailed.mcap', slowing)
     ship, document = tmp_path / 'ship.yaml', tmp_path / 'found.json'
     ship.write_text(MODEL)
@@ -103,18 +99,14 @@ def test_the_first_word_is_that_there_is_no_coastdown_and_why(
     assert 'not examined: the force on the ship' in text
 
 
-def test_what_needs_a_ship_file_says_so(
-    sailing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_needs_a_ship_file_says_so(sailing: Path, tmp_path, capsys) -> None:
     out = tmp_path / 'ship.yaml'
     assert main(['diagnose', str(sailing), '--write', str(out)]) == 1
     assert '--write needs one' in capsys.readouterr().err
     assert not out.exists()
 
 
-def test_without_coastdown_and_positions_it_says_what_to_give(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_coastdown_and_positions_it_says_what_to_give(tmp_path, capsys) -> None:
     time = np.arange(3600.0)
     log = 4.0 + 0.1 * np.sin(time / 200.0)
     path = bag(tmp_path / 'log.mcap', time, speed_through_water=log)
@@ -125,9 +117,7 @@ def test_without_coastdown_and_positions_it_says_what_to_give(
     assert '--window' in error
 
 
-def test_a_coast_without_steady_sailing_before_it_says_what_to_give(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_coast_without_steady_sailing_before_it_says_what_to_give(tmp_path, capsys) -> None:
     rng = np.random.default_rng(1)
     time = np.arange(0.0, 35.0, 0.1)
     # v' = -0.3 v^2 after 5 s of steady speed
@@ -142,9 +132,7 @@ def test_a_coast_without_steady_sailing_before_it_says_what_to_give(
     assert 'give a record that begins earlier' in error
 
 
-def test_a_ship_file_of_two_values_does_not_hide_a_current(
-    tmp_path: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_file_of_two_values_does_not_hide_a_current(tmp_path, ship_file, capsys):
     path, document = tmp_path / 'run.mcap', tmp_path / 'found.json'
     line = ['simulate', '--ship', str(ship_file), '-o', str(path), '--lead-in', '1800']
     assert main([*line, '--effect', 'current=0.4', '--seed', '3']) == 0
@@ -153,6 +141,8 @@ def test_a_ship_file_of_two_values_does_not_hide_a_current(
     page = tmp_path / 'page.html'
     line = ['diagnose', str(path), '--ship', str(two), '--report', str(page)]
     assert main([*line, '--json', str(document)]) == 0
+    assert 'the ship file has no baseline' in capsys.readouterr().out
+    assert 'compared with all hulls of her length and volume' in page.read_text(encoding='utf-8')
     found = json.loads(document.read_text())
     assert found['baseline'] == 'fitted_here'
     assert found['coastdowns_used'] == 1
@@ -170,9 +160,7 @@ def test_a_ship_file_of_two_values_does_not_hide_a_current(
     assert 'a leg on another course' in page.read_text(encoding='utf-8')
 
 
-def test_a_log_in_knots_is_asked_about_its_unit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_in_knots_is_asked_about_its_unit(tmp_path, capsys) -> None:
     rng = np.random.default_rng(1)
     time = np.arange(3600.0)
     speed = np.where(time // 600.0 % 3 == 0, 3.0, 6.0)

@@ -44,9 +44,7 @@ def test_a_port_in_use_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert by_name(tmp_path)[f'port {port}'].state is CheckState.LOOK
 
 
-def test_a_missing_package_is_told_with_what_does_not_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_is_told_with_what_does_not_work(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(doctor, '_OPTIONAL', {'no_such_package': 'the impossible'})
     found = by_name(tmp_path)['no_such_package']
     assert (found.state, found.found) == (
@@ -68,9 +66,7 @@ def own_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures('own_environment')
-def test_a_ship_sails_past_the_node_and_live_is_replay(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_sails_past_the_node_and_live_is_replay(tmp_path, capsys) -> None:
     pytest.importorskip('rclpy')
     assert main(['doctor', '--run', '--out', str(tmp_path)]) == 0
     said = capsys.readouterr().out
@@ -81,9 +77,7 @@ def test_a_ship_sails_past_the_node_and_live_is_replay(
 
 
 @pytest.mark.usefixtures('own_environment')
-def test_a_node_that_fails_is_told_with_its_log(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_node_that_fails_is_told_with_its_log(tmp_path, capsys, monkeypatch) -> None:
     pytest.importorskip('rclpy')
     monkeypatch.setattr(demo, 'TRIAL_SETTINGS', ('steady_s:=nonsense',))
     assert main(['doctor', '--run', '--out', str(tmp_path), '--json']) == 1

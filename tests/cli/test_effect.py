@@ -8,7 +8,6 @@ import math
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -37,9 +36,7 @@ def test_a_sound_file_can_be_used(capsys: pytest.CaptureFixture[str]) -> None:
     assert document['effects'][0]['name'] == 'weed'
 
 
-def test_all_files_are_reported_whichever_is_bad(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_files_are_reported_whichever_is_bad(tmp_path, capsys) -> None:
     bad, empty = tmp_path / 'bad.yaml', tmp_path / 'none.yaml'
     bad.write_text(WEED.read_text().replace('unit: 1', 'unit: m', 1))
     assert main(['effect', 'check', str(bad), str(empty), str(WEED), '--json']) == 1
@@ -97,12 +94,7 @@ def record() -> sd.Record:
     parameters=st.tuples(_PARAMETERS, _PARAMETERS),
 )
 @settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck))
-def test_what_passes_is_taken_by_simulate_and_diagnose(
-    record: sd.Record,
-    acting: tuple[str, str, str],
-    scope: str,
-    parameters: tuple[dict[str, Any], dict[str, Any]],
-) -> None:
+def test_what_passes_is_taken_by_simulate_and_diagnose(record, acting, scope, parameters):
     channel, variable, expression = acting
     form = {'channel': channel, 'scope': scope, 'variable': variable, 'expression': expression}
     form |= {'shape': 'constant' if variable == 'speed' else 'ramp', 'valid': {}}
@@ -126,9 +118,7 @@ def test_what_passes_is_taken_by_simulate_and_diagnose(
         assert sd.diagnose(record, ship=ship).verdict
 
 
-def test_a_name_that_is_taken_is_an_error_of_its_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_that_is_taken_is_an_error_of_its_file(tmp_path, capsys) -> None:
     wrong = tmp_path / 'wrong.yaml'
     for name in ('fouling', 'none', 'unknown'):
         wrong.write_text(WEED.read_text().replace('name: weed', f'name: {name}'))
@@ -150,14 +140,13 @@ def weedy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated run with weed, alone in a folder."""
     bag = tmp_path_factory.mktemp('bags') / 'weed.mcap'
     line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--effect', 'weed=0.002']
+    line += ['--lead-in', '700', '--duration', '1200']
     assert main(line) == 1  # without the folder it is not known
     assert main([*line, *EFFECTS]) == 0
     return bag
 
 
-def test_a_learnt_effect_is_named_and_written_into_the_ship_file(
-    weedy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_learnt_effect_is_named_and_written_into_the_ship_file(weedy, tmp_path, capsys):
     written = tmp_path / 'weedy.yaml'
     line = ['diagnose', str(weedy), '--json']
     assert main([*line, *EFFECTS, '--write', str(written)]) == 0
@@ -178,9 +167,7 @@ def test_a_learnt_effect_is_named_and_written_into_the_ship_file(
     assert 'weed: A = ' in capsys.readouterr().out
 
 
-def test_a_term_of_the_ship_file_may_be_simulated_without_a_folder(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_term_of_the_ship_file_may_be_simulated_without_a_folder(tmp_path, capsys) -> None:
     ship = tmp_path / 'ship.yaml'
     term = replace(LearntTerm.load(WEED), name='weed_of_her_own')  # no test before knows it
     ship.write_text(replace(Ship.load(SHIP), learnt=(term,)).to_yaml())
@@ -189,9 +176,7 @@ def test_a_term_of_the_ship_file_may_be_simulated_without_a_folder(
     assert 'weed_of_her_own: A = 0.002' in capsys.readouterr().out
 
 
-def test_a_hostile_term_in_a_ship_file_is_an_error(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_hostile_term_in_a_ship_file_is_an_error(tmp_path, capsys) -> None:
     mark, hostile = tmp_path / 'mark', tmp_path / 'ship.yaml'
     term = LearntTerm.load(WEED)
     ship = replace(Ship.load(SHIP), learnt=(term,)).to_yaml()
@@ -210,9 +195,7 @@ def test_the_terms_in_use_are_attached_to_a_recording(weedy: Path) -> None:
     assert LearntTerm.from_yaml(attached['effects/weed.yaml']) == LearntTerm.load(WEED)
 
 
-def test_a_fleet_names_it_and_does_a_bag_again_for_it(
-    weedy: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fleet_names_it_and_does_a_bag_again_for_it(weedy: Path, tmp_path, capsys) -> None:
     line = ['fleet', str(weedy.parent), '-o', str(tmp_path / 'store'), '--workers', '1', '--json']
     assert main(line) == 0
     named = []
@@ -227,9 +210,7 @@ def test_a_fleet_names_it_and_does_a_bag_again_for_it(
 
 
 @pytest.mark.parametrize('verb', ['replay', 'forecast', 'watch', 'trend', 'poster', 'node'])
-def test_every_verb_takes_a_folder_of_effects(
-    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_verb_takes_a_folder_of_effects(verb: str, tmp_path, capsys) -> None:
     more = {'node': ['--ship', str(SHIP), '--out', str(tmp_path)]}.get(verb, ['none'])
     (tmp_path / 'bad.yaml').write_text('name: fouling')
     assert main([verb, *more, '--effects', str(tmp_path)]) == 1

@@ -3,26 +3,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from shipdrag_ros.cli import main
 
 
 @pytest.mark.parametrize('given', ['0', '-1', 'two', '1025'])
-def test_a_number_of_workers_that_is_none_is_refused(
-    given: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_number_of_workers_that_is_none_is_refused(given: str, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
         main(['fleet', 'x', '-o', 'y', f'--workers={given}'])
     assert ended.value.code == 2
     assert 'expected a whole number from 1 to 1024' in capsys.readouterr().err
 
 
-def test_where_no_bag_lies_no_store_is_left(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_where_no_bag_lies_no_store_is_left(tmp_path, capsys) -> None:
     store = tmp_path / 'store'
     (tmp_path / 'empty').mkdir()
     assert main(['fleet', str(tmp_path / 'empty'), '-o', str(store)]) == 1
@@ -30,9 +24,7 @@ def test_where_no_bag_lies_no_store_is_left(
     assert not store.exists()
 
 
-def test_bags_in_the_folder_of_the_store_are_not_passed_over_in_silence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bags_in_the_folder_of_the_store_are_not_passed_over_in_silence(tmp_path, capsys) -> None:
     (tmp_path / 'bags' / 'ship').mkdir(parents=True)
     store = str(tmp_path / 'bags')
     for place in (store, f'{store}/ship'):

@@ -86,9 +86,7 @@ def test_no_glide_is_said(steady_bag: Path, capsys: pytest.CaptureFixture[str]) 
     assert 'No coastdown found' in none['reason']
 
 
-def test_a_bag_without_a_glide_is_said_beside_one_with_a_glide(
-    steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bag_without_a_glide_is_said_beside_one_with_a_glide(steady_bag, coastdown_bag, capsys):
     assert main(['forecast', str(coastdown_bag), str(steady_bag), '--after', '1e305']) == 0
     told = capsys.readouterr().out
     assert 'the glide ends' in told
@@ -107,9 +105,7 @@ def test_a_time_that_is_none(coastdown_bag: Path, capsys: pytest.CaptureFixture[
     assert len(result.forecast(after=300.0).made) == 1
 
 
-def test_a_bag_behind_the_times_is_told_where_to_stand(
-    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bag_behind_the_times_is_told_where_to_stand(coastdown_bag: Path, capsys) -> None:
     with pytest.raises(SystemExit):
         main(['forecast', '--after', '300', str(coastdown_bag)])
     assert 'as in --after 60 300 -- BAG' in capsys.readouterr().err
@@ -120,9 +116,7 @@ def test_a_bag_behind_the_times_is_told_where_to_stand(
     assert '(default: 60 120 300)' in ' '.join(capsys.readouterr().out.split())
 
 
-def test_if_she_were_stopped_now(
-    ship_file: Path, steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_if_she_were_stopped_now(ship_file, steady_bag, coastdown_bag, capsys):
     assert main(['forecast', str(steady_bag), '--if-stopped-now', '--json']) == 0
     told = capsys.readouterr()
     assert 'by the clean hull of the ship file' in told.err

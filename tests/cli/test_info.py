@@ -39,9 +39,7 @@ def test_the_json(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (shaft['input'], shaft['messages'], shaft['rate_hz']) == ('shaft', 302, 1.0)
 
 
-def test_a_remapping_changes_what_is_heard(
-    steady_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_remapping_changes_what_is_heard(steady_bag: Path, capsys) -> None:
     line = ['info', str(steady_bag), '--remap', '/speed_through_water:=speed_over_ground']
     capsys.readouterr()
     assert main([*line, '--json']) == 0
@@ -49,9 +47,7 @@ def test_a_remapping_changes_what_is_heard(
     assert 'speed_through_water' in about['missing_inputs']
 
 
-def test_of_a_part_only_what_is_in_it_is_shown(
-    steady_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_of_a_part_only_what_is_in_it_is_shown(steady_bag: Path, capsys) -> None:
     capsys.readouterr()
     assert main(['info', f'{steady_bag}@100:150', str(steady_bag), '--json']) == 0
     part, whole = json.loads(capsys.readouterr().out)['bags']
@@ -61,9 +57,7 @@ def test_of_a_part_only_what_is_in_it_is_shown(
     assert {topic['rate_hz'] for topic in part['topics']} == {1.0}
 
 
-def test_a_log_is_shown_as_its_bag_would_be(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_is_shown_as_its_bag_would_be(tmp_path, capsys) -> None:
     log = tmp_path / 'log.csv'
     log.write_text('time,STW [kn]\n0,12.0\n1,11.9\n')
     capsys.readouterr()

@@ -7,20 +7,22 @@ import json
 from pathlib import Path
 
 import pytest
-from mcap.reader import make_reader
-from mcap.writer import Writer
 
 import shipdrag_ros as sd
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fleet.store import BagResult, Store, bag_row
+from shipdrag_ros.samples import Block, concatenate
+from tests.runs import write_run
 
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 
 
 def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, out, page = (tmp_path / name for name in ('run.mcap', 'new.yaml', 'page.html'))
-    assert main(['simulate', '--ship', str(SHIP), '-o', str(bag)]) == 0
+    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '700']
+    assert main([*line, '--duration', '900']) == 0
     capsys.readouterr()
     assert main(['learn', str(bag), '-o', str(out), '--report', str(page), '--json']) == 0
     said = capsys.readouterr()
@@ -37,9 +39,7 @@ def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize('name', ['fouling', 'Kelp', '../kelp'])
-def test_a_name_that_cannot_be_is_refused_before_the_work(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_that_cannot_be_is_refused_before_the_work(name: str, tmp_path, capsys) -> None:
     line = ['learn', str(tmp_path / 'none.mcap'), '-o', str(tmp_path / 'a.yaml'), '--name', name]
     assert main(line) == 1
     assert 'name' in capsys.readouterr().err
@@ -65,12 +65,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_bags_of_a_store_are_found_from_anywhere(
-    fleet: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_bags_of_a_store_are_found_from_anywhere(fleet, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['runs']) == 1
@@ -80,64 +75,35 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
     """A store of a bag with no ship file attached, kept in the store for each ship."""
     (folder / 'bags').mkdir()
     store = Store(folder / 'store')
-    with (fleet / 'bags' / 'run.mcap').open('rb') as stream:
-        whole = list(make_reader(stream).iter_messages())
+    (run,) = open_runs([fleet / 'bags' / 'run.mcap'])
+    whole = concatenate([item for item in run.inputs() if isinstance(item, Block)])
     for number, ship in enumerate(ships):
-        bag = folder / 'bags' / f'{number}.mcap'
-        with bag.open('wb') as out:
-            writer = Writer(out)
-            writer.start(profile='ros2')
-            schemas: dict[int, int] = {}
-            channels: dict[int, int] = {}
-            for schema, channel, message in whole:
-                assert schema is not None
-                if channel.id not in channels:
-                    schemas[schema.id] = writer.register_schema(
-                        schema.name, schema.encoding, schema.data
-                    )
-                    channels[channel.id] = writer.register_channel(
-                        channel.topic, channel.message_encoding, schemas[schema.id]
-                    )
-                writer.add_message(
-                    channels[channel.id], message.log_time, message.data, message.publish_time
-                )
-            writer.finish()
+        bag = write_run(folder / 'bags' / f'{number}.mcap', whole)
         row = bag_row('bags', bag.name, f'{number}' * 64)
         store.write(BagResult({**row, 'ship': ship, 'coastdowns': 1}))
         store.keep_ship(ship, {'ship.yaml': SHIP.read_text()})
     return store.path
 
 
-def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(fleet, tmp_path, capsys):
     store = bare(fleet, tmp_path, 'Vitus Bering')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
     assert len(json.loads(capsys.readouterr().out)['runs']) == 1
 
 
-def test_a_store_of_two_ships_names_them(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_store_of_two_ships_names_them(fleet: Path, tmp_path, capsys) -> None:
     store = bare(fleet, tmp_path, 'Alder', 'Birch')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
     assert "the store holds 'Alder', 'Birch'" in capsys.readouterr().err
 
 
-def test_a_window_of_a_store_counts(
-    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_window_of_a_store_counts(fleet: Path, tmp_path, capsys) -> None:
     line = ['learn', f'{fleet / "store"}@0:200', '-o', str(tmp_path / 'a.yaml')]
     assert main(line) == 1
     assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err
 
 
-def test_a_bag_of_a_store_that_is_gone_is_named(
-    fleet: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_bag_of_a_store_that_is_gone_is_named(fleet, tmp_path, monkeypatch, capsys):
     store = (fleet / 'store').rename(tmp_path / 'moved')
     try:
         monkeypatch.chdir(tmp_path)
@@ -149,9 +115,7 @@ def test_a_bag_of_a_store_that_is_gone_is_named(
     assert 'give the bags themselves' in said
 
 
-def test_a_store_without_a_coastdown_is_an_error(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_store_without_a_coastdown_is_an_error(tmp_path, capsys) -> None:
     store = tmp_path / 'store'
     (store / 'coastdowns').mkdir(parents=True)
     Store(store).write(BagResult(bag_row('bags', 'run.mcap', 'a' * 64)))

@@ -46,13 +46,7 @@ def stopped(line: list[str]) -> int | str | None:
         (KeyboardInterrupt(), 130, ''),
     ],
 )
-def test_an_end_has_its_status(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    result: int | BaseException,
-    status: int,
-    said: str,
-) -> None:
+def test_an_end_has_its_status(monkeypatch, capsys, result, status, said):
     assert run_verb(monkeypatch, result) == status
     captured = capsys.readouterr()
     assert captured.err.startswith(said)
@@ -92,13 +86,7 @@ def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> No
     captured = capsys.readouterr().out
     assert f'usage: shipdrag {verb}' in captured
     assert 'None' not in captured
-
-
-@pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])
-def test_each_verb_takes_effects(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
-    line = [verb, 'list', '--help'] if verb == 'effect' else [verb, '--help']
-    assert stopped(line) == 0
-    assert '--effects DIR' in capsys.readouterr().out
+    assert '--effects DIR' in captured or verb == 'effect'  # there it is of `list`, which runs
 
 
 @pytest.mark.parametrize('verb', [verb.name for verb in cli.verbs()])

@@ -19,13 +19,7 @@ LIMIT_S = 240.0
 
 
 @pytest.mark.parametrize('verb', ['node', 'demo'])
-def test_without_ros_it_says_how_to_get_it(
-    verb: str,
-    ship_file: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_without_ros_it_says_how_to_get_it(verb, ship_file, tmp_path, monkeypatch, capsys):
     # what is imported anew here is forgotten afterwards, by the package above it too
     monkeypatch.setattr('shipdrag_ros.node', None, raising=False)
     for name in list(sys.modules):
@@ -40,9 +34,7 @@ def test_without_ros_it_says_how_to_get_it(
     assert not (tmp_path / 'out').exists()
 
 
-def test_a_bad_ship_file_is_told_before_ros_starts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bad_ship_file_is_told_before_ros_starts(tmp_path, capsys) -> None:
     assert main(['node', '--ship', 'no such.yaml', '--out', str(tmp_path)]) == 1
     assert 'no such.yaml: 1 problem' in capsys.readouterr().err
 
@@ -83,9 +75,7 @@ def node_log(tmp_path: Path, ship: Path, *ros_arguments: str) -> str:
         ({'ship_file': 'another.yaml', 'output_directory': 'elsewhere'}, True),
     ],
 )
-def test_the_command_line_holds_over_a_parameter_file(
-    ship_file: Path, tmp_path: Path, changed: dict[str, str], said: bool
-) -> None:
+def test_the_command_line_holds_over_a_parameter_file(ship_file, tmp_path, changed, said):
     tree = yaml.safe_load((ROOT / 'config' / 'parameters.yaml').read_text())
     tree['/**']['ros__parameters'] |= {**changed, 'froude_min': 0.07}
     file = tmp_path / 'parameters.yaml'
@@ -100,9 +90,7 @@ def test_the_command_line_holds_over_a_parameter_file(
     assert ("output_directory 'elsewhere'" in log) == said
 
 
-def test_the_command_line_holds_over_what_follows_ros_args(
-    ship_file: Path, tmp_path: Path
-) -> None:
+def test_the_command_line_holds_over_what_follows_ros_args(ship_file: Path, tmp_path) -> None:
     log = node_log(tmp_path, ship_file, '-p', 'ship_file:=another.yaml')
     assert f"ship_file='{ship_file}'" in log
     assert "ship_file 'another.yaml' of -p is not used" in log

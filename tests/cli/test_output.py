@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,9 +29,7 @@ def test_json_has_stdout_for_itself(capsys: pytest.CaptureFixture[str]) -> None:
     assert captured.err == 'result\n'
 
 
-def test_json_in_a_file_leaves_stdout_to_the_reader(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_json_in_a_file_leaves_stdout_to_the_reader(capsys, tmp_path) -> None:
     output = Output(str(tmp_path / 'a.json'))
     output.say('result')
     output.json({'a': 1})

@@ -50,9 +50,7 @@ def test_times_and_ways_are_those_of_the_curves(store: Path, tmp_path: Path) -> 
     assert '<b>ship</b>' not in text
 
 
-def test_coastdowns_without_a_table_are_those_of_the_ship(
-    store: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_coastdowns_without_a_table_are_those_of_the_ship(store: Path, capsys) -> None:
     slow = fleet_result(50, 0.0)
     rows = tuple(row | {'speed_m_s': 0.01 * row['speed_m_s']} for row in slow.coastdowns)
     Store(store).write(BagResult(slow.bag | {'ship': 'Slow'}, rows))
@@ -62,8 +60,6 @@ def test_coastdowns_without_a_table_are_those_of_the_ship(
     assert 'None of 1 coastdowns' in capsys.readouterr().out
 
 
-def test_a_ship_without_a_file_is_named(
-    fleet_store: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_without_a_file_is_named(fleet_store: Path, capsys) -> None:
     assert main(['poster', str(fleet_store)]) == 0
     assert 'keeps no ship file' in capsys.readouterr().out

@@ -121,9 +121,7 @@ def test_the_seed_repeats_the_noise_and_another_does_not(simulate) -> None:
     assert np.any(first != other)
 
 
-def test_effects_act_and_the_truth_says_which_but_the_ship_does_not(
-    simulate, ship_file: Path
-) -> None:
+def test_effects_act_and_the_truth_says_which_but_the_ship_does_not(simulate, ship_file):
     quiet = ('--noise', '0')
     clean = simulate(*quiet)
     bag = simulate(*quiet, '--effect', 'fouling=0.5', '--effect', 'log_scale=0.1')
@@ -170,9 +168,7 @@ def test_inputs_say_which_sensors_see_it(simulate) -> None:
     np.testing.assert_allclose(bag.of(Channel.WIND_APPARENT).value[:20, 0], -10.0, rtol=1e-6)
 
 
-def test_the_json_says_what_was_made(
-    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_json_says_what_was_made(ship_file: Path, tmp_path, capsys) -> None:
     path = tmp_path / 'a.mcap'
     assert main(['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT, '--json']) == 0
     said = json.loads(capsys.readouterr().out)
@@ -197,13 +193,7 @@ def test_the_json_says_what_was_made(
         ),
     ],
 )
-def test_a_user_error_is_told_and_leaves_no_bag(
-    ship_file: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: tuple[str, ...],
-    said: str,
-) -> None:
+def test_a_user_error_is_told_and_leaves_no_bag(ship_file, tmp_path, capsys, arguments, said):
     path = tmp_path / 'a.mcap'
     assert main(['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT, *arguments]) == 1
     assert capsys.readouterr().err.startswith(said)
@@ -221,9 +211,7 @@ def test_a_user_error_is_told_and_leaves_no_bag(
         ('--speed', '0'),
     ],
 )
-def test_an_impossible_value_is_wrong_usage(
-    ship_file: Path, tmp_path: Path, arguments: tuple[str, ...]
-) -> None:
+def test_an_impossible_value_is_wrong_usage(ship_file, tmp_path, arguments):
     line = ['simulate', '--ship', str(ship_file), '-o', str(tmp_path / 'a.mcap'), *arguments]
     with pytest.raises(SystemExit) as end:
         main(line)
@@ -248,9 +236,7 @@ def test_the_stamps_begin_at_the_date_given(simulate, given: str, first: str) ->
 
 
 @pytest.mark.parametrize('given', ['yesterday', '2026-13-01', '1970-01-01', '2100-01-01'])
-def test_a_date_that_is_none_is_refused(
-    ship_file: Path, tmp_path: Path, given: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_date_that_is_none_is_refused(ship_file: Path, tmp_path, given: str, capsys) -> None:
     line = ['simulate', '--ship', str(ship_file), '-o', str(tmp_path / 'a.mcap')]
     with pytest.raises(SystemExit) as ended:
         main([*line, '--start', given])

@@ -66,8 +66,6 @@ def test_the_same_seed_gives_the_same_files(folder: Path, tmp_path: Path) -> Non
         assert path.read_bytes() == (folder / 'alder' / path.name).read_bytes(), path.name
 
 
-def test_a_folder_that_holds_something_is_left_alone(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_holds_something_is_left_alone(folder: Path, capsys) -> None:
     assert main(['simulate-fleet', '-o', str(folder)]) == 1
     assert 'is not empty; give a new folder' in capsys.readouterr().err

@@ -7,7 +7,6 @@ import argparse
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -82,30 +81,21 @@ def test_watch_plays_the_part_that_is_given(coastdown_bag: Path) -> None:
     assert whole.span_ns[0] + 400 * 10**9 == part.span_ns[0]
 
 
-def replayed(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
-    assert main(['replay', *words, '--json']) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_replay_takes_each_window_and_does_not_combine_what_overlaps(
-    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bags = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
+def test_replay_takes_each_window_and_does_not_combine_what_overlaps(coastdown_bag, capsys):
+    bags = [f'{coastdown_bag}@430:700', f'{coastdown_bag}@500:900']
     capsys.readouterr()
     assert main(['replay', *bags, '--window', '0', '1', '--json']) == 0
     told = capsys.readouterr()
     found = json.loads(told.out)
     first, second = ((it['end_ns'] - it['start_ns']) * 1e-9 for it in found['coastdowns'])
-    assert (first, second) == (pytest.approx(470.0), pytest.approx(700.0))
+    assert (first, second) == (pytest.approx(270.0), pytest.approx(400.0))
     assert {each['ended_by'] for each in found['coastdowns']} == {'given'}
     assert found['combined'] is None
     assert 'Not combined: windows of' in told.err
 
 
 @pytest.mark.parametrize('verb', ['diagnose', 'baseline'])
-def test_a_part_that_is_given_twice_is_no_second_run(
-    verb: str, coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_part_that_is_given_twice_is_no_second_run(verb, coastdown_bag, tmp_path, capsys):
     words = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
     if verb == 'baseline':
         ship = str(ROOT / 'config' / 'vitus_bering.yaml')
@@ -123,30 +113,26 @@ def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
     refuse_overlaps([WindowedRun(run, (0.0, 430.0)), part])
 
 
-@pytest.mark.parametrize('window', ['0:2400', '300:2400'])
-def test_a_window_may_hold_the_steady_lead(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], window: str
-) -> None:
+def test_a_window_may_hold_the_steady_lead(tmp_path, capsys) -> None:
     ship = str(ROOT / 'config' / 'vitus_bering.yaml')
     lead = tmp_path / 'lead.mcap'
     assert main(['simulate', '--ship', ship, '-o', str(lead), '--lead-in', '900']) == 0
     capsys.readouterr()
-    assert main(['diagnose', f'{lead}@{window}', '--ship', ship, '--json']) == 0
+    assert main(['diagnose', f'{lead}@0:2400', '--ship', ship, '--json']) == 0
     assert json.loads(capsys.readouterr().out)['coastdowns_used'] == 1
 
 
-def test_what_is_cut_is_said_first_in_text_and_report(
-    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    page = tmp_path / 'a.html'
-    assert main(['replay', f'{coastdown_bag}@100:1200', '--report', str(page)]) == 0
+def test_what_is_cut_is_said_first_in_text_and_report(coastdown_bag, tmp_path, capsys):
+    page, document = tmp_path / 'a.html', tmp_path / 'a.json'
+    line = ['replay', f'{coastdown_bag}@100:900', '--report', str(page), '--json', str(document)]
+    assert main(line) == 0
     said = capsys.readouterr().out
-    assert 'Of 100.0 s to 1200.0 s only' in said
+    assert 'Of 100.0 s to 900.0 s only' in said
     assert said.index('is taken for a coastdown') < said.index('r(v) is known from')
     text = page.read_text(encoding='utf-8')
     assert text.index('is taken for a coastdown') < text.index('r(v) is known from')
     assert 'Hatched: what was cut, and why' in text
-    found = replayed(capsys, f'{coastdown_bag}@100:1200')
+    found = json.loads(document.read_text())
     (coastdown,) = found['coastdowns']
     before = [each for each in found['not_coastdowns'] if each['reason'] == 'thrust']
     assert [each['end_ns'] for each in before] == [coastdown['start_ns']]

@@ -84,7 +84,7 @@ def test_the_track_stands_in_for_a_log_that_fails(ship, clean, at_s, value) -> N
         inside = between(at_s, 900)
         return put(values[np.argmax(inside), 0] if value is None else value, inside)(values)
 
-    monitor = Monitor(ship, Parameters())
+    monitor = Monitor(ship, Parameters(update_s=600.0))
     events = [*monitor.update(spoilt(clean, LOG, fail)), *monitor.finish()]
     ended = [event for event in events if isinstance(event, EndedCoastdown)]
     # positions alone leave open whether the engine drove her for half a minute as the log failed

@@ -57,9 +57,7 @@ def test_each_instrument_is_judged_by_itself_and_told_where_it_was_heard(ship: S
         (Channel.POSITION, Channel.POSITION_2),
     ],
 )
-def test_the_second_one_carries_on_where_the_first_falls_silent(
-    ship: Ship, first: Channel, second: Channel
-) -> None:
+def test_the_second_one_carries_on_where_the_first_falls_silent(ship, first, second):
     sd = 3.0 if first is Channel.POSITION else 0.03
     silent = Sensor(channel=first, sd=sd, gaps_s=((LEAD_S + 200.0, 9999.0),))
     (*_, alone) = watched(ship, sailed(ship, silent))[1]
@@ -72,9 +70,7 @@ def test_the_second_one_carries_on_where_the_first_falls_silent(
 
 
 @pytest.mark.parametrize('off', [-0.05, 0.05])
-def test_a_second_log_in_another_scale_makes_no_step_where_it_carries_on(
-    ship: Ship, off: float
-) -> None:
+def test_a_second_log_in_another_scale_makes_no_step_where_it_carries_on(ship, off):
     silent = Sensor(channel=FIRST, sd=0.03, gaps_s=((LEAD_S + 200.0, LEAD_S + 300.0),))
     block = sailed(ship, silent, Sensor(channel=SECOND, sd=0.03))
     other = (block.channel == SECOND)[:, None]

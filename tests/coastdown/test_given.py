@@ -131,9 +131,7 @@ def test_a_kick_in_the_glide_is_cut_out(kick: float, reason: str) -> None:
 
 
 @pytest.mark.parametrize('before_s', [600.0, 0.0])
-def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(
-    before_s: float,
-) -> None:
+def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(before_s):
     time_s = np.arange(-before_s, LENGTH_S)
     revs = np.where(time_s < 10.0, 1.0, 0.6)
     inputs = [block(LOG, noisy(slowed(revs)), time_s), block(SHAFT, 12.0 * revs, time_s)]
@@ -143,10 +141,10 @@ def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives(
 
 
 def test_power_taken_back_in_steps_is_no_coastdown() -> None:
-    time_s = np.arange(-600.0, LENGTH_S)
+    time_s = np.arange(-200.0, LENGTH_S)
     revs = np.select([time_s < 0.0, time_s < 150.0], [1.0, 0.75], 0.5)
     inputs = [block(LOG, noisy(slowed(revs)), time_s), block(SHAFT, 12.0 * revs, time_s)]
-    found = judge(window(*inputs, before_s=600.0), BOAT, Parameters())
+    found = judge(window(*inputs, before_s=200.0), BOAT, Parameters())
     assert found.failure is not None
     assert 'the shaft turns' in found.failure
 
@@ -172,11 +170,11 @@ def test_a_window_in_which_she_is_driven_almost_to_its_end_is_refused() -> None:
 
 
 def test_a_shaft_that_is_let_go_may_speed_up_to_windmill() -> None:
-    time_s = np.arange(-600.0, LENGTH_S)
+    time_s = np.arange(-200.0, LENGTH_S)
     speed = glide(time_s)
     turning = np.where(time_s < 0.0, 12.0, np.where(time_s < 40.0, 3.0, 0.5 * 3.0 * speed))
     inputs = [block(LOG, noisy(speed), time_s), block(SHAFT, turning, time_s)]
-    assert is_whole(judge(window(*inputs, before_s=600.0), BOAT, Parameters()))
+    assert is_whole(judge(window(*inputs, before_s=200.0), BOAT, Parameters()))
 
 
 def test_a_shaft_that_keeps_its_revs_in_a_glide_is_told() -> None:
@@ -355,11 +353,10 @@ def held_at_first(until_s: float, length_s: float, *, start: float = 6.0) -> np.
     return np.array(speed)
 
 
-@pytest.mark.parametrize('seed', range(2))
-def test_a_brake_that_is_let_go_is_cut_and_nothing_else(seed: int) -> None:
+def test_a_brake_that_is_let_go_is_cut_and_nothing_else() -> None:
     ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
     speed = held_at_first(120.0, 780.0)
-    noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
+    noise = np.random.default_rng(900).normal(0.0, 0.03, len(speed))
     log = block(LOG, speed + noise, np.arange(780.0))
     found = judge(window(log, end_s=780.0), ship, Parameters())
     assert [cut.reason for cut in found.cuts] == [Dismissal.BRAKE]

@@ -90,9 +90,7 @@ def test_nothing_is_said_of_a_slow_ship_or_too_soon() -> None:
 
 
 @pytest.mark.parametrize('current_m_s', [1.5, 2.5])
-def test_before_she_slows_a_scale_and_a_current_look_alike_and_nothing_is_said(
-    current_m_s: float,
-) -> None:
+def test_before_she_slows_a_scale_and_a_current_look_alike_and_nothing_is_said(current_m_s):
     steady = np.full(13, 5.0)
     assert scaled(steady, steady + current_m_s).log_odds < LOG_ODDS_OF_NINE
     slow = np.linspace(3.0, 5.0, 13)  # the newest first

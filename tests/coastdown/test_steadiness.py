@@ -18,7 +18,7 @@ FIRST = 1_700_000_000
 def learnt(speed, *, first: int = FIRST, **parameters) -> Steadiness:
     stamps = (first + np.arange(len(speed))) * SECOND_NS
     ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
-    monitor = Monitor(ship, Parameters(**parameters))
+    monitor = Monitor(ship, Parameters(**parameters), estimate=None)
     monitor.update(Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed))
     return monitor._memory.steadiness
 

@@ -59,9 +59,7 @@ def test_the_unit_exposes_little() -> None:
     assert float(found[1]) <= EXPOSED_AT_MOST
 
 
-def test_the_unit_and_the_container_give_arguments_that_there_are(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_unit_and_the_container_give_arguments_that_there_are(capsys) -> None:
     (line,) = of_unit('ExecStart')
     container = (DEPLOY / 'Containerfile').read_text().replace('\\\n', ' ')
     command = re.search(r'^CMD (\[.*\])$', container, flags=re.MULTILINE)

@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from tests.runs import CARGO as SHIP
@@ -31,3 +35,11 @@ def cargo_fixture() -> Ship:
     Return the ship of the reference experiment.
     """
     return SHIP
+
+
+@pytest.fixture(scope='package')
+def in_a_current() -> DiagnosisResult:
+    """A run with a current, that the ship file does not have."""
+    run = coasted('current=0.4', name='<outward>', lead_in_s=1800.0, coast_s=1500.0)
+    found = diagnose([run], SHIP, Parameters())
+    return replace(found, estimates=(estimate_final(run.window, SHIP, Parameters()),))

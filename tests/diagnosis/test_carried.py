@@ -215,9 +215,7 @@ def alone(fouled: CoastRun) -> DiagnosisResult:
     return diagnosed(fouled)
 
 
-def test_an_earlier_diagnosis_names_what_one_run_leaves_open(
-    fouled: CoastRun, alone: DiagnosisResult
-) -> None:
+def test_an_earlier_diagnosis_names_what_one_run_leaves_open(fouled, alone):
     told = diagnosed(fouled, earlier(fouling=0.98))
     assert alone.verdict == 'one_of'
     assert alone.earlier == ()
@@ -237,9 +235,7 @@ def test_an_earlier_diagnosis_names_what_one_run_leaves_open(
     assert passed_on.last_ns == pytest.approx(NOW_NS + 1200 * 10**9, abs=20 * 10**9)
 
 
-def test_an_earlier_diagnosis_that_the_runs_contradict_is_said(
-    fouled: CoastRun, alone: DiagnosisResult
-) -> None:
+def test_an_earlier_diagnosis_that_the_runs_contradict_is_said(fouled, alone):
     told = diagnosed(fouled, earlier(log_scale=0.98))
     (effect,) = told.earlier[0].effects
     assert effect.contradicted
@@ -251,9 +247,7 @@ def test_an_earlier_diagnosis_that_the_runs_contradict_is_said(
     assert math.log(after / before) > -0.3
 
 
-def test_an_earlier_size_that_the_runs_contradict_is_said(
-    fouled: CoastRun, alone: DiagnosisResult
-) -> None:
+def test_an_earlier_size_that_the_runs_contradict_is_said(fouled, alone):
     wrong = EarlierCandidate(0.98, {'fouling': {'friction_factor': Parameter(1.2, 0.04)}})
     told = diagnosed(fouled, replace(earlier(), candidates=(wrong,)))
     (effect,) = told.earlier[0].effects

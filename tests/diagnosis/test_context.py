@@ -29,9 +29,7 @@ _TIMES = np.arange(0.0, 5610.0, 10.0)
 
 
 @pytest.mark.parametrize(('gain', 'turned_rad'), [(1.05, 0.0), (1.0, 0.05)])
-def test_an_anemometer_that_is_wrong_by_its_sd_is_no_other_speed(
-    cargo: Ship, gain: float, turned_rad: float
-) -> None:
+def test_an_anemometer_that_is_wrong_by_its_sd_is_no_other_speed(cargo, gain, turned_rad):
     scenario = Scenario(speed_m_s=8.0, lead_in_s=600.0, duration_s=1200.0, heading_rad=0.7)
     inputs = ('speed_through_water', 'wind_apparent')
     block = sense(simulate(cargo, scenario), standard_sensors(inputs=inputs), seed=3)

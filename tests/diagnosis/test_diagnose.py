@@ -77,22 +77,13 @@ def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
     assert found.held_out_after.chi2_per_sample < 1.5
 
 
-@pytest.mark.parametrize(
-    ('effect', 'name', 'parameter', 'value'),
-    [
-        ('current=0.3', 'current', 'along_track_m_s', 0.3),
-        ('log_scale=0.1', 'log_scale', 'factor', 0.1),
-    ],
-)
-def test_what_is_hidden_is_named_and_then_no_longer_missing(
-    effect: str, name: str, parameter: str, value: float
-) -> None:
-    runs = [run(effect, seed=1), run(effect, heading_rad=0.3 + 3.14159, seed=2)]
+def test_what_is_hidden_is_named_and_then_no_longer_missing() -> None:
+    runs = [run('log_scale=0.1'), run('log_scale=0.1', heading_rad=0.3 + 3.14159, seed=2)]
     found = diagnose(runs, SHIP, PARAMETERS)
     assert found.verdict is Verdict.NAMED
-    assert [each.name for each in found.effects] == [name]
-    size = found.effects[0].parameters[parameter]
-    assert abs(size.value - value) < 3.0 * size.sd
+    assert [each.name for each in found.effects] == ['log_scale']
+    size = found.effects[0].parameters['factor']
+    assert abs(size.value - 0.1) < 3.0 * size.sd
     assert found.after is not None
     assert found.held_out_after is not None
     assert found.after.chi2_per_sample < 0.5 * found.before.chi2_per_sample

@@ -35,9 +35,7 @@ def seen(cargo: Ship) -> tuple[Observation, ...]:
     return tuple(Observation.of(run.window, cargo, Parameters(), name=run.name) for run in runs)
 
 
-def test_a_held_out_run_is_judged_by_what_the_other_shows(
-    seen: tuple[Observation, ...], cargo: Ship
-) -> None:
+def test_a_held_out_run_is_judged_by_what_the_other_shows(seen, cargo):
     comparing = Comparing(ship_runs(seen, cargo), cargo, ())
     nothing = comparing.fit_nothing()
     assert nothing.tables is not None

@@ -182,9 +182,7 @@ def test_radar_may_be_wrong_where_the_positions_are_not_of_the_globe() -> None:
     ],
     ids=['one course', 'courses unknown'],
 )
-def test_without_turns_a_current_and_an_offset_are_not_told_apart(
-    sailing: Sailing, other: str
-) -> None:
+def test_without_turns_a_current_and_an_offset_are_not_told_apart(sailing, other):
     found = found_in(sailing)
     assert found.verdict is Verdict.ONE_OF
     assert {'current', 'log_offset'} <= {name for each in found.candidates for name in each.names}

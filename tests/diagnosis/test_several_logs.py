@@ -14,16 +14,13 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 
 FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2
 
 
 @pytest.mark.parametrize('first_heard', [True, False])
-def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(
-    cargo: Ship, first_heard: bool
-) -> None:
+def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo, first_heard):
     scenario = Scenario(speed_m_s=8.0, lead_in_s=900.0, duration_s=900.0)
     inputs = ('speed_through_water', 'speed_through_water_2', 'position')
     block = sense(simulate(cargo, scenario), standard_sensors(inputs=inputs), seed=5)

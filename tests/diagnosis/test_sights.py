@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,9 +23,7 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 
 
-def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(
-    seen_of: Callable[..., Observation], cargo: Ship
-) -> None:
+def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(seen_of, cargo):
     fast = seen_of()
     slow = replace(fast, name='slow', speed_m_s=0.5 * fast.speed_m_s)
     alone, beside = (sight(slow, seen, cargo).model for seen in ([slow], [fast, slow]))
@@ -73,9 +70,7 @@ def window_of(
         'early',
     ],
 )
-def test_nothing_is_missing_whatever_is_measured_and_whoever_dates_the_stop(
-    cargo: Ship, inputs: tuple[str, ...], how: dict[str, Any]
-) -> None:
+def test_nothing_is_missing_whatever_is_measured_and_whoever_dates_the_stop(cargo, inputs, how):
     window = window_of(cargo, *inputs, **how)
     found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
     assert {each.names: each.probability for each in found.candidates}[NONE] > 0.6

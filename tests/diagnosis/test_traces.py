@@ -8,32 +8,19 @@ import math
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.parameters import Parameters
-from tests.runs import CARGO as SHIP
-from tests.runs import coasted
 
-LEAD_IN_S, COAST_S, CURRENT_M_S = 1800.0, 1500.0, 0.3
+LEAD_IN_S, COAST_S, CURRENT_M_S = 1800.0, 1500.0, 0.4  # of the run
 
 
-@pytest.fixture(scope='module')
-def found() -> DiagnosisResult:
-    """A run into which a current is put."""
-    run = coasted(
-        f'current={CURRENT_M_S}',
-        name='at sea',
-        lead_in_s=LEAD_IN_S,
-        coast_s=COAST_S,
-        heading_rad=0.3,
-        reference_rad=0.3,
-    )
-    return diagnose([run], SHIP, Parameters())
+@pytest.fixture
+def found(in_a_current: DiagnosisResult) -> DiagnosisResult:
+    return in_a_current
 
 
 def test_each_quantity_is_held_against_the_model(found: DiagnosisResult) -> None:
     (trace,) = found.traces
-    assert trace.name == 'at sea'
+    assert trace.name == '<outward>'
     assert trace.lead_in_s == pytest.approx(LEAD_IN_S, abs=60.0)
     names = [each.quantity for each in trace.compared]
     assert names == ['speed_through_water', 'position', 'position_across']

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +12,10 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
+from tests.runs import CARGO as SHIP
 
-SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 PARAMETERS = Parameters()
 STOP_NS = START_NS + 900 * 10**9
 
@@ -46,9 +44,7 @@ def test_the_band_holds_the_truth_where_the_log_is_doubted_and_it_is_said(window
     assert away(0.7) < 2.0
 
 
-def test_the_parts_of_sigma_still_make_sigma_and_the_speeds_are_those_of_both(
-    window: Window,
-) -> None:
+def test_the_parts_of_sigma_still_make_sigma_and_the_speeds_are_those_of_both(window):
     found = averaged(estimate_final)(replace(window, log_doubt=0.4), SHIP, PARAMETERS)
     squares = sum(np.square(part) for part in found.sigma_parts.values())
     assert np.sqrt(squares) == pytest.approx(found.calm.sigma_m_s2, rel=0.05)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import numpy as np
 import pytest
 
@@ -12,10 +10,9 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.scenario import GaussMarkov
+from tests.runs import CARGO as SHIP
 
-SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
 DRAG_1_M = 3e-4  # v' = -DRAG v^2
 
 

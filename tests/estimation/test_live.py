@@ -158,14 +158,7 @@ def test_noise_that_is_slow_widens_the_band(coast: Any, ship: Ship) -> None:
         ((Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND, Channel.POSITION), 0.02, True),
     ],
 )
-def test_every_set_of_inputs_serves(
-    coast: Any,
-    ship: Ship,
-    channels: tuple[Channel, ...],
-    bound: float,
-    current: bool,
-    estimator: Estimator,
-) -> None:
+def test_every_set_of_inputs_serves(coast, ship, channels, bound, current, estimator):
     block = with_current(coast.block(500), 0.3)
     if channels == (Channel.POSITION,):
         block = coast.block(500)

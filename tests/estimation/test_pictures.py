@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation import pictures
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.report import drawing
 from shipdrag_ros.ship import Ship, TableBaseline
 
@@ -61,9 +60,7 @@ def test_orders_are_shown_for_each_input_and_the_joint_problem(estimate: Estimat
     assert len(figure.axes[0].get_lines()) == 1
 
 
-def test_the_curve_has_its_band_range_scales_and_truth(
-    estimate: Estimate, ship: Ship, truth: TrueCurve
-) -> None:
+def test_the_curve_has_its_band_range_scales_and_truth(estimate, ship, truth):
     known = (truth.speed_m_s, truth.resistance_m_s2)
     axis = pictures.resistance_picture(estimate, ship, truth=known).axes[0]
     curve, kilo = estimate.valid_curve, ship.mass_kg / 1000.0

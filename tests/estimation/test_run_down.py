@@ -96,9 +96,7 @@ def test_the_pitch_of_a_propeller_dates_the_stop_where_the_shaft_goes_on() -> No
         (0.6 * SPEED / 8.0 * 12.0, 'as the water turns it'),
     ],
 )
-def test_without_a_record_before_it_the_window_tells_what_the_shaft_shows(
-    shaft: Float64, says: str
-) -> None:
+def test_without_a_record_before_it_the_window_tells_what_the_shaft_shows(shaft, says):
     window = cut(
         series(Channel.SHAFT, TIME, shaft),
         series(Channel.SPEED_THROUGH_WATER, TIME, SPEED),

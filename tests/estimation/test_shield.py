@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-from importlib.resources import files
 
 import pytest
 
@@ -17,17 +16,14 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
-
-SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
+from tests.runs import CARGO as SHIP
 
 
 def _broken(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     raise ZeroDivisionError('division by zero')
 
 
-def test_the_monitor_raises_nothing_and_says_what_failed(
-    caplog: pytest.LogCaptureFixture, defects: set[tuple[str, int]]
-) -> None:
+def test_the_monitor_raises_nothing_and_says_what_failed(caplog, defects):
     block = sense(
         simulate(SHIP, Scenario(speed_m_s=6.0, duration_s=900.0)), standard_sensors(), seed=1
     )
@@ -52,9 +48,7 @@ def test_errors_with_words_keep_them() -> None:
         shielded(refuses)(None, SHIP, Parameters())  # type: ignore[arg-type]
 
 
-def test_a_forecast_that_fails_costs_the_forecast_alone(
-    caplog: pytest.LogCaptureFixture, defects: set[tuple[str, int]]
-) -> None:
+def test_a_forecast_that_fails_costs_the_forecast_alone(caplog, defects):
     block = sense(
         simulate(SHIP, Scenario(speed_m_s=6.0, duration_s=900.0)), standard_sensors(), seed=1
     )

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -18,8 +17,8 @@ from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.ship.facts import parse_fact
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from tests.runs import CARGO as SHIP
 
-SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
 BARE = replace(SHIP, baseline=None)
 SPEEDS = np.array([3.0, 5.0, 7.0])
 WINDS = ((6.0, 0.0), (-6.0, 2.0), (0.0, 6.0), (4.0, -4.0))  # from ahead, from port [m/s]

@@ -147,9 +147,7 @@ def test_a_ship_that_drifts_astern_is_told(estimate: Estimate) -> None:
         ('one', None, False),
     ],
 )
-def test_a_constant_r_is_told_to_be_a_mean(
-    estimate: Estimate, estimator: str, order: int | None, told: bool
-) -> None:
+def test_a_constant_r_is_told_to_be_a_mean(estimate, estimator, order, told):
     other = replace(estimate, estimator=estimator, order=order)
     notes = words.notes(other)
     assert any('its mean, not its shape' in note for note in notes) is told

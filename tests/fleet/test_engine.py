@@ -70,9 +70,7 @@ def silent(text: str, done: int, total: int) -> None:
     """Take progress and say nothing."""
 
 
-def test_the_verb_from_bags_to_rows_and_again(
-    fleet_folder: Path, tmp_path: Path, engine: Engine, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_verb_from_bags_to_rows_and_again(fleet_folder, tmp_path, engine, capsys):
     store, result = tmp_path / 'store', tmp_path / 'result.json'
     line = ['fleet', str(fleet_folder), '-o', str(store)]
     assert main([*line, '--workers', '1', '--json', str(result)]) == 1  # some bags were skipped
@@ -141,9 +139,7 @@ def test_a_worker_that_dies_again_while_it_starts_is_waited_for(engine: Engine) 
     assert parse_timedelta(dask.config.get('distributed.deploy.lost-worker-timeout')) > 600.0
 
 
-def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
-    bags: list[Path], tmp_path: Path, engine: Engine
-) -> None:
+def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(bags, tmp_path, engine):
     folder, store = tmp_path / 'fleet', Store(tmp_path / 'store')
     folder.mkdir()
     for number in (1, 2):
@@ -165,9 +161,7 @@ def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
     )
 
 
-def test_a_run_is_counted_once_however_often_it_was_copied(
-    bags: list[Path], tmp_path: Path, engine: Engine
-) -> None:
+def test_a_run_is_counted_once_however_often_it_was_copied(bags, tmp_path, engine):
     """A folder under another name, a copy without its run file, and half of a bag."""
     folder, store = tmp_path / 'fleet', Store(tmp_path / 'store')
     for name in ('a copy', 'ship'):
@@ -193,9 +187,7 @@ def test_a_run_is_counted_once_however_often_it_was_copied(
 
 
 @pytest.mark.parametrize('place', ['tcp://127.0.0.1:9', 'nonsense', 'http://127.0.0.1:8786'])
-def test_a_scheduler_that_cannot_be_reached_is_told(
-    place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_cannot_be_reached_is_told(place: str, monkeypatch) -> None:
     monkeypatch.setattr('shipdrag_ros.fleet.engine._REACHED_S', 0.5)
     start_s = time.monotonic()
     with pytest.raises(FleetError, match='cannot be reached'), Engine(scheduler=place):
@@ -233,17 +225,13 @@ def test_what_is_no_scheduler_is_told(says: bytes, monkeypatch: pytest.MonkeyPat
         assert not thread.is_alive()
 
 
-def test_a_folder_without_a_bag_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_a_bag_is_told(tmp_path, capsys) -> None:
     (tmp_path / 'empty').mkdir()
     assert main(['fleet', str(tmp_path / 'empty'), '-o', str(tmp_path / 'store')]) == 1
     assert 'no bag lies below' in capsys.readouterr().err
 
 
-def test_that_no_worker_is_left_is_an_error_and_no_wait_for_ever(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_that_no_worker_is_left_is_an_error_and_no_wait_for_ever(monkeypatch) -> None:
     monkeypatch.setattr('shipdrag_ros.fleet.engine._LOOK_S', 1.0)
     with Engine(workers=1) as lonely:
         assert lonely._client is not None

@@ -87,9 +87,7 @@ def test_the_run_file_says_how_she_was(bags: list[Path], tmp_path: Path) -> None
     assert 20200 / 18700 < ratio < 1.05 * 20200 / 18700
 
 
-def test_a_ship_file_beside_speaks_for_its_own_ship_alone(
-    bags: list[Path], tmp_path: Path
-) -> None:
+def test_a_ship_file_beside_speaks_for_its_own_ship_alone(bags: list[Path], tmp_path) -> None:
     shutil.copy(bags[1], tmp_path / 'a.mcap')
     beside = SHIP.read_text().replace('form_factor: 0.20', 'form_factor: 0.30')
     (tmp_path / 'ship.yaml').write_text(beside)
@@ -136,9 +134,7 @@ def test_a_log_and_a_table_are_read_without_options(tmp_path: Path) -> None:
         ('a.bag', b'#ROSBAG V2.0\n', 'a.bag'),
     ],
 )
-def test_what_cannot_be_read_says_why_and_not_where(
-    tmp_path: Path, name: str, content: bytes, why: str
-) -> None:
+def test_what_cannot_be_read_says_why_and_not_where(tmp_path, name, content, why):
     (tmp_path / name).write_bytes(content)
     result = done(tmp_path / name)
     assert result.coastdowns == ()

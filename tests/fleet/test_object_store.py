@@ -47,9 +47,7 @@ def bucket(bags: list[Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     s3fs.S3FileSystem.clear_instance_cache()
 
 
-def test_bags_are_found_and_give_the_rows_of_local_ones(
-    bucket: str, bags: list[Path], tmp_path: Path
-) -> None:
+def test_bags_are_found_and_give_the_rows_of_local_ones(bucket, bags, tmp_path):
     sources = find([bucket]).sources
     assert [source.bag for source in sources] == [
         'empty.mcap',

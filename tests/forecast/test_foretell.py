@@ -55,9 +55,7 @@ def early(window: Window, ship: Ship) -> Estimate:
 
 
 @pytest.mark.parametrize('estimator', ['one', 's1_joint'])
-def test_it_comes_as_it_was_foretold(
-    window: Window, truth: Truth, ship: Ship, estimator: str
-) -> None:
+def test_it_comes_as_it_was_foretold(window, truth, ship, estimator):
     found = foretell(after(window, 600.0, ship, estimator), ship, froude_min=0.05)
     gliding = truth.time_s >= LEAD_IN_S
     time_s = truth.time_s[gliding] - LEAD_IN_S - 600.0
@@ -213,9 +211,7 @@ def test_it_takes_less_than_five_milliseconds(early: Estimate, ship: Ship) -> No
     assert np.median(spent) < 5e-3
 
 
-def test_what_followed_is_read_from_the_instruments(
-    window: Window, truth: Truth, early: Estimate, ship: Ship
-) -> None:
+def test_what_followed_is_read_from_the_instruments(window, truth, early, ship):
     whole = estimate(window, ship, Parameters(estimator='one'))
     checked = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
     gliding = truth.time_s >= LEAD_IN_S
@@ -259,9 +255,7 @@ def test_words(early: Estimate, ship: Ship) -> None:
 
 
 @pytest.mark.parametrize('kind', ['speed_through_water', 'position'])
-def test_the_second_of_a_kind_alone_is_foretold_and_followed(
-    window: Window, ship: Ship, kind: str
-) -> None:
+def test_the_second_of_a_kind_alone_is_foretold_and_followed(window, ship, kind):
     one, why = replace(window, before=None), 'it is not there'
     for other in sorted({*MOTION_INPUTS} - {kind}):
         one = one.without(other, why)

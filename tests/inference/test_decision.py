@@ -15,7 +15,6 @@ from shipdrag_ros.inference.decision import (
     LISTED,
     NONE,
     UNKNOWN,
-    Names,
     Verdict,
     WeighedHypothesis,
     decide,
@@ -78,9 +77,7 @@ def test_every_decision_follows_from_the_probabilities(ways: list[WeighedHypothe
 
 
 @given(st.lists(WAYS, min_size=1, max_size=5), st.sampled_from([(), [frozenset('ab')]]))
-def test_many_probabilities_at_once_name_where_one_decision_does(
-    several: list[list[WeighedHypothesis]], inseparable: list[frozenset[str]]
-) -> None:
+def test_many_probabilities_at_once_name_where_one_decision_does(several, inseparable):
     each = [probabilities(ways) for ways in several]
     sums = [p for one in each for p in marginals(one).values()]
     assume(all(abs(p - CERTAIN) > 1e-9 for p in sums))
@@ -103,9 +100,7 @@ def test_many_probabilities_at_once_name_where_one_decision_does(
         ({UNKNOWN: 0.49, A: 0.51}, Verdict.ONE_OF, []),
     ],
 )
-def test_where_the_line_is(
-    probability: dict[Names, float], verdict: Verdict, named: list[str]
-) -> None:
+def test_where_the_line_is(probability, verdict, named):
     found = decide(probability)
     assert (found.verdict, sorted(found.effects)) == (verdict, named)
 

@@ -58,9 +58,7 @@ def test_the_limit_of_a_size_is_the_quantile_of_its_distribution() -> None:
 
 @pytest.mark.parametrize('power', [1.0, -1.8])
 @pytest.mark.parametrize('reading', [0.02, 0.1, 0.4])
-def test_the_limit_of_a_log_normal_size_is_that_of_its_posterior_on_a_grid(
-    power: float, reading: float
-) -> None:
+def test_the_limit_of_a_log_normal_size_is_that_of_its_posterior_on_a_grid(power, reading):
     # the reading of a trace that is the size to a power, with noise of 0.1
     prior, noise = log_normal(0.25, 0.6), 0.1
     z = np.linspace(-8.0, 8.0, 200_001)

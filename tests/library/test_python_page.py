@@ -14,9 +14,7 @@ PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'python.md'
 
 
 @pytest.mark.timeout(600)  # on a machine where nothing is compiled yet
-def test_the_blocks_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_blocks_run(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text(encoding='utf-8')
     blocks = re.findall(r'^```python\n([\s\S]*?)^```', text, flags=re.MULTILINE)

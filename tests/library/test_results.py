@@ -25,9 +25,7 @@ def diagnosis(record: sd.Record) -> sd.Diagnosis:
     return sd.diagnose(record)
 
 
-def test_each_says_in_a_line_what_it_is(
-    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
-) -> None:
+def test_each_says_in_a_line_what_it_is(record, found, diagnosis):
     assert repr(record) == '<Record: Vitus Bering, 1 run, 5204 messages>'
     assert repr(found).startswith('<Resistance: Vitus Bering, 1 coastdown; ')
     assert 'kN at' in repr(found)
@@ -35,9 +33,7 @@ def test_each_says_in_a_line_what_it_is(
     assert repr(diagnosis).startswith('<Diagnosis: Vitus Bering, named: log scale (')
 
 
-def test_a_notebook_shows_text_and_a_table_and_nothing_else(
-    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
-) -> None:
+def test_a_notebook_shows_text_and_a_table_and_nothing_else(record, found, diagnosis):
     for each in (record, found, found.coastdowns[0], diagnosis):
         page = each._repr_html_()
         assert page.count('<table>') == page.count('</table>') == 1
@@ -47,9 +43,7 @@ def test_a_notebook_shows_text_and_a_table_and_nothing_else(
     assert '&lt;b&gt;' in named._repr_html_()
 
 
-def test_a_summary_is_a_text_that_prints(
-    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
-) -> None:
+def test_a_summary_is_a_text_that_prints(record, found, diagnosis):
     for each in (record, found, found.coastdowns[0], diagnosis):
         text = each.summary()
         assert isinstance(text, str)
@@ -58,9 +52,7 @@ def test_a_summary_is_a_text_that_prints(
         assert text._repr_html_().count('<p>') == len(text.splitlines())
 
 
-def test_nothing_that_a_result_holds_fills_a_screen(
-    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
-) -> None:
+def test_nothing_that_a_result_holds_fills_a_screen(record, found, diagnosis):
     (coastdown,) = found.coastdowns
     parts = (found.curve, coastdown.event, coastdown.estimate, coastdown.run, record.truth)
     for each in (*parts, diagnosis.found, found.ship, record.samples()):
@@ -94,17 +86,13 @@ def test_the_frame_is_the_curve(found: sd.Resistance) -> None:
     assert len(found.coastdowns[0].to_frame()) == len(frame)
 
 
-def test_without_pandas_the_frame_says_what_is_missing(
-    found: sd.Resistance, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_pandas_the_frame_says_what_is_missing(found: sd.Resistance, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, 'pandas', None)
     with pytest.raises(sd.ShipdragError, match='pip install pandas'):
         found.to_frame()
 
 
-def test_plots_are_drawn_on_the_axes_given(
-    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
-) -> None:
+def test_plots_are_drawn_on_the_axes_given(record, found, diagnosis):
     figure, axes = plt.subplots(1, 3)
     try:
         for ax, each in zip(axes, (record, found, diagnosis)):

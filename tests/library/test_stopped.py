@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -23,9 +21,7 @@ STAMPS = 10**18 + np.arange(300) * 10**9
         (Channel.SPEED_OVER_GROUND_3, 'over ground'),
     ],
 )
-def test_the_second_of_a_kind_shows_the_present_speed(
-    tmp_path: Path, channel: Channel, measured: str
-) -> None:
+def test_the_second_of_a_kind_shows_the_present_speed(tmp_path, channel, measured):
     speed = 6.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     path = write_run(tmp_path / 'a.mcap', Block.of(channel, STAMPS, speed), Ship.example())
     found = sd.estimate(sd.read(path)).if_stopped_now()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.diagnosis import diagnose
@@ -26,6 +26,7 @@ from shipdrag_ros.replay.coasts import dismissed_glides, whole_window
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS
+from tests.runs import write_run
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SHIP = Ship.load(SHIP_FILE)
@@ -76,17 +77,8 @@ def sailed(path: Path, force: Force) -> Path:
     def block(channel: Channel, value: np.ndarray) -> Block:
         return Block.of(channel, stamps, value, receive_ns=stamps + 10**7)
 
-    with BagWriter(path) as writer:
-        writer.attach('ship.yaml', SHIP_FILE.read_text(encoding='utf-8'))
-        writer.write_samples(
-            in_arrival_order(
-                [
-                    block(Channel.SPEED_THROUGH_WATER, speed + rng.normal(0.0, 0.03, len(speed))),
-                    block(Channel.POSITION, fixes),
-                ]
-            )
-        )
-    return path
+    log = block(Channel.SPEED_THROUGH_WATER, speed + rng.normal(0.0, 0.03, len(speed)))
+    return write_run(path, in_arrival_order([log, block(Channel.POSITION, fixes)]), SHIP)
 
 
 def diagnosed(path: Path, force: Force, window: str = '') -> dict[str, Any]:
@@ -112,9 +104,7 @@ def test_a_glide_that_was_dismissed_is_something(tmp_path: Path) -> None:
     assert 'lost speed without thrust' in ' '.join(found['notes'])
 
 
-def test_a_bag_without_a_coastdown_is_told_of_beside_a_glide_with_more_in_it(
-    tmp_path: Path,
-) -> None:
+def test_a_bag_without_a_coastdown_is_told_of_beside_a_glide_with_more_in_it(tmp_path) -> None:
     bags = [sailed(tmp_path / f'{force.__name__}.mcap', force) for force in (belt_of_ice, tug)]
     answer = tmp_path / 'answer.json'
     assert main(['diagnose', *map(str, bags), '--json', str(answer)]) == 0
@@ -123,9 +113,7 @@ def test_a_bag_without_a_coastdown_is_told_of_beside_a_glide_with_more_in_it(
     assert f"no coastdown was found in '{bags[1]}'" in notes
 
 
-def test_without_a_baseline_no_glide_is_held_against_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_without_a_baseline_no_glide_is_held_against_one(tmp_path, capsys) -> None:
     bag, ship = sailed(tmp_path / 'run.mcap', tug), tmp_path / 'bare.yaml'
     ship.write_text('name: bare\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
     assert main(['diagnose', str(bag), '--ship', str(ship)]) == 0
@@ -185,9 +173,7 @@ def test_the_fleet_sees_the_whole_glide_as_the_verb_does(tmp_path: Path) -> None
     assert 'all of each glide is compared with the model' in said
 
 
-def test_the_fleet_says_of_a_glide_that_gives_no_row_what_it_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fleet_says_of_a_glide_that_gives_no_row_what_it_shows(tmp_path, monkeypatch) -> None:
     def refuse(*args: Any, **options: Any) -> Any:
         raise ShipdragError('asked for nan')
 
@@ -198,9 +184,7 @@ def test_the_fleet_says_of_a_glide_that_gives_no_row_what_it_shows(
     assert 'All of it compared with the model: it could not be: asked for nan' in said
 
 
-def test_an_earlier_diagnosis_of_another_ship_is_refused_in_its_own_words(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_earlier_diagnosis_of_another_ship_is_refused_in_its_own_words(tmp_path, capsys):
     bag, earlier = sailed(tmp_path / 'run.mcap', tug), tmp_path / 'earlier.json'
     document = {
         'ship': {'name': 'Another', 'length_m': 90.0, 'effects': []},

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import pytest
 
@@ -113,9 +113,7 @@ class Process:
 
 
 @pytest.fixture
-def start(
-    tmp_path: Path, own_domain: Callable[[], tuple[int, TextIO]]
-) -> Iterator[Callable[..., Process]]:
+def start(tmp_path, own_domain):
     """A function that starts a module of the package on a domain of this test's own."""
     domain, lock = own_domain()
     started: list[Process] = []

@@ -39,9 +39,7 @@ class Reader:
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.booleans(), st.booleans()), max_size=200))
-def test_a_reader_who_reads_at_any_time_has_the_picture(
-    steps: list[tuple[int, bool, bool]],
-) -> None:
+def test_a_reader_who_reads_at_any_time_has_the_picture(steps):
     rows: list[list[int]] = []
     frames = Frames(lambda: rows)
     reader, slow = Reader(), Reader()

@@ -9,6 +9,7 @@ import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return found
 
 
+@cache
 def timeline_of(bag: Path) -> Timeline:
     (run,) = open_runs([bag])
     timeline = Timeline(run, Ship.load(SHIP), Parameters())
@@ -357,9 +359,7 @@ def test_the_checklist_shows_what_it_compares(check: Check, text: str) -> None:
     assert check.text == text
 
 
-def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(
-    bags: list[Path], tmp_path: Path
-) -> None:
+def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(bags, tmp_path):
     (tmp_path / 'broken.mcap').write_bytes(b'no bag')
     (tmp_path / 'out.mcap').write_bytes(bags[0].read_bytes())
     found = list(recorded_runs(tmp_path))
@@ -373,19 +373,6 @@ def test_a_folder_that_the_node_has_yet_to_make_is_told(tmp_path: Path) -> None:
     (told,) = recorded_runs(tmp_path / 'records')
     assert isinstance(told, str)
     assert 'records: there is no such folder so far' in told
-
-
-def test_a_verdict_whose_document_is_on_its_way_has_every_part() -> None:
-    bridge = Bridge(Ship.load(SHIP))
-    bridge.show_verdict('done', 'Nothing is missing.')
-    found = bridge.parts(0.0)['verdict']
-    assert found == {
-        'state': 'done',
-        'sentence': 'Nothing is missing.',
-        'sizes': [],
-        'probabilities': [],
-        'decide': [],
-    }
 
 
 def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:

@@ -69,9 +69,7 @@ def test_it_answers_to_its_own_names_only(open_page: str, host: str, status: int
         ({}, 400),  # let in; and told that there is nothing to play
     ],
 )
-def test_another_page_cannot_press_the_buttons(
-    open_page: str, headers: dict[str, str], status: int
-) -> None:
+def test_another_page_cannot_press_the_buttons(open_page, headers, status):
     body = json.dumps({'action': 'play'})
     assert post(f'{open_page}player', content=body, headers=headers).status_code == status
 
@@ -128,9 +126,7 @@ POST = b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000\r\n\r\n
 
 @pytest.mark.parametrize('beginning', [b'', HEAD, POST], ids=['silent', 'header', 'body'])
 @pytest.mark.parametrize('drips', [False, True])
-def test_who_never_asks_holds_no_place(
-    serving: Any, monkeypatch: pytest.MonkeyPatch, beginning: bytes, drips: bool
-) -> None:
+def test_who_never_asks_holds_no_place(serving, monkeypatch, beginning, drips):
     monkeypatch.setattr(serve, 'CONNECTIONS', 5)
     monkeypatch.setattr(serve, 'ASK_S', 1.5)
     with serving(LivePage(NodeSource(), token=TOKEN)) as url:
@@ -178,9 +174,7 @@ def test_more_viewers_than_places_are_told(serving: Any, monkeypatch: pytest.Mon
             each.close()
 
 
-def test_many_who_come_at_once_are_all_answered(
-    serving: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_many_who_come_at_once_are_all_answered(serving: Any, monkeypatch) -> None:
     """Their requests are there before the first of them is read."""
     monkeypatch.setattr(serve, 'CONNECTIONS', 5)
     with serving(LivePage(NodeSource())) as url:
@@ -195,9 +189,7 @@ def test_many_who_come_at_once_are_all_answered(
     assert answers.count(b'200') == 5
 
 
-def test_a_reader_who_reads_nothing_is_let_go(
-    serving: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_who_reads_nothing_is_let_go(serving: Any, monkeypatch) -> None:
     monkeypatch.setattr(serve, 'STUCK_S', 0.5)
     source = NodeSource()
     page = LivePage(source)

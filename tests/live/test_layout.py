@@ -84,9 +84,7 @@ def health(level: int, text: str) -> Health:
         (STALE, 'no data for 431 s; the clock of the sensor is 12.3 s behind'),
     ],
 )
-def test_before_there_is_anything_to_show(
-    serving: Any, view: Any, level: int | None, text: str
-) -> None:
+def test_before_there_is_anything_to_show(serving, view, level, text):
     source = NodeSource()
     with serving(LivePage(source)) as url:
         if level is not None:

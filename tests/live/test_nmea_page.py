@@ -65,9 +65,7 @@ def checklist(viewer: Any) -> dict[str, str]:
     return {row.query_selector('b').inner_text(): row.inner_text() for row in rows}
 
 
-def test_what_instruments_say_by_nmea_is_what_a_mate_reads(
-    start: Any, view: Any, talker: Talker, tmp_path: Path
-) -> None:
+def test_what_instruments_say_by_nmea_is_what_a_mate_reads(start, view, talker, tmp_path):
     parameters = {
         'ship_file': str(SHIP),
         'output_directory': str(tmp_path / 'bags'),

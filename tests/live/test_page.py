@@ -45,9 +45,7 @@ def violations(page: Any) -> list[str]:
     ]
 
 
-def test_a_coastdown_over_topics_from_steady_to_verdict(
-    start: Any, view: Any, tmp_path: Path
-) -> None:
+def test_a_coastdown_over_topics_from_steady_to_verdict(start: Any, view: Any, tmp_path) -> None:
     pytest.importorskip('rclpy')
     from shipdrag_ros.node.spectator import Rehearsal
     from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors

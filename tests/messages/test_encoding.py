@@ -38,13 +38,7 @@ def decoded_again(block: Block) -> Block:
     value=st.tuples(st.floats(0.0, 40.0, width=32), st.floats(-90.0, 90.0)),
     variance=st.tuples(st.floats(1e-9, 1e3), st.floats(1e-9, 1e3)),
 )
-def test_round_trip(
-    channel: Channel,
-    stamp_ns: int,
-    delay_ns: int,
-    value: tuple[float, float],
-    variance: tuple[float, float],
-) -> None:
+def test_round_trip(channel, stamp_ns, delay_ns, value, variance):
     if channel is Channel.HEADING:
         value = (math.remainder(value[0], 2 * math.pi), 0.0)
     if channel not in TWO_COLUMNS:

@@ -181,9 +181,7 @@ def test_a_pitch_alone_is_read() -> None:
 @given(
     names=joint_names, velocity=numbers, position=numbers, stamp_ns=stamps, little=st.booleans()
 )
-def test_samples_of_a_message_are_those_of_the_rule(
-    names: list[str], velocity: list[float], position: list[float], stamp_ns: int, little: bool
-) -> None:
+def test_samples_of_a_message_are_those_of_the_rule(names, velocity, position, stamp_ns, little):
     sent = message(reference, names, velocity, position, stamp_ns=stamp_ns)
     payload = reference.serialize(types.JOINT_STATE, sent, little_endian=little)
     found, surplus = expected(sent)
@@ -207,9 +205,7 @@ def test_samples_of_a_message_are_those_of_the_rule(
         max_size=20,
     )
 )
-def test_a_batch_of_several_sources_gives_the_bits_of_single_messages(
-    rows: list[tuple[list[str], list[float], list[float], int, bool]],
-) -> None:
+def test_a_batch_of_several_sources_gives_the_bits_of_single_messages(rows):
     sources = (SHAFT, RUDDER, POINT)
     payloads = []
     for i, (names, velocity, position, number, little) in enumerate(rows):
@@ -241,9 +237,7 @@ def test_a_batch_of_several_sources_gives_the_bits_of_single_messages(
 
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_broken_bytes_are_malformed_to_both_readers_and_spoil_no_neighbour(
-    data: st.DataObject,
-) -> None:
+def test_broken_bytes_are_malformed_to_both_readers_and_spoil_no_neighbour(data):
     names = data.draw(joint_names)
     good = reference.serialize(
         types.JOINT_STATE,

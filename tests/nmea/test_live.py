@@ -93,9 +93,7 @@ def test_a_group_that_cannot_be_joined_says_where() -> None:
         assert 'udp://239.192.0.1:60001@ADDRESS' in counts(heard).problem
 
 
-def test_a_flood_is_slowed_and_what_finds_no_room_is_counted(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_flood_is_slowed_and_what_finds_no_room_is_counted(monkeypatch) -> None:
     monkeypatch.setattr(live, 'WAITING_LINES', 40)
     monkeypatch.setattr(live, 'BURST_LINES', 50.0)
     port = free_port(socket.SOCK_DGRAM)

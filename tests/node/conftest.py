@@ -214,6 +214,10 @@ class Peer:
         return str(answer.current_state.label)
 
 
+def values(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
+
+
 class Diagnostics:
     """
     The latest status of each part of the node.
@@ -260,8 +264,7 @@ class Diagnostics:
             status = self.of(part)
             if status is None:
                 return None
-            values = {item.key: item.value for item in status.values}
-            there = text in status.message if value is None else values.get(value) == text
+            there = text in status.message if value is None else values(status).get(value) == text
             return status if there else None
 
         try:

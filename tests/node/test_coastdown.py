@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import EndedBy
@@ -18,6 +17,8 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, Truth, sense, simulate, standard_sensors
+from tests.node.conftest import values
+from tests.recorded import rows
 
 pytest.importorskip('rclpy')
 
@@ -68,12 +69,6 @@ def topics_of(peer: Any) -> dict[str, list[bytes]]:
     return heard
 
 
-def recorded(path: Path, topic: str) -> list[bytes]:
-    with path.open('rb') as stream:
-        messages = make_reader(stream).iter_messages(topics=[topic], log_time_order=False)
-        return [message.data for _, _, message in messages]
-
-
 def on_the_wire(payload: bytes) -> bytes:
     """DDS fills a message up to a multiple of four bytes."""
     return payload + bytes(-len(payload) % 4)
@@ -87,9 +82,7 @@ def assert_replayed(path: Path, *, at_least: int) -> Any:
     return result
 
 
-def test_live_figures_are_recorded_and_replayed(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_live_figures_are_recorded_and_replayed(start_node, peer, diagnostics, tmp_path):
     from geometry_msgs.msg import AccelWithCovarianceStamped, TwistWithCovarianceStamped
     from nav_msgs.msg import Path as Ahead
     from rclpy.serialization import deserialize_message
@@ -101,8 +94,7 @@ def test_live_figures_are_recorded_and_replayed(
     peer.player.connect(block)
     peer.player.play(block, speed=SPEED)
     diagnostics.wait_for('input heading', '0', value='rate [Hz]')  # all has been heard
-    status = diagnostics.of('estimate')
-    assert 'specific resistance [m/s^2]' in {item.key for item in status.values}
+    assert 'specific resistance [m/s^2]' in values(diagnostics.of('estimate'))
 
     late = peer.listen(
         '/coastdown_node/resistance_curve', TYPES['resistance_curve'], latched=True, raw=True
@@ -112,13 +104,13 @@ def test_live_figures_are_recorded_and_replayed(
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     names = ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path')
-    sent = {name: len(list(recorded(bag, f'/coastdown_node/{name}'))) for name in names}
+    sent = {name: len(rows(bag, f'/coastdown_node/{name}')) for name in names}
     peer.spin_until(lambda: all(len(heard[name]) >= sent[name] for name in names))
     peer.spin_until(lambda: read_event(heard['events'][-1]).kind is EventKind.COASTDOWN)
     for name in names:
         assert len(heard[name]) > 20
         assert heard[name] == [
-            on_the_wire(payload) for payload in recorded(bag, f'/coastdown_node/{name}')
+            on_the_wire(row.payload) for row in rows(bag, f'/coastdown_node/{name}')
         ]
     assert heard['resistance_curve'][-2] == late[0]
     *_, made, withdrawn = (deserialize_message(each, PointCloud2) for each in heard['forecast'])
@@ -156,9 +148,7 @@ def test_live_figures_are_recorded_and_replayed(
     assert [field.name for field in curve.fields] == ['speed', 'resistance', 'sigma', 'froude']
 
 
-def test_silence_ends_a_coastdown_by_the_clock(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_silence_ends_a_coastdown_by_the_clock(start_node, peer, diagnostics, tmp_path):
     node = start_node(**PARAMETERS, data_stop_s=8.0)
     block = record()
     peer.player.connect(block)
@@ -176,9 +166,7 @@ def test_silence_ends_a_coastdown_by_the_clock(
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.SILENCE]
 
 
-def test_recording_starts_mid_run_and_a_reset_is_replayed(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_recording_starts_mid_run_and_a_reset_is_replayed(start_node, peer, diagnostics, tmp_path):
     node = start_node(record=False, **PARAMETERS)
     block = record()
     peer.player.connect(block)

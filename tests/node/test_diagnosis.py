@@ -9,10 +9,8 @@ import time
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
@@ -30,6 +28,8 @@ from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
+from tests.node.conftest import values
+from tests.recorded import rows
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 LEAD_IN_S, COAST_S = 660.0, 660.0
@@ -49,10 +49,6 @@ def record(*effects: str) -> Block:
     block = sense(truth, standard_sensors(rate_hz=1.0, inputs=STANDARD_INPUTS), seed=1)
     silent_ns = int(block.receive_ns[0]) + round((LEAD_IN_S + COAST_S - 60.0) * 1e9)
     return block[(block.receive_ns < silent_ns) | (block.channel == Channel.HEADING)]
-
-
-def values_of(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
 
 
 @cache
@@ -79,24 +75,15 @@ def result_of(diagnosing: Diagnosing) -> DiagnosisStatus:
         ({}, SHIP_FILE, 'none yet', 'none yet'),
     ],
 )
-def test_node_says_whether_it_can_diagnose(
-    start_node: Any,
-    diagnostics: Any,
-    settings: dict[str, Any],
-    ship: Path,
-    state: str,
-    reason: str,
-) -> None:
+def test_node_says_whether_it_can_diagnose(start_node, diagnostics, settings, ship, state, reason):
     chosen = {} if ship is None else {'ship_file': str(ship)}
     start_node(**chosen, **settings, record=False)
     status = diagnostics.wait_for('diagnosis', reason)
-    assert values_of(status)['state'] == state
+    assert values(status)['state'] == state
     assert status.level == b'\x00'
 
 
-def test_node_names_what_is_missing_as_the_verb_does(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_node_names_what_is_missing_as_the_verb_does(start_node, peer, diagnostics, tmp_path):
     node = start_node(ship_file=str(SHIP_FILE), use_sim_time=True, **SETTINGS)
     block = record('current=0.5')
     peer.player.connect(block)
@@ -118,19 +105,16 @@ def test_node_names_what_is_missing_as_the_verb_does(
     found = diagnose([CoastRun('the coastdown', window)], result.ship, result.parameters)
     assert status.message == sentence(found)
     assert status.level == b'\x01'
-    assert values_of(status)['verdict'] == 'named'
+    assert values(status)['verdict'] == 'named'
     assert 'diagnosis: Missing in the model: current' in node.log
     # the document of the verb to the last digit, on the topic and in the bag
     expected = json.loads(json_text(document(found, result.ship)))
     answer = json.loads(told.data)
-    assert answer.pop('coastdown')['end_ns'] == int(values_of(status)['end of the coastdown [ns]'])
+    assert answer.pop('coastdown')['end_ns'] == int(values(status)['end of the coastdown [ns]'])
     assert answer.pop('caveat') == ''
     assert answer == expected
-    with bag.open('rb') as file:
-        recorded = [each for _, _, each in make_reader(file).iter_messages(topics=[TOPIC])]
-    assert [types.deserialize('std_msgs/msg/String', each.data).data for each in recorded] == [
-        told.data
-    ]
+    (kept,) = rows(bag, TOPIC)
+    assert types.deserialize('std_msgs/msg/String', kept.payload).data == told.data
 
 
 def test_too_little_steady_record_is_told() -> None:
@@ -151,9 +135,7 @@ def test_coastdown_without_estimate_is_not_diagnosed() -> None:
     assert 'withdrawn: 1 %' in status.reason
 
 
-def test_process_that_dies_is_a_failure_that_harms_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_process_that_dies_is_a_failure_that_harms_nothing(monkeypatch) -> None:
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
     diagnosing.begin(*a_coastdown())

@@ -13,6 +13,7 @@ import pytest
 
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 pytest.importorskip('rclpy')
 
@@ -51,7 +52,7 @@ class Ship:
             self._player.publish(speeds(1))
             self.peer.spin_for(1.0)
             status = self.diagnostics.of(INPUT)
-            return status is not None and {x.key: x.value for x in status.values}['used'] != '0'
+            return status is not None and values(status)['used'] != '0'
 
         self.peer.spin_until(used)
 
@@ -60,8 +61,7 @@ class Ship:
         self.diagnostics.wait_for(PART, str(self.sent + 1), value='messages')
 
     def said(self, key: str) -> str:
-        values = {item.key: item.value for item in self.diagnostics.of(PART).values}
-        return values[key]
+        return values(self.diagnostics.of(PART))[key]
 
     def bags(self) -> list[Path]:
         return sorted(self.directory.glob('*.mcap'))
@@ -76,9 +76,7 @@ def speeds_in(run: Run) -> int:
     return {topic.topic: topic.messages for topic in run.topics}['/speed_through_water']
 
 
-def test_killed_it_leaves_what_it_said_and_started_anew_it_overwrites_nothing(
-    start_node: Any, ship: Ship
-) -> None:
+def test_killed_it_leaves_what_it_said_and_started_anew_it_overwrites_nothing(start_node, ship):
     node = start_node()
     ship.send(20)
     ship.wait_recorded()
@@ -99,9 +97,7 @@ def test_killed_it_leaves_what_it_said_and_started_anew_it_overwrites_nothing(
     assert len(ship.bags()) == 2
 
 
-def test_a_full_disk_is_told_and_only_what_it_never_took_is_lost(
-    start_node: Any, peer: Any, ship: Ship
-) -> None:
+def test_a_full_disk_is_told_and_only_what_it_never_took_is_lost(start_node, peer, ship):
     node = start_node()
     ship.send(5)
     ship.wait_recorded()
@@ -143,9 +139,7 @@ def test_a_directory_that_vanishes_is_told_and_made_again(start_node: Any, ship:
 
 
 @pytest.mark.parametrize('limit', [{'part_duration_s': 1.0}, {'part_size_bytes': 100_000}])
-def test_parts_stand_alone_and_are_read_as_one(
-    start_node: Any, ship: Ship, limit: dict[str, float]
-) -> None:
+def test_parts_stand_alone_and_are_read_as_one(start_node, ship, limit):
     node = start_node(**limit)
     ship.send(100)
     while ship.said('part [1]') < '2':

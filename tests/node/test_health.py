@@ -20,9 +20,7 @@ ASKED = 'no shaft is received: is the engine stopped, and not astern?'
         (State.STEADY, ('speed_through_water',), False),
     ],
 )
-def test_in_a_coastdown_it_asks_for_the_engine_where_no_shaft_tells(
-    monitor: State, received: tuple[str, ...], asked: bool
-) -> None:
+def test_in_a_coastdown_it_asks_for_the_engine_where_no_shaft_tells(monitor, received, asked):
     facts = [InputFacts(name, type=name, age_s=0.5, total=Counts(9, 9, {})) for name in received]
     inputs = InputStates().tick(facts, simulated=False, now_s=1.0)
     status = state_status(Standing('active', monitor, clock_ns=1, sim_time=False), inputs)

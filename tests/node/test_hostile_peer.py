@@ -7,7 +7,6 @@ import math
 import random
 import struct
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 
 from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 pytest.importorskip('rclpy')
 
@@ -45,9 +45,7 @@ def odd_stamps() -> list[Any]:
     return made
 
 
-def test_it_harms_neither_the_node_nor_its_recording(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_it_harms_neither_the_node_nor_its_recording(start_node, peer, diagnostics, tmp_path):
     from shipdrag_ros.node.inputs import message_class
 
     node = start_node()
@@ -68,11 +66,9 @@ def test_it_harms_neither_the_node_nor_its_recording(
     diagnostics.wait_for('input speed_through_water', '20', value='unreadable too_long')
     diagnostics.wait_for('input shaft', '1', value='unreadable too_long')
     diagnostics.wait_for('input speed_through_water', '1', value='rejected nan')
-    malformed = {
-        item.key: item.value for item in diagnostics.of('input speed_through_water').values
-    }
-    assert int(malformed['unreadable malformed']) >= len(LYING)
-    assert int(malformed['used']) <= 2  # one of the numbers is a speed
+    told = values(diagnostics.of('input speed_through_water'))
+    assert int(told['unreadable malformed']) >= len(LYING)
+    assert int(told['used']) <= 2  # one of the numbers is a speed
     assert peer.state() == 'active'
     assert node.stop() == 0
     assert sum(bag.stat().st_size for bag in (tmp_path / 'bags').glob('*.mcap')) < 2**20

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.messages.topics import Health, Status
 from shipdrag_ros.node.main import line, terminal_line
+from tests.recorded import attachments, rows, summary
 
 rclpy = pytest.importorskip('rclpy')
 STATE = {
@@ -38,12 +38,6 @@ from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
 START_S = 240.0
 
 
-def attachments(bag: Path) -> dict[str, str]:
-    with bag.open('rb') as stream:
-        reader = make_reader(stream, validate_crcs=True)
-        return {item.name: item.data.decode() for item in reader.iter_attachments()}
-
-
 @pytest.mark.parametrize(
     ('name', 'value', 'said'),
     [
@@ -57,9 +51,7 @@ def attachments(bag: Path) -> dict[str, str]:
         ('use_sim_time', 3, 'use_sim_time: 3, expected true or false'),
     ],
 )
-def test_bad_parameters_are_user_errors(
-    capfd: pytest.CaptureFixture[str], name: str, value: object, said: str
-) -> None:
+def test_bad_parameters_are_user_errors(capfd, name: str, value: object, said: str) -> None:
     line = ['coastdown_node', '--ros-args', '-p', f'{name}:={json.dumps(value)}']
     assert main(line) == 1
     error = capfd.readouterr().err
@@ -77,9 +69,7 @@ def test_bad_parameters_are_user_errors(
         ('/**/coastdown_node', '/big/ship'),
     ],
 )
-def test_parameters_for_this_node_are_read(
-    capfd: pytest.CaptureFixture[str], tmp_path: Path, section: str, namespace: str
-) -> None:
+def test_parameters_for_this_node_are_read(capfd, tmp_path, section: str, namespace: str) -> None:
     file = tmp_path / 'ours.yaml'
     file.write_text(f'{section}:\n  ros__parameters: {{windows_s: 600.0}}\n')
     line = ['coastdown_node', '--ros-args', '--params-file', str(file)]
@@ -95,9 +85,7 @@ def test_signal_handlers_are_given_back() -> None:
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_with_a_readable_bag(
-    start_node: Any, peer: Any, tmp_path: Path, number: signal.Signals
-) -> None:
+def test_a_signal_ends_it_with_a_readable_bag(start_node, peer, tmp_path, number):
     node = start_node()
     publisher = peer.advertise('/depth', 'sensor_msgs/msg/Range')
     peer.wait_for_listener(publisher)
@@ -106,11 +94,7 @@ def test_a_signal_ends_it_with_a_readable_bag(
     assert node.stop(number) == 0
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
-    with bag.open('rb') as stream:
-        summary = make_reader(stream).get_summary()
-    assert summary is not None
-    assert summary.statistics is not None
-    assert summary.statistics.message_count == 3  # two events besides
+    assert summary(bag).statistics.message_count == 3  # two events besides
 
 
 def test_without_an_input_it_leaves_no_file(start_node: Any, tmp_path: Path) -> None:
@@ -126,7 +110,7 @@ def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> No
     code = (
         'import sys; from shipdrag_ros.node.main import run\n'
         f'sys.exit(run({str(ship)!r}, "123", settings={{"keep_days": 2.0}}, '
-        'ros_arguments=["-p", "window_s:=600.0", "-p", "keep_days:=1.0"]))'
+        'ros_arguments=["-p", "window_s:=600", "-p", "keep_days:=1.0"]))'
     )
     log = tmp_path / 'log'
     with (
@@ -167,9 +151,7 @@ def test_a_start_without_compiled_code_hears_records_and_ends_when_asked(
     assert node.stop() == 0
     assert 'ready to estimate' not in node.log
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    with bag.open('rb') as stream:
-        reader = make_reader(stream, validate_crcs=True)
-        assert [m.data for _, _, m in reader.iter_messages(['/speed_through_water'])] == sent
+    assert [row.payload for row in rows(bag, '/speed_through_water')] == sent
 
 
 def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path) -> None:

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.reader import make_reader
 
+from tests.node.conftest import values
+from tests.recorded import rows
 from tests.sources.log_samples import sentence
 
 pytest.importorskip('rclpy')
@@ -60,18 +61,6 @@ def instruments() -> Any:
     it.close()
 
 
-def messages(bag: Path) -> dict[str, list[bytes]]:
-    found: dict[str, list[bytes]] = {}
-    with bag.open('rb') as stream:
-        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
-            found.setdefault(channel.topic, []).append(message.data)
-    return found
-
-
-def values(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
-
-
 def test_what_is_heard_is_used_recorded_and_replayed(
     start_node: Any, peer: Any, diagnostics: Any, instruments: Instruments, tmp_path: Path
 ) -> None:
@@ -104,14 +93,14 @@ def test_what_is_heard_is_used_recorded_and_replayed(
     assert node.stop() == 0
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    recorded = messages(bag)
-    lines = [types.deserialize(types.STRING, data).data for data in recorded['/nmea']]
+    lines = [types.deserialize(types.STRING, row.payload).data for row in rows(bag, '/nmea')]
     assert lines == instruments.sent
-    twist = types.deserialize(SPEED_TYPE, recorded['/speed_through_water'][0]).twist.twist
+    speeds = rows(bag, '/speed_through_water')
+    twist = types.deserialize(SPEED_TYPE, speeds[0].payload).twist.twist
     assert math.isclose(twist.linear.x, 10.0 * 1852.0 / 3600.0)
     (run,) = open_runs([bag])
     result = replay(run)
-    assert result.inputs['speed_through_water'].messages == len(recorded['/speed_through_water'])
+    assert result.inputs['speed_through_water'].messages == len(speeds)
     assert result.recorded.first_difference is None
 
 
@@ -138,9 +127,7 @@ def test_a_topic_that_is_there_feeds_and_nmea_is_counted(
     assert status.level == b'\x01'
 
 
-def test_a_line_is_not_blamed_for_the_noise_of_another(
-    start_node: Any, diagnostics: Any, peer: Any, instruments: Instruments
-) -> None:
+def test_a_line_is_not_blamed_for_the_noise_of_another(start_node, diagnostics, peer, instruments):
     with socket.create_server(('127.0.0.1', 0)) as server:
         noisy = f'tcp://127.0.0.1:{server.getsockname()[1]}'
         start_node(nmea=f'{instruments.source} {noisy}')
@@ -197,6 +184,5 @@ def test_of_two_lines_the_second_takes_over_when_the_first_is_cut(
     said = f'speed_through_water: now from VWVHW on {after}, no longer from VWVHW on {before}'
     assert said in node.log
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    found = messages(bag)
-    assert any(said.encode() in payload for payload in found['/coastdown_node/events'])
-    assert any(speed[:9] in payload for payload in found['/nmea'])
+    assert any(said.encode() in row.payload for row in rows(bag, '/coastdown_node/events'))
+    assert any(speed[:9] in row.payload for row in rows(bag, '/nmea'))

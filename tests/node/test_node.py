@@ -4,17 +4,19 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import EventKind, encode, read_event
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
+from tests.recorded import rows
 
 pytest.importorskip('rclpy')
 
@@ -32,13 +34,8 @@ def speeds(*, count: int = 5, age_s: float = 0.0) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, stamps, 5.0 + 1e-3 * np.arange(count))
 
 
-def topics_in(bag: Path) -> dict[str, int]:
-    """Messages of each topic."""
-    counts: dict[str, int] = {}
-    with bag.open('rb') as stream:
-        for _, channel, _ in make_reader(stream).iter_messages():
-            counts[channel.topic] = counts.get(channel.topic, 0) + 1
-    return counts
+def topics_in(bag: Path) -> Counter[str]:
+    return Counter(row.topic for row in rows(bag))
 
 
 def the_bag(directory: Path) -> Path:
@@ -50,9 +47,7 @@ def kinds(events: list[bytes]) -> list[EventKind]:
     return [read_event(payload).kind for payload in events]
 
 
-def test_records_all_it_hears_and_counts_what_is_no_use(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_records_all_it_hears_and_counts_what_is_no_use(start_node, peer, diagnostics, tmp_path):
     node = start_node()
     peer.player.connect(speeds())
     block = speeds(age_s=1.5)
@@ -68,10 +63,10 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     diagnostics.wait_for(part, '1', value='rejected duplicate')
     diagnostics.wait_for(part, '4', value='rejected out_of_order')
     status = diagnostics.wait_for(part, '1', value='unreadable malformed')
-    values = {item.key: item.value for item in status.values}
-    assert 1.5 < float(values['clock offset [s]']) < 30.0
-    assert float(values['age [s]']) >= 0.0
-    assert values['publishers'] == '2'
+    told = values(status)
+    assert 1.5 < float(told['clock offset [s]']) < 30.0
+    assert float(told['age [s]']) >= 0.0
+    assert told['publishers'] == '2'
     status = diagnostics.wait_for(part, 'of 11 readings used')
     assert status.level == b'\x02'
     assert '5 out of order' in status.message or '4 out of order' in status.message
@@ -83,16 +78,14 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     }
 
 
-def test_inputs_are_recorded_by_their_own_name(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_inputs_are_recorded_by_their_own_name(start_node, peer, diagnostics, tmp_path):
     from sensor_msgs.msg import Range
 
     remapped = ('depth:=/sounder/depth', 'speed_through_water_2:=/log2/sped', '__ns:=/ship')
     node = start_node(*(word for each in remapped for word in ('-r', each)))
     # a further log that is remapped to where nobody publishes is spoken of
     status = diagnostics.wait_for('input speed_through_water_2', 'no')
-    assert '/log2/sped' in {item.value for item in status.values}
+    assert '/log2/sped' in values(status).values()
     assert diagnostics.of('input speed_through_water_3') is None
     publisher = peer.advertise('/sounder/depth', 'sensor_msgs/msg/Range')
     peer.wait_for_listener(publisher)
@@ -126,18 +119,15 @@ def test_a_further_log_is_spoken_of_where_somebody_publishes_it_and_a_heading_in
     status = diagnostics.wait_for('input heading', '3', value='used')
     assert status.level == b'\x00'
     assert status.message == 'receiving; its type holds no time: it counts from its arrival'
-    values = {item.key: item.value for item in status.values}
-    assert values['type'] == 'std_msgs/msg/Float64'
-    assert values['clock offset [s]'] == 'none'
+    told = values(status)
+    assert (told['type'], told['clock offset [s]']) == ('std_msgs/msg/Float64', 'none')
     assert node.stop() == 0
     assert topics_in(the_bag(tmp_path))['/speed_through_water_2'] == 5
     (run,) = open_runs([the_bag(tmp_path)])
     assert replay(run).inputs['heading'].used == 3
 
 
-def test_hears_a_publisher_of_any_quality_of_service(
-    start_node: Any, peer: Any, diagnostics: Any
-) -> None:
+def test_hears_a_publisher_of_any_quality_of_service(start_node, peer, diagnostics):
     from rclpy.duration import Duration
     from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
@@ -205,15 +195,15 @@ def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
     node.go_on()
 
     def counted() -> int:
-        values = {item.key: item.value for item in diagnostics.of(part).values}
-        return int(values['messages']) + int(values['messages lost'])
+        told = values(diagnostics.of(part))
+        return int(told['messages']) + int(told['messages lost'])
 
     peer.spin_until(lambda: counted() > 3)
     one.publish(sent[-1])
     peer.spin_until(lambda: counted() >= 401)
     assert counted() == 401
-    values = {item.key: item.value for item in diagnostics.of(part).values}
-    heard, lost = int(values['messages']), int(values['messages lost'])
+    told = values(diagnostics.of(part))
+    heard, lost = int(told['messages']), int(told['messages lost'])
 
     other = type(peer)()
     try:
@@ -231,9 +221,8 @@ def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
     finally:
         other.close()
     assert node.stop() == 0
-    with the_bag(tmp_path).open('rb') as stream:
-        messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
-        notes = [read_event(message.data) for _, _, message in messages]
+    events = rows(the_bag(tmp_path), '/coastdown_node/events')
+    notes = [read_event(row.payload) for row in events]
     said = [note.text for note in notes if note.kind is EventKind.MESSAGE_LOST]
     assert bool(said) is bool(lost)
     if lost:
@@ -267,9 +256,7 @@ def test_reports_sim_time_without_a_clock(start_node: Any, peer: Any, diagnostic
     diagnostics.wait_for('input speed_through_water', '5', value=UNUSED)
 
 
-def test_estimates_on_when_the_disk_does_not_take_it(
-    start_node: Any, peer: Any, diagnostics: Any
-) -> None:
+def test_estimates_on_when_the_disk_does_not_take_it(start_node, peer, diagnostics):
     start_node(output_directory='/proc/nowhere')
     block = speeds()
     peer.player.connect(block)
@@ -282,9 +269,7 @@ def test_estimates_on_when_the_disk_does_not_take_it(
     assert 'recording failed' in answer.message
 
 
-def test_obeys_transitions_and_refuses_illegal_ones(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_obeys_transitions_and_refuses_illegal_ones(start_node, peer, diagnostics, tmp_path):
     start_node()
     assert not peer.change_state('configure')
     assert not peer.change_state('no_such_transition')
@@ -310,9 +295,7 @@ def test_obeys_transitions_and_refuses_illegal_ones(
     assert peer.state() == 'finalized'
 
 
-def test_waits_to_be_configured_without_autostart(
-    start_node: Any, peer: Any, ship_file: Path
-) -> None:
+def test_waits_to_be_configured_without_autostart(start_node, peer, ship_file):
     from rcl_interfaces.srv import DescribeParameters, SetParameters
     from rclpy.parameter import Parameter
 
@@ -353,9 +336,7 @@ def test_waits_to_be_configured_without_autostart(
     assert peer.state() == 'active'
 
 
-def test_services_record_and_reset(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_services_record_and_reset(start_node: Any, peer: Any, diagnostics: Any, tmp_path) -> None:
     node = start_node()
     events = peer.listen('/coastdown_node/events', EVENT_TYPE, raw=True)
     peer.spin_until(lambda: peer.node.count_publishers('/coastdown_node/events'))
@@ -382,9 +363,7 @@ def test_services_record_and_reset(
     assert topics_in(second)['/speed_through_water'] == 10
 
 
-def test_a_clock_that_goes_back_begins_a_new_bag(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_a_clock_that_goes_back_begins_a_new_bag(start_node, peer, diagnostics, tmp_path):
     node = start_node(use_sim_time=True)
     epoch_ns = 1_700_000_000 * 10**9
     block = Block.of(Channel.SPEED_THROUGH_WATER, epoch_ns + np.arange(3) * 10**8, [5, 6, 7])
@@ -397,14 +376,11 @@ def test_a_clock_that_goes_back_begins_a_new_bag(
     assert node.stop() == 0
     bags = sorted((tmp_path / 'bags').glob('*.mcap'))
     assert [topics_in(bag)['/speed_through_water'] for bag in bags] == [3, 3]
-    with bags[1].open('rb') as stream:
-        messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
-        assert kinds([message.data for _, _, message in messages])[0] is EventKind.CLOCK_JUMP
+    first, *_ = rows(bags[1], '/coastdown_node/events')
+    assert read_event(first.payload).kind is EventKind.CLOCK_JUMP
 
 
-def test_nobody_on_the_network_chooses_files_or_clock(
-    start_node: Any, peer: Any, tmp_path: Path
-) -> None:
+def test_nobody_on_the_network_chooses_files_or_clock(start_node, peer, tmp_path):
     from rcl_interfaces.srv import SetParameters
     from rclpy.parameter import Parameter
 

@@ -45,9 +45,7 @@ def said(manager: socket.socket) -> bytes:
         return b''
 
 
-def test_ready_once_active_then_alive_each_second_then_stopping(
-    start_node: Any, manager: socket.socket
-) -> None:
+def test_ready_once_active_then_alive_each_second_then_stopping(start_node, manager):
     node = start_node(up=None, record=False)
     before = heard_until(manager, 'READY=1')
     assert 'active; ' in node.log
@@ -68,9 +66,7 @@ def test_ready_once_active_then_alive_each_second_then_stopping(
     heard_until(manager, 'STOPPING=1')
 
 
-def test_a_node_that_does_not_start_is_never_ready(
-    start_node: Any, manager: socket.socket
-) -> None:
+def test_a_node_that_does_not_start_is_never_ready(start_node, manager):
     node = start_node(up=None, ship_file='/nowhere/ship.yaml')
     assert node.wait() == 1
     manager.settimeout(0.1)
@@ -78,9 +74,7 @@ def test_a_node_that_does_not_start_is_never_ready(
         assert b'READY=1' not in message
 
 
-def test_a_manager_that_is_gone_ends_no_node(
-    start_node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_manager_that_is_gone_ends_no_node(start_node: Any, monkeypatch) -> None:
     monkeypatch.setenv('NOTIFY_SOCKET', '/nowhere/notify')
     node = start_node(record=False)
     assert node.stop() == 0

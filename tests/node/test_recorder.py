@@ -10,9 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 
-import pytest
-from mcap.reader import make_reader
-
 from shipdrag_ros.bags.durable import LiveFile, PartLimits
 from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
@@ -28,6 +25,7 @@ from shipdrag_ros.node.health import recording_status
 from shipdrag_ros.node.recorder import DEFAULT_LIMITS, EVERYTHING, Recorder, RecordingState
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+from tests.recorded import attachments, rows
 
 SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
 PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
@@ -54,17 +52,6 @@ def received(arrival_ns: int) -> EncodedMessage:
 
 def sent(stamp_ns: int) -> OutputMessage:
     return event_message(EventNote(EventKind.LIFECYCLE, stamp_ns, 'active', {}))
-
-
-def rows(path: Path) -> list[tuple[str, int, int]]:
-    with path.open('rb') as stream:
-        messages = make_reader(stream).iter_messages(log_time_order=False)
-        return [(c.topic, m.log_time, m.publish_time) for _, c, m in messages]
-
-
-def attachments(path: Path) -> dict[str, str]:
-    with path.open('rb') as stream:
-        return {item.name: item.data.decode() for item in make_reader(stream).iter_attachments()}
 
 
 def path_of(recorder: Recorder) -> Path:
@@ -96,7 +83,9 @@ def test_writes_inputs_and_outputs_in_order(tmp_path: Path) -> None:
     assert progress is not None
     assert (progress.messages, progress.waiting, progress.lost) == (2, 0, 0)
     path = path_of(it)
-    assert rows(path) == [('/ship/depth', 100, 5), ('/coastdown_node/events', 100, 7)]
+    first, second = rows(path)
+    assert first == ('/ship/depth', 100, 5, b'as received')
+    assert second[:3] == ('/coastdown_node/events', 100, 7)
     assert Ship.from_yaml(attachments(path)['ship.yaml'], subject='bag') == SHIP
     kept = Parameters.from_yaml(attachments(path)['parameters.yaml'], subject='bag')
     assert kept == PARAMETERS
@@ -109,7 +98,7 @@ def test_what_was_said_before_the_first_input_is_recorded(tmp_path: Path) -> Non
         it.output(sent(stamp_ns), 7)
     it.input(received(8))
     it.close()
-    times = [publish_ns for _, _, publish_ns in rows(path_of(it))]
+    times = [row.publish_ns for row in rows(path_of(it))]
     assert times == [*range(200, 300), 5]  # the latest hundred, and the input
 
 
@@ -202,9 +191,7 @@ def test_what_was_lost_is_counted_over_all_recordings(tmp_path: Path) -> None:
     assert it.status().text == 'not recording, 1 message(s) lost'
 
 
-def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_hangs_holds_nobody_up_and_is_told(tmp_path, monkeypatch) -> None:
     it = recorder(tmp_path)
     it.start()
     it.input(received(0))
@@ -225,13 +212,11 @@ def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
         assert not freed.is_set()
         freed.set()
     it.close()
-    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [0, 1, 2]
+    assert [row.log_ns for row in rows(path_of(it))] == [0, 1, 2]
     assert not it.status().slow
 
 
-def test_old_recordings_that_cannot_be_removed_are_said_until_they_can(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_old_recordings_that_cannot_be_removed_are_said_until_they_can(tmp_path, monkeypatch):
     monkeypatch.setattr('shipdrag_ros.node.recorder.EVERY_S', 0.05)
     old = tmp_path / 'coastdown_20260101T000000Z_000.mcap'
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

@@ -20,14 +20,11 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
+from tests.node.conftest import values
 
 PREFERRED = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 PLAIN = 'geometry_msgs/msg/TwistStamped'
 PART = 'input speed_through_water'
-
-
-def values(status: Any) -> dict[str, str]:
-    return {item.key: item.value for item in status.values}
 
 
 def twist(speed_m_s: float) -> Any:
@@ -137,9 +134,7 @@ def test_a_sentence_a_second_does_not_shadow_a_topic_at_10_hz(
     assert replay(run).recorded.first_difference is None
 
 
-def test_a_flood_on_one_input_delays_no_other(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
-) -> None:
+def test_a_flood_on_one_input_delays_no_other(start_node, peer, diagnostics, tmp_path):
     node = start_node()
     ground = peer.advertise('/speed_over_ground', PREFERRED)
     peer.wait_for_listener(ground)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -140,9 +139,7 @@ def words(tmp_path_factory: pytest.TempPathFactory, fleet_store: Path) -> dict[s
 
 
 @pytest.mark.parametrize('kind', PAGES)
-def test_a_page_opens_and_no_picture_is_without_data(
-    tab: Any, words: dict[str, str], tmp_path: Path, kind: str
-) -> None:
+def test_a_page_opens_and_no_picture_is_without_data(tab, words, tmp_path, kind):
     page = tmp_path / 'page.html'
     line = PAGES[kind].format_map(words).split()
     assert main([*line, '--report', str(page)]) == 0
@@ -161,9 +158,7 @@ def test_a_page_opens_and_no_picture_is_without_data(
 
 
 @pytest.mark.parametrize(('scheme', 'darkest', 'lightest'), [('light', 0.9, 1), ('dark', 0, 0.1)])
-def test_a_page_is_read_by_day_and_by_night(
-    tab: Any, tmp_path: Path, scheme: str, darkest: float, lightest: float
-) -> None:
+def test_a_page_is_read_by_day_and_by_night(tab, tmp_path, scheme, darkest, lightest):
     page = tmp_path / 'page.html'
     line = f'cable --length 50 --diameter 0.1 --speed 3 --report {page}'
     assert main(line.split()) == 0
@@ -203,9 +198,7 @@ def options(top: argparse.ArgumentParser, verb: str) -> set[str]:
         (lambda axis: axis.legend([], []), 1),
     ],
 )
-def test_the_check_knows_empty_axes(
-    tab: Any, tmp_path: Path, draw: Callable[[Any], object], empty: int
-) -> None:
+def test_the_check_knows_empty_axes(tab, tmp_path, draw, empty):
     from matplotlib.figure import Figure
 
     from shipdrag_ros.report.drawing import data_uri

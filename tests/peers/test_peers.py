@@ -132,9 +132,7 @@ def test_faults_are_named_and_a_kill_loses_nothing_older_than_a_second(
     assert len(left) >= received
 
 
-def test_a_log_in_knots_is_not_green_and_the_remedy_is_named(
-    stranger: Stranger, programs: list[Program], tmp_path: Path
-) -> None:
+def test_a_log_in_knots_is_not_green_and_the_remedy_is_named(stranger, programs, tmp_path):
     start_node(programs, tmp_path, '-p', 'use_sim_time:=true', '-p', 'record:=false')
     state = {'second': 1_700_000_000}
 
@@ -164,9 +162,7 @@ def test_a_log_in_knots_is_not_green_and_the_remedy_is_named(
     assert all(s.level[0] != OK for s in stranger.said('state', since=since))
 
 
-def test_a_log_in_a_wrong_scale_is_named_once_she_slows_and_the_positions_find_the_stop(
-    tmp_path: Path,
-) -> None:
+def test_a_log_in_a_wrong_scale_is_named_once_she_slows_and_the_positions_find_the_stop(tmp_path):
     bench = Bench(tmp_path)
     try:
         good, text = nonsense(

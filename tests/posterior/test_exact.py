@@ -61,9 +61,7 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
         np.testing.assert_allclose(table[1 + place], by, rtol=0.0, atol=0.01 * size)
 
 
-def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_current(
-    ship: Ship,
-) -> None:
+def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_current(ship):
     problem = problem_of(ship, codes=tuple(CODES.values()))
     k, rows = problem.coefficients, problem.rows
     table, _ = predict(problem.forces, problem.start, problem.grid_s, rows)

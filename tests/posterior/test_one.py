@@ -46,9 +46,7 @@ def test_live_and_final_agree(ship: Ship, found: Estimate) -> None:
 @pytest.mark.parametrize(
     'change', [{'shift_ns': 86_400_123_456_789}, {'turned_rad': 1.1}], ids=['later', 'turned']
 )
-def test_neither_date_nor_frame_of_the_positions_matter(
-    ship: Ship, found: Estimate, change: dict[str, float]
-) -> None:
+def test_neither_date_nor_frame_of_the_positions_matter(ship, found, change):
     other = estimate_final(window_of(ship, seed=1, **change), ship, ONE)
     r, sigma = at(found, SPEEDS)
     np.testing.assert_allclose(at(other, SPEEDS)[0], r, rtol=0.0, atol=0.02 * sigma.min())
@@ -61,9 +59,7 @@ def test_readings_that_are_something_else_hardly_count(ship: Ship, found: Estima
 
 
 @pytest.mark.parametrize('log_factor', [-0.02, 0.0, 0.02])
-def test_the_band_holds_the_truth_of_a_log_alone_that_is_off(
-    ship: Ship, log_factor: float
-) -> None:
+def test_the_band_holds_the_truth_of_a_log_alone_that_is_off(ship, log_factor):
     # 5 ships, seeds 0 to 4, at 20 speeds each: at least 80 % where 95 % are aimed at
     truth = ship.resistance_n(SPEEDS) / ship.mass_kg
     inside = []

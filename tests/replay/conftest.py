@@ -66,7 +66,7 @@ class Live:
         self.bag.attach('parameters.yaml', self.parameters.to_yaml())
 
     def receive(self, message: EncodedMessage) -> None:
-        self.write(message)
+        self.write(message, message.log_ns, message.publish_ns)
         source = Source(message.topic.removeprefix('/'), message.type)
         block = decode(source, [message.payload], [message.log_ns]).block
         self.report(self.monitor.update(block), message.log_ns)
@@ -81,27 +81,19 @@ class Live:
         self.events += events
         for event in events:
             for message in outputs(event):
-                self.write_output(message, now_ns)
+                self.write(message, now_ns, message.stamp_ns)
 
-    def write(self, message: EncodedMessage) -> None:
-        if self.bag is not None:
-            self.bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+    def record(self, path: Path, block: Block) -> None:
+        """Receive all of a record, and record it."""
+        self.start(path)
+        for message in encode(block):
+            self.receive(message)
+        self.stop(int(block.receive_ns[-1]))
 
-    def write_output(self, message: OutputMessage, now_ns: int) -> None:
+    def write(self, message: EncodedMessage | OutputMessage, log_ns: int, publish_ns: int) -> None:
         if self.bag is not None:
-            self.bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=now_ns,
-                publish_ns=message.stamp_ns,
-            )
+            content = (message.topic, message.type, message.payload)
+            self.bag.write(*content, log_ns=log_ns, publish_ns=publish_ns)
 
 
 @pytest.fixture(scope='session')
@@ -129,9 +121,5 @@ def live() -> type[Live]:
 def recording(ship: Ship, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Event]]:
     path = tmp_path_factory.mktemp('recording') / 'live.mcap'
     live = Live(ship)
-    live.start(path)
-    block = sail()
-    for message in encode(block):
-        live.receive(message)
-    live.stop(int(block.receive_ns[-1]))
+    live.record(path, sail())
     return path, live.events

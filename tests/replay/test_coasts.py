@@ -33,9 +33,7 @@ def with_clock(block: Block, offset_s: float, *, silent_s: tuple[float, float]) 
 
 @pytest.mark.parametrize('shaft', [True, False])
 @pytest.mark.parametrize('offset_s', [-36.0, -9.0, 9.0])
-def test_a_log_whose_clock_is_off_is_heard(
-    ship, parameters, voyage, tmp_path, offset_s: float, shaft: bool
-) -> None:
+def test_a_log_whose_clock_is_off_is_heard(ship, parameters, voyage, tmp_path, offset_s, shaft):
     block = with_clock(voyage(), offset_s, silent_s=(600.0, 640.0))
     if not shaft:
         block = block[block.channel != Channel.SHAFT]

@@ -36,9 +36,7 @@ def message(stamp_ns: int, payload: bytes = b'', name: str = 'speed') -> OutputM
         ([5, 6, 1, 2], [5, 6, 1, 2], (4, 4, None)),
     ],
 )
-def test_comparison(
-    recorded: list[int], replayed: list[int], expected: tuple[int, int, str | None]
-) -> None:
+def test_comparison(recorded, replayed, expected):
     comparison = Comparison(iter([message(stamp) for stamp in recorded]))
     for stamp in replayed:
         comparison.add(message(stamp))

@@ -37,9 +37,7 @@ def test_a_log_that_stands_still_is_told(tmp_path: Path, from_s: int, channel: C
 
 
 @pytest.mark.parametrize('steady', [0.0, 4.0])
-def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(
-    tmp_path: Path, steady: float
-) -> None:
+def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(tmp_path, steady: float) -> None:
     noise = 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed = steady + noise if steady else np.zeros(len(STAMPS))
     path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))

@@ -37,9 +37,7 @@ def replayed(path: Path) -> ReplayResult:
     return replay(run)
 
 
-def test_replay_gives_the_live_figures_bit_for_bit(
-    recording: tuple[Path, list[Event]], ship: Ship, parameters: Parameters
-) -> None:
+def test_replay_gives_the_live_figures_bit_for_bit(recording, ship, parameters):
     path, events = recording
     result = replayed(path)
     updates = [event for event in events if isinstance(event, Update)]
@@ -72,11 +70,7 @@ def test_further_instruments_are_recorded_in_their_order_and_replayed_bit_for_bi
         noise = np.random.default_rng(3).normal(0.0, 0.02, part.value.shape)
         both.append(replace(part, channel=code, value=part.value + noise))
     block = in_arrival_order([block, *both])
-    live = live(ship)
-    live.start(tmp_path / 'live.mcap')
-    for message in encode(block):
-        live.receive(message)
-    live.stop(int(block.receive_ns[-1]))
+    live(ship).record(tmp_path / 'live.mcap', block)
     result = replayed(tmp_path / 'live.mcap')
     assert result.recorded is not None
     assert result.recorded.identical == result.recorded.compared > 50
@@ -87,9 +81,7 @@ def test_further_instruments_are_recorded_in_their_order_and_replayed_bit_for_bi
     assert heard.channel.tolist() == block.channel.tolist()
 
 
-def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(
-    recording: tuple[Path, list[Event]],
-) -> None:
+def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(recording):
     path, events = recording
     (run,) = open_runs([path])
     result = replay(run, compare=False)
@@ -104,9 +96,7 @@ def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(
     )
 
 
-def test_another_ship_or_parameters_are_used_and_not_compared(
-    recording: tuple[Path, list[Event]], ship: Ship, parameters: Parameters
-) -> None:
+def test_another_ship_or_parameters_are_used_and_not_compared(recording, ship, parameters):
     path, _ = recording
     (run,) = open_runs([path])
     own = replay(run)
@@ -135,9 +125,7 @@ def test_progress_is_told_and_ends_at_the_total(recording: tuple[Path, list[Even
     assert len(told) > 1
 
 
-def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
-) -> None:
+def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(tmp_path, ship, voyage):
     block = voyage(steady_s=60.0, coast_s=60.0)
     value = block.value.copy()
     log = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
@@ -173,9 +161,7 @@ def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, shi
 
 
 @pytest.mark.parametrize('clock_s', [0.0, 3600.0])
-def test_a_stop_is_of_the_clock_of_the_bag(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], clock_s: float
-) -> None:
+def test_a_stop_is_of_the_clock_of_the_bag(tmp_path, ship, voyage, clock_s):
     block = voyage()
     log = block[block.channel == Channel.SPEED_THROUGH_WATER]
     log = replace(log, receive_ns=log.receive_ns + round(clock_s * 1e9))
@@ -190,9 +176,7 @@ def test_a_stop_is_of_the_clock_of_the_bag(
 
 
 @pytest.mark.parametrize('stop', [-1.0, 1e6, 1e305, datetime(2001, 1, 1, tzinfo=UTC)])
-def test_a_stop_outside_of_the_bag_is_an_error(
-    recording: tuple[Path, list[Event]], stop: float | datetime
-) -> None:
+def test_a_stop_outside_of_the_bag_is_an_error(recording, stop):
     (run,) = open_runs([recording[0]])
     said = '2001-01-01T00:00:00' if isinstance(stop, datetime) else f'{stop} s'
     with pytest.raises(BagError, match=r'stop at .*expected inside of .* s long') as error:
@@ -208,9 +192,7 @@ def test_a_stop_before_any_speed_is_an_error(recording: tuple[Path, list[Event]]
 
 
 @pytest.mark.parametrize('text', ['noon', '2026-06-01T08:05:00', '-3', 'nan'])
-def test_a_stop_that_is_no_time_is_refused(
-    recording: tuple[Path, list[Event]], text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_stop_that_is_no_time_is_refused(recording, text, capsys):
     with pytest.raises(SystemExit) as ended:
         main(['replay', str(recording[0]), f'--stop={text}'])
     assert ended.value.code == 2
@@ -218,19 +200,12 @@ def test_a_stop_that_is_no_time_is_refused(
 
 
 @pytest.mark.parametrize(('own', 'more'), [('', ['--window', '1', '900']), ('@1:900', [])])
-def test_a_window_beside_a_stop_is_refused(
-    recording: tuple[Path, list[Event]],
-    capsys: pytest.CaptureFixture[str],
-    own: str,
-    more: list[str],
-) -> None:
+def test_a_window_beside_a_stop_is_refused(recording, capsys, own, more):
     assert main(['replay', f'{recording[0]}{own}', '--stop', '400', *more]) == 1
     assert 'a window and a stop are given; give one of them' in capsys.readouterr().err
 
 
-def test_what_a_bag_holds_is_not_denied_with_a_stop(
-    tmp_path: Path, recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_bag_holds_is_not_denied_with_a_stop(tmp_path, recording, capsys):
     path = tmp_path / 'told.json'
     assert main(['replay', str(recording[0]), '--stop', '400', '--json', str(path)]) == 0
     told = capsys.readouterr()
@@ -241,9 +216,7 @@ def test_what_a_bag_holds_is_not_denied_with_a_stop(
     assert any(words in each['warning'] for each in json.loads(path.read_text())['warnings'])
 
 
-def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], live: type[Any]
-) -> None:
+def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voyage, live):
     block = voyage()
     messages = list(encode(block[block.channel != Channel.SHAFT]))
     at = next(i for i, each in enumerate(messages) if each.log_ns > START_NS + 405e9)
@@ -253,7 +226,7 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
         session.receive(message)
     now_ns = messages[at - 1].log_ns
     told = EventNote(EventKind.ENGINE_STOPPED, now_ns, 'the engine was stopped')
-    session.write_output(event_message(told), now_ns)
+    session.write(event_message(told), now_ns, now_ns)
     assert session.monitor.engine_stopped(now_ns) == ''
     for message in messages[at:]:
         session.receive(message)
@@ -278,8 +251,6 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
 
 
 @pytest.mark.parametrize('verb', ['forecast', 'diagnose'])
-def test_other_verbs_take_a_stop(
-    recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str], verb: str
-) -> None:
+def test_other_verbs_take_a_stop(recording: tuple[Path, list[Event]], capsys, verb: str) -> None:
     assert main([verb, str(recording[0]), '--stop', '1e6']) == 1
     assert 'stop at 1000000.0 s: expected inside of' in capsys.readouterr().err

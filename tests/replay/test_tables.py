@@ -91,9 +91,7 @@ def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:
         np.testing.assert_array_equal([float(row[name]) for row in rows], getattr(curve, name))
 
 
-def test_a_name_that_is_a_formula_is_text_and_numbers_are_numbers(
-    run: RunResult, tmp_path: Path
-) -> None:
+def test_a_name_that_is_a_formula_is_text_and_numbers_are_numbers(run, tmp_path):
     named = replace(run, bag='=HYPERLINK("http://x","y").mcap')
     write_curves(tmp_path / 'curves.csv', [named])
     with (tmp_path / 'curves.csv').open(newline='') as file:

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.coastdown.events import ENDED_BY, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, EndedBy
 from shipdrag_ros.replay import Recorded, words
-from shipdrag_ros.ship import Ship
 
 
 def test_every_end_has_words() -> None:
@@ -24,9 +23,7 @@ def test_the_comparison_with_the_bag_is_said() -> None:
     assert 'more than 3e-14 of its value' in rounding
 
 
-def test_a_coastdown_without_estimate_gives_its_reason(
-    coastdown: EndedCoastdown, ship: Ship
-) -> None:
+def test_a_coastdown_without_estimate_gives_its_reason(coastdown, ship):
     failed = replace(coastdown, estimate=None, failure='too few samples')
     assert words.summary(failed, ship) == ('No resistance could be estimated: too few samples.',)
     assert coastdown.estimate is not None

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import base64
-from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -15,9 +14,7 @@ from shipdrag_ros.report import drawing
 
 
 @pytest.mark.parametrize('name', ['picture.svg', 'picture.png'])
-def test_a_picture_is_saved_as_its_name_says(
-    estimate: Estimate, tmp_path: Path, name: str
-) -> None:
+def test_a_picture_is_saved_as_its_name_says(estimate: Estimate, tmp_path, name: str) -> None:
     drawing.save(pictures.order_picture(estimate), tmp_path / name)
     head = (tmp_path / name).read_bytes()[:100]
     assert head.startswith(b'\x89PNG') if name.endswith('png') else b'<?xml' in head
@@ -32,7 +29,5 @@ def test_the_same_data_give_the_same_bytes(estimate: Estimate) -> None:
 
 
 @pytest.mark.parametrize(('width', 'wide'), [(drawing.SIZE[0], False), (7.2, False), (9.0, True)])
-def test_a_picture_much_wider_than_others_takes_the_page_for_itself(
-    width: float, wide: bool
-) -> None:
+def test_a_picture_much_wider_than_others_takes_the_page_for_itself(width, wide):
     assert drawing.picture(Figure(figsize=(width, 3.0)), 'caption').wide == wide

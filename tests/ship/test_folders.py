@@ -52,9 +52,7 @@ def test_every_bad_file_of_a_folder_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('count', [2, 201])
-def test_a_ship_file_and_a_folder_refuse_the_same_in_the_same_words(
-    count: int, tmp_path: Path
-) -> None:
+def test_a_ship_file_and_a_folder_refuse_the_same_in_the_same_words(count: int, tmp_path) -> None:
     texts = [WEED.read_text().replace('name: weed', 'name: fouling')] * 2
     if count > 2:
         texts = [WEED.read_text().replace('name: weed', f'name: weed_{i}') for i in range(count)]

@@ -208,22 +208,13 @@ def test_any_values_are_a_ship_or_a_refusal(values):
 @pytest.mark.parametrize(
     'text',
     [
-        '!!bool maybe',
-        'length_m: !!int abc',
-        'length_m: !!timestamp x',
         'length_m: !!python/object:os.system x',
-        '&a [*a]',
-        '&a {length_m: *a}',
-        '[' * 3000,
-        '{? [1] : 2}',
         'a: &a [1,1,1,1,1,1,1,1]\nb: &b [*a,*a,*a,*a,*a,*a]\nlength_m: [*b,*b,*b,*b,*b,*b]',
-        '--- {}\n--- {}',
-        'length_m: ' + '9' * 5000,
+        '[' * 3000,
         'length_m: 1e999',
-        '\x00',
     ],
 )
-def test_hostile_text_is_refused(text):
+def test_hostile_text_is_refused(text):  # more of it: test_strict_yaml.py
     with pytest.raises(ShipFileError) as caught:
         Ship.from_yaml(text, subject='hostile')
     assert len(str(caught.value)) < 5000

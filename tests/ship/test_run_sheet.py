@@ -37,9 +37,7 @@ def test_what_is_stated_of_a_run_overrides_the_ship_file() -> None:
     # ITTC 7.5-02-01-03: fresh and sea water
     [(15.0, 999.1, 1.1386e-6), (15.0, 1026.0, 1.1892e-6), (5.0, 1027.7, 1.5617e-6)],
 )
-def test_viscosity_is_that_of_the_tables(
-    temperature_c: float, density: float, expected: float
-) -> None:
+def test_viscosity_is_that_of_the_tables(temperature_c, density, expected):
     assert kinematic_viscosity(temperature_c, density) == pytest.approx(expected, rel=0.02)
 
 

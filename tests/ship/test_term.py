@@ -231,9 +231,7 @@ def test_a_formula_is_as_sure_as_it_foretold_runs_left_out() -> None:
         (GROWN, ({'day': 20610.0}, {'day': 20620.0}), 2.0),
     ],
 )
-def test_a_force_by_depth_or_date_is_of_the_run(
-    text: str, runs: tuple[dict[str, float], dict[str, float]], ratio: float
-) -> None:
+def test_a_force_by_depth_or_date_is_of_the_run(text, runs, ratio):
     effect, ship = declared(LearntTerm.from_yaml(text)), Ship.example()
     one, other = (
         effect.action(Frame(ship, Scenario(speed_m_s=6.0, **run), 0.0), 0.02).resistance_n(3.0)
@@ -342,17 +340,8 @@ WRONG_FORMULAS = (
     'rho*g*nabla*A*u_c*exp(50*u/sqrt(g*L)*50)',
     'rho*g*nabla*A*u_c**(u/sqrt(g*L)*0 - 500)*u/u',
     '__import__("os").system("touch /tmp/x")*A*u_c',
-    'A.__class__.__mro__[1].__subclasses__()',
-    'open("/etc/passwd").read()',
-    'eval("1")',
-    'exec("import os")',
-    '(lambda: A)()*u_c',
-    '[A for A in (1,)][0]*u_c',
-    'A if u_c else A',
     '9**9**9**9*A*u_c',
-    'A' * 500,
-    '(' * 190 + 'A' + ')' * 190,
-    '',
+    '(' * 190 + 'A' + ')' * 190,  # more of it: test_expression.py
 )
 WRONG: dict[str, tuple[Any, ...]] = {
     'name': ('', 'Weed', '../weed', 'a b', 'fouling', 'x' * 61, 7, None, ['a'], 'weed\n',

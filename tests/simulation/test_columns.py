@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.errors import ShipdragError, SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
+from shipdrag_ros.ship import Propulsion, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import (
     Action,
     EngineOrder,
@@ -30,8 +29,8 @@ from shipdrag_ros.simulation import (
 )
 from shipdrag_ros.simulation.columns import _prepare, _steps
 from shipdrag_ros.simulation.effects import LIBRARY
+from tests.runs import CARGO
 
-CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 SCENARIO = Scenario(
     speed_m_s=8.2,
     lead_in_s=100.0,

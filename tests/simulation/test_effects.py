@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,30 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Air, ConstantAddedMass, Propeller, Ship, TableBaseline
+from shipdrag_ros.ship import Air, Ship, TableBaseline
 from shipdrag_ros.simulation import STOP, EngineOrder, Scenario, Sensor, Truth, sense, simulate
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import find, parse
+from tests.runs import CARGO
+from tests.simulation.conftest import DRAG_1_M, N_R, quadratic
 
-CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 SCENARIO = Scenario(speed_m_s=8.0, lead_in_s=0.0, duration_s=900.0)
-N_R = 0.08
-DRAG_1_M = 3e-4
-
-
-def quadratic(drag_1_m: float = DRAG_1_M, **changes: object) -> Ship:
-    """Return a ship with r = drag_1_m v^2 and nothing else."""
-    ship = Ship(
-        length_m=150.0,
-        displaced_volume_m3=20200.0,
-        breadth_m=21.6,
-        draught_m=8.6,
-        propeller=Propeller(5.6, 'none'),
-        added_mass=ConstantAddedMass(value=N_R),
-    )
-    speed = np.linspace(0.0, 10.0, 2001)
-    table = TableBaseline(tuple(speed), tuple(drag_1_m * speed**2 * ship.mass_kg), 0.01)
-    return replace(ship, baseline=table, **changes)
 
 
 def run(ship: Ship, *texts: str, scenario: Scenario = SCENARIO, **options: object) -> Truth:

@@ -40,9 +40,9 @@ from shipdrag_ros.simulation.effects import (
     parse,
     using,
 )
+from tests.runs import CARGO
 
 ROOT = Path(__file__).resolve().parents[2]
-CARGO = Ship.load(ROOT / 'config' / 'vitus_bering.yaml')
 SCENARIO = Scenario(speed_m_s=8.2, lead_in_s=20.0, duration_s=600.0, heading_rad=0.4)
 FRAME = Frame(CARGO, SCENARIO, SCENARIO.heading_rad)
 PROMISED = {

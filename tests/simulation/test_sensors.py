@@ -2,14 +2,12 @@
 """Sensors: what they read, and the statistics of their faults."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
     STANDARD_SD,
     START_NS,
@@ -22,8 +20,8 @@ from shipdrag_ros.simulation import (
     simulate,
     standard_sensors,
 )
+from tests.runs import CARGO
 
-CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 LOG = Sensor(channel=Channel.SPEED_THROUGH_WATER)
 
 

@@ -2,7 +2,6 @@
 """Surge motion against closed forms, energy and its own convergence."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ import pytest
 from shipdrag_ros.errors import ShipdragError, SimulationError
 from shipdrag_ros.ship import (
     Air,
-    ConstantAddedMass,
     Propulsion,
     Ship,
     StatedEffect,
@@ -18,21 +16,10 @@ from shipdrag_ros.ship import (
     Water,
 )
 from shipdrag_ros.simulation import STOP, EngineOrder, GaussMarkov, Scenario, Turn, simulate
+from tests.runs import CARGO
+from tests.simulation.conftest import N_R, quadratic
 
-CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 AT_ONCE = replace(CARGO, propulsion=None)
-N_R = 0.08
-
-
-def quadratic(drag_1_m: float, **changes: object) -> Ship:
-    """Return a ship with r = drag_1_m v^2 (PCHIP meets a parabola on a dense table)."""
-    ship = Ship(
-        length_m=150.0, displaced_volume_m3=20200.0, added_mass=ConstantAddedMass(value=N_R)
-    )
-    speed = np.linspace(0.0, 10.0, 2001)
-    force = drag_1_m * speed**2 * ship.mass_kg
-    table = TableBaseline(tuple(speed), tuple(force), 0.01)
-    return replace(ship, baseline=table, **changes)
 
 
 def test_quadratic_drag_has_its_closed_form():

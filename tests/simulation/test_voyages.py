@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,8 @@ from shipdrag_ros.simulation.voyages import (
     HullHistory,
     plan_fleet,
 )
+from tests.runs import CARGO as PATTERN
 
-PATTERN = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 YEAR = 365.25
 
 

@@ -147,26 +147,20 @@ def test_lines_may_be_led_by_the_time_of_their_day(files: dict[str, Path], tmp_p
     assert np.array_equal(led.value, plain.value)
 
 
-def test_a_log_of_a_serial_line_may_begin_with_zeros(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_a_log_of_a_serial_line_may_begin_with_zeros(files: dict[str, Path], tmp_path) -> None:
     path = tmp_path / 'capture.txt'
     path.write_bytes(b'\0\0\0' + files['nmea'].read_bytes())
     first = block_of(path)
     assert np.array_equal(first.value, block_of(files['nmea']).value)
 
 
-def test_lines_of_a_serial_adapter_may_end_with_a_carriage_return(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_lines_of_a_serial_adapter_may_end_with_a_carriage_return(files, tmp_path):
     path = tmp_path / 'slcan.log'
     path.write_bytes(files['slcan'].read_bytes().replace(b'\n', b'\r'))
     assert np.array_equal(block_of(path).value, block_of(files['slcan']).value)
 
 
-def test_a_serial_adapter_need_not_give_milliseconds(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_a_serial_adapter_need_not_give_milliseconds(files: dict[str, Path], tmp_path) -> None:
     path, plain = tmp_path / 'plain.log', files['slcan']
     path.write_text('\n'.join(line[:-4] for line in plain.read_text().splitlines()))
     found, whole = block_of(path, rate=10.0), block_of(plain)
@@ -175,9 +169,7 @@ def test_a_serial_adapter_need_not_give_milliseconds(
 
 
 @pytest.mark.parametrize('length', '01234567')
-def test_a_damaged_length_of_a_frame_makes_no_value_of_its_milliseconds(
-    files: dict[str, Path], tmp_path: Path, length: str
-) -> None:
+def test_a_damaged_length_of_a_frame_makes_no_value_of_its_milliseconds(files, tmp_path, length):
     """Each line of 8 bytes in turn says that it has fewer; its clock is no byte, nor bytes it."""
     lines = files['slcan'].read_text().splitlines()
     whole = {tuple(row) for row in block_of(files['slcan']).value.tolist()}
@@ -236,9 +228,7 @@ def test_files_of_one_instrument_each_are_one_run(files: dict[str, Path], tmp_pa
     assert len(values(both, Channel.SPEED_THROUGH_WATER)) == 60
 
 
-def test_replay_of_a_log_is_replay_of_its_bag(
-    files: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_replay_of_a_log_is_replay_of_its_bag(files: dict[str, Path], tmp_path, capsys) -> None:
     ship = str(ROOT / 'config' / 'vitus_bering.yaml')
     bag = tmp_path / 'log.mcap'
     assert main(['import', str(files['csv']), '-o', str(bag)]) == 0
@@ -256,9 +246,7 @@ def test_replay_of_a_log_is_replay_of_its_bag(
 
 
 @pytest.mark.parametrize('kind', FORMAT_OF)
-def test_a_log_read_directly_gives_the_bits_of_its_bag(
-    files: dict[str, Path], tmp_path: Path, kind: str
-) -> None:
+def test_a_log_read_directly_gives_the_bits_of_its_bag(files, tmp_path, kind):
     needs(kind)
     bag = tmp_path / 'log.mcap'
     assert main(['import', str(files[kind]), '-o', str(bag)]) == 0
@@ -269,9 +257,7 @@ def test_a_log_read_directly_gives_the_bits_of_its_bag(
         assert one.tobytes() == other.tobytes(), name
 
 
-def test_nothing_is_written_while_a_log_is_read(
-    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_written_while_a_log_is_read(files, tmp_path, monkeypatch):
     empty = tmp_path / 'tmp'
     empty.mkdir()
     monkeypatch.setattr('tempfile.tempdir', str(empty))
@@ -280,9 +266,7 @@ def test_nothing_is_written_while_a_log_is_read(
     assert not any(empty.iterdir())
 
 
-def test_a_library_that_is_not_there_is_named(
-    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_library_that_is_not_there_is_named(files, tmp_path, monkeypatch):
     for kind, library in (('ardupilot', 'pymavlink'), ('ulog', 'pyulog')):
         monkeypatch.setitem(sys.modules, library, None)
         monkeypatch.setitem(sys.modules, f'{library}.DFReader', None)
@@ -324,9 +308,7 @@ def test_attributes_of_a_point_may_have_any_name(files: dict[str, Path], tmp_pat
     np.testing.assert_array_equal(found.value, whole.value)
 
 
-def test_what_a_killed_recorder_left_in_the_log_of_sqlite3_is_read(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_what_a_killed_recorder_left_in_the_log_of_sqlite3_is_read(files, tmp_path):
     path = tmp_path / 'grows.db3'
     shutil.copy(files['sqlite3'], path)
     with closing(sqlite3.connect(path)) as database:
@@ -343,9 +325,7 @@ def test_what_a_killed_recorder_left_in_the_log_of_sqlite3_is_read(
     assert sorted(map(str, bag.iterdir())) == left
 
 
-def test_a_heading_without_end_costs_no_other_value_of_a_log_of_ardupilot(
-    files: dict[str, Path], tmp_path: Path
-) -> None:
+def test_a_heading_without_end_costs_no_other_value_of_a_log_of_ardupilot(files, tmp_path):
     needs('ardupilot')
     path = tmp_path / 'log.bin'
     about = struct.pack('<BB4s16s64s', 132, 15, b'ATT', b'Qf', b'TimeUS,Yaw')

@@ -98,9 +98,7 @@ signed = st.integers(-350, 350)
     st.tuples(st.integers(-90 * 60_000, 90 * 60_000), st.integers(-180 * 60_000, 180 * 60_000)),
     st.sampled_from('NKM'),
 )
-def test_values_are_those_written(
-    case: tuple[int, ...], below: tuple[int, int], at: tuple[int, int], unit: str
-) -> None:
+def test_values_are_those_written(case, below, at, unit):
     water, ground, wind, wind_from, heading, variation, deviation, rpm, rudder = case
     (depth, offset), (latitude, longitude) = below, at
 
@@ -466,9 +464,7 @@ def test_a_time_without_a_fix_counts_only_where_it_goes_on() -> None:
     ],
 )
 @pytest.mark.parametrize('offset_s', [0.0, 40.0])
-def test_the_time_since_the_last_fix_is_measured_by_the_logger(
-    prefix: Any, offset_s: float
-) -> None:
+def test_the_time_since_the_last_fix_is_measured_by_the_logger(prefix, offset_s):
     at = START.timestamp() + offset_s  # the logger's clock need not be right
     log = lines(
         f'{prefix(at + 0.125)}{rmc(0)}',

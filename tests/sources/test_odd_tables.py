@@ -76,9 +76,7 @@ def test_longitudes_in_the_column_of_latitudes_are_none(tmp_path: Path) -> None:
         ('130.6', '215.0', (1.51, 2.25)),
     ],
 )
-def test_degrees_and_minutes_in_one_number(
-    tmp_path: Path, north: str, east: str, expected: tuple[float, float]
-) -> None:
+def test_degrees_and_minutes_in_one_number(tmp_path, north, east, expected):
     rows = [f'{i},{north},{east},10' for i in range(20)]
     block, _ = read(tmp_path, 'time,Lat,Lon,STW [kn]', rows)
     np.testing.assert_allclose(of(block, Channel.POSITION_GEODETIC)[:, :2], [expected] * 20)
@@ -105,18 +103,14 @@ def test_days_of_a_spreadsheet_are_refused(tmp_path: Path) -> None:
         ('Lat [m],Lon [m]', '50,60'),
     ],
 )
-def test_a_unit_that_does_not_fit_is_said_and_not_used(
-    tmp_path: Path, name: str, value: str
-) -> None:
+def test_a_unit_that_does_not_fit_is_said_and_not_used(tmp_path, name: str, value: str) -> None:
     block, shown = read(tmp_path, f'time,STW [kn],{name}', [f'{i},10,{value}' for i in range(20)])
     assert set(block.channel.tolist()) == {Channel.SPEED_THROUGH_WATER}
     assert 'Not used: ' in shown
 
 
 @pytest.mark.parametrize(('unit', 'factor'), [('mph', 0.44704), ('ft/s', 0.3048)])
-def test_a_stated_unit_that_agrees_with_the_way_is_taken(
-    tmp_path: Path, unit: str, factor: float
-) -> None:
+def test_a_stated_unit_that_agrees_with_the_way_is_taken(tmp_path, unit, factor):
     rows = [f'2018-03-02T{clock(i)}Z,{latitude(i)},10.25,{SPEED / factor:.4f}' for i in range(100)]
     block, _ = read(tmp_path, f'time,Lat,Lon,SOG [{unit}]', rows)
     np.testing.assert_allclose(of(block, Channel.SPEED_OVER_GROUND)[:, 0], SPEED, rtol=1e-4)
@@ -196,9 +190,7 @@ def test_a_header_may_stand_on_line_38(tmp_path: Path) -> None:
         ('propeller_rps', Channel.SHAFT, 2.0 * math.pi),
     ],
 )
-def test_a_unit_may_stand_at_the_end_of_a_name(
-    tmp_path: Path, name: str, channel: Channel, factor: float
-) -> None:
+def test_a_unit_may_stand_at_the_end_of_a_name(tmp_path, name, channel, factor):
     rows = [f'{s},{SPEED},{0.5 + s / 1000}' for s in range(30)]
     block, _ = read(tmp_path, f'time_s,sog_mps,{name}', rows)
     expected = [(0.5 + s / 1000) * factor for s in range(30)]

@@ -50,9 +50,7 @@ def convert(
     return bag, json.loads(capsys.readouterr().out)
 
 
-def test_a_table_becomes_a_curve(
-    table: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_becomes_a_curve(table: Path, ship_file: Path, capsys) -> None:
     bag, said = convert(
         capsys,
         table,
@@ -76,9 +74,7 @@ def test_a_rate_takes_the_place_of_a_time(table: Path, capsys: pytest.CaptureFix
     assert said['end_ns'] - said['start_ns'] == 2399 * 250_000_000
 
 
-def test_the_words_tell_what_was_left_out(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_words_tell_what_was_left_out(table: Path, tmp_path, capsys) -> None:
     with table.open('a') as file:
         file.write('\na,700,fast,1,2\n')
     line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
@@ -90,9 +86,7 @@ def test_the_words_tell_what_was_left_out(
     assert "speed_through_water: 1 rejected, not a number: line 2402: 'fast'" in captured
 
 
-def test_times_that_go_back_are_told(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_times_that_go_back_are_told(table: Path, tmp_path, capsys) -> None:
     line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
     assert main([*line, '--map', 'speed_through_water=v:kn']) == 0
     # the last of run b is as late as the last of run a
@@ -139,14 +133,7 @@ def test_what_follows_a_clock_that_was_set_back_has_times_of_its_own(tmp_path: P
         ((), 1, "'x', 'y': unit not known; --map position=x,y:m"),
     ],
 )
-def test_a_mistake_is_told_and_leaves_no_bag(
-    table: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    arguments: tuple[str, ...],
-    status: int,
-    said: str,
-) -> None:
+def test_a_mistake_is_told_and_leaves_no_bag(table, tmp_path, capsys, arguments, status, said):
     line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), *arguments]
     if status == 2:
         with pytest.raises(SystemExit) as end:
@@ -195,9 +182,7 @@ def test_a_log_becomes_a_bag(log: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert (said['magnetic_heading'], said['log_attached']) == (True, True)
 
 
-def test_the_words_tell_what_of_a_log_was_not_used(
-    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_words_tell_what_of_a_log_was_not_used(log: Path, tmp_path, capsys) -> None:
     assert main(['import', str(log), '-o', str(tmp_path / 'a.mcap')]) == 0
     said = capsys.readouterr().out
     assert '6 messages of 6 sentences in 7 lines, 1 s' in said
@@ -211,9 +196,7 @@ def test_the_words_tell_what_of_a_log_was_not_used(
     assert 'Talkers that NMEA 0183 does not know: XX 1' in said
 
 
-def test_dates_and_checksums_that_a_log_lacks_are_given(
-    log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_dates_and_checksums_that_a_log_lacks_are_given(log: Path, capsys) -> None:
     log.write_text('$GPGLL,5430.00,N,01000.00,E,120000,A\n')
     _, said = convert(capsys, log, '--date', '2024-02-29', '--no-checksum')
     assert said['start_ns'] == 1_709_208_000 * 10**9
@@ -231,9 +214,7 @@ def test_a_bag_needs_no_import(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize('option', [('--format', 'signalk'), ('--map', 'depth=v', '--rate', '1')])
-def test_no_option_lets_a_pipe_or_a_bag_in(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: tuple[str, ...]
-) -> None:
+def test_no_option_lets_a_pipe_or_a_bag_in(tmp_path, capsys, option: tuple[str, ...]) -> None:
     pipe, bag = tmp_path / 'pipe', tmp_path / 'a.mcap'
     os.mkfifo(pipe)  # without a writer, one that reads it waits for ever
     bag.write_bytes(b'\x89MCAP0\r\n')
@@ -242,9 +223,7 @@ def test_no_option_lets_a_pipe_or_a_bag_in(
         assert why in capsys.readouterr().err
 
 
-def test_of_several_files_what_went_into_the_bag_is_counted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_of_several_files_what_went_into_the_bag_is_counted(tmp_path, capsys) -> None:
     first, second = tmp_path / 'a.csv', tmp_path / 'b.csv'
     first.write_text('time,speed_through_water\n1e9,8\n1000000001,8\n')
     second.write_text('time,speed_through_water,heading\n1e9,7,1\n1000000002,7,1\n')
@@ -260,9 +239,7 @@ def test_of_several_files_what_went_into_the_bag_is_counted(
     assert 'b.csv: speed_through_water not taken for the time' in shown.err
 
 
-def test_a_format_of_another_package_is_found_by_its_entry_point(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_format_of_another_package_is_found_by_its_entry_point(tmp_path, monkeypatch, capsys):
     """One more format, of lines `> seconds speed`, without a word of it anywhere else."""
     (tmp_path / 'arrows.py').write_text(
         'from shipdrag_ros.sources.format import CERTAIN, NO, Format, Option\n'
@@ -303,9 +280,7 @@ def test_a_format_of_another_package_is_found_by_its_entry_point(
     assert 'argument --epoch: of a log of arrows, and this is a CSV' in capsys.readouterr().err
 
 
-def test_a_format_that_cannot_be_loaded_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_format_that_cannot_be_loaded_is_named(tmp_path, monkeypatch) -> None:
     about = tmp_path / 'broken-1.0.dist-info'
     about.mkdir()
     (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n')

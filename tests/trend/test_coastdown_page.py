@@ -87,9 +87,7 @@ def test_rows_of_the_report_lead_to_pages_and_back(fleet_store: Path, tmp_path: 
         assert '<a href="../a/fleet.html">The fleet</a>' in there.read_text()
 
 
-def test_pages_without_a_report_are_refused(
-    fleet_store: Path, tmp_path: Path, capsys: Any
-) -> None:
+def test_pages_without_a_report_are_refused(fleet_store: Path, tmp_path, capsys) -> None:
     assert main(['trend', str(fleet_store), '--pages', str(tmp_path)]) == 1
     assert 'give --report' in capsys.readouterr().err
 

@@ -52,9 +52,7 @@ def test_each_option_changes_the_figures(capsys: pytest.CaptureFixture[str]) -> 
     assert document(capsys, '--speed', '1')['errors'][5][1:] != smooth['errors'][5][1:]
 
 
-def test_the_readable_result_says_what_to_use_and_what_not(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_readable_result_says_what_to_use_and_what_not(capsys) -> None:
     assert main(LINE) == 0
     shown = capsys.readouterr().out
     for part in (
@@ -71,9 +69,7 @@ def test_the_readable_result_says_what_to_use_and_what_not(
     assert 'without upper end' in capsys.readouterr().out
 
 
-def test_a_long_cable_without_a_stated_coefficient_is_warned_of(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_long_cable_without_a_stated_coefficient_is_warned_of(capsys) -> None:
     line = ['cable', '--length', '300', '--diameter', '0.02', '--speed', '3']
     assert main(line) == 0
     assert 'WARNING: length over diameter is 1.5e+04' in capsys.readouterr().out
@@ -92,9 +88,7 @@ def test_the_page_shows_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('name', ['--length', '--diameter', '--speed', '--c0', '--tolerance'])
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', '1e300', 'x'])
-def test_impossible_values_are_wrong_usage(
-    name: str, value: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_impossible_values_are_wrong_usage(name: str, value: str, capsys) -> None:
     with pytest.raises(SystemExit) as stopped:
         main([*LINE, f'{name}={value}'])
     assert stopped.value.code == 2

@@ -49,9 +49,7 @@ def found(hulls: Hulls, resistance: Callable[[Hulls], Float64]) -> ResidualFit:
     return fit_residual(hulls, 1e-3 * resistance(hulls) * (1.0 + 0.02 * noise), form='sakhnovsky')
 
 
-def test_the_ship_states_what_the_form_foretells(
-    ship: Ship, found: ResidualFit, resistance: Callable[[Hulls], Float64]
-) -> None:
+def test_the_ship_states_what_the_form_foretells(ship, found, resistance):
     written = Ship.from_yaml(with_residual(ship, found, lcb=0.005).to_yaml(), subject='again')
     base = written.baseline
     assert isinstance(base, CoefficientBaseline)
@@ -83,18 +81,14 @@ def test_what_is_missing_is_told_together(ship: Ship, found: ResidualFit) -> Non
     assert [each.partition(':')[0] for each in told] == ['breadth_m', 'baseline', 'lcb']
 
 
-def test_what_is_hardly_known_is_refused(
-    ship: Ship, hulls: Hulls, resistance: Callable[[Hulls], Float64]
-) -> None:
+def test_what_is_hardly_known_is_refused(ship, hulls, resistance):
     noise = 2e-3 * np.random.default_rng(3).normal(size=len(hulls))
     vague = fit_residual(hulls, 1e-3 * resistance(hulls) + noise, form='sirotina')
     with pytest.raises(DataError, match='times the value'):
         with_residual(ship, vague, lcb=None)
 
 
-def test_other_units_are_refused(
-    ship: Ship, hulls: Hulls, resistance: Callable[[Hulls], Float64]
-) -> None:
+def test_other_units_are_refused(ship, hulls, resistance):
     thousandfold = fit_residual(hulls, resistance(hulls), form='sirotina')
     with pytest.raises(DataError, match='neither times 1000 nor a force'):
         with_residual(ship, thousandfold, lcb=None)

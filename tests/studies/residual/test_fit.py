@@ -33,9 +33,7 @@ def test_a_form_comes_back_from_its_own_data(form: str, fleet: Fleet) -> None:
 
 
 @pytest.mark.parametrize(('form', 'rank'), [('sakhnovsky', 12), ('sirotina', 14)])
-def test_nine_hulls_leave_the_form_open(
-    form: str, rank: int, fleet: Fleet, resistance: Resistance
-) -> None:
+def test_nine_hulls_leave_the_form_open(form, rank, fleet, resistance):
     # S4: 9 models, 12 and 10 terms of shape alone
     hulls = fleet(9, 3)
     found = fit_residual(hulls, resistance(hulls), form=form)

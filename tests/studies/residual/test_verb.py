@@ -48,9 +48,7 @@ def fit(table: Path, *more: str, form: str = 'sirotina') -> int:
     return main(['residual', str(table), '--form', form, '--target', 'c_R', *more])
 
 
-def test_json_to_the_letter(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_to_the_letter(table: Path, tmp_path, capsys) -> None:
     new, page = tmp_path / 'new.csv', tmp_path / 'page.html'
     new.write_text('Fr;slenderness;B_T;L_B\n0.14;6.68;4.1;7.8\n0.14;6.68;4.1;20\n')
     assert fit(table, '--predict', str(new), '--report', str(page), '--json') == 0
@@ -85,9 +83,7 @@ def test_each_form(form: str, table: Path, capsys: pytest.CaptureFixture[str]) -
     assert found['predictions'] == []
 
 
-def test_writes_a_ship_file_or_refuses(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_writes_a_ship_file_or_refuses(table: Path, tmp_path, capsys) -> None:
     ship, out = tmp_path / 'ship.yaml', tmp_path / 'out.yaml'
     ship.write_text(SHIP)
     assert fit(table, '--ship', str(ship), '--write', str(out)) == 0
@@ -113,9 +109,7 @@ def test_writes_a_ship_file_or_refuses(
     assert fit(table, *more, '--lcb', '0.005', form='sakhnovsky') == 0
 
 
-def test_errors_say_what_to_mend(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_errors_say_what_to_mend(table: Path, tmp_path, capsys) -> None:
     bare = tmp_path / 'bare.csv'
     bare.write_text('L_B,Fr,c_R\n8,0.1,0.001\n')
     assert fit(bare, form='sakhnovsky') == 1
@@ -130,14 +124,3 @@ def test_errors_say_what_to_mend(
     assert "'C_B' is a ratio of the hull; name the column" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         fit(table, form='cubic')
-
-
-def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
-    root = Path(__file__).resolve().parents[3]
-    line = 'residual docs/data/river_ships.csv --form auto --target c_R'
-    assert f'shipdrag {line}' in (root / 'docs' / 'method.md').read_text(encoding='utf-8')
-    verb, data, *rest = line.split()
-    assert main([verb, str(root / data), *rest, '--json']) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found['rank'] == 15
-    assert found['hulls'] == 40

@@ -142,9 +142,7 @@ def test_speed_over_ground_stands_in_for_a_log_and_is_said(
         ('s1_position', (Channel.POSITION,), 3, '3 distinct stamp'),
     ],
 )
-def test_too_little_is_refused_with_the_count(
-    coast: Any, ship: Ship, estimator: str, channels: tuple[Channel, ...], n: int, message: str
-) -> None:
+def test_too_little_is_refused_with_the_count(coast, ship, estimator, channels, n, message):
     with pytest.raises(EstimationError, match=message):
         estimate(window(only(coast.block(n), *channels)), ship, Parameters(estimator=estimator))
 

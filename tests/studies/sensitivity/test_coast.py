@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SensitivityError, ShipdragError
-from shipdrag_ros.ship import Ship, TableBaseline
+from shipdrag_ros.ship import TableBaseline
 from shipdrag_ros.simulation import Action, simulate
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, coast_from, parse_coast
-
-CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
+from tests.runs import CARGO
 
 
 def test_the_coastdown_ends_where_the_ship_has_slowed_to_a_third():

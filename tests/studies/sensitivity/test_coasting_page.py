@@ -3,16 +3,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as words
-
-SHIP = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
+from tests.runs import CARGO as SHIP
 
 
 @pytest.fixture(scope='module')

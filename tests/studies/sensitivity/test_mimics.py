@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,7 @@ from shipdrag_ros.ship import Propulsion, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
-
-CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
+from tests.runs import CARGO
 
 
 def mimics_of(ship: Ship):
@@ -32,15 +30,11 @@ def test_more_friction_is_fouling_where_nothing_else_is_viscous():
     assert fouling.left < 0.02
 
 
-def test_a_speed_that_is_not_known_explains_nothing_twice():
+def test_a_speed_that_is_not_known_explains_nothing_twice_and_errors_stay_in_what_may_be(coasted):
     # a log that is off and a place that is off leave what the rest of the record shows
-    found = mimics_of(CARGO)
+    found = {mimic.effect.name: mimic for mimic in coasted.mimics}
     assert found['log_offset'].distance > 1.0
     assert found['log_offset'].left > 0.9
-
-
-def test_errors_stay_within_what_may_be_wrong():
-    found = mimics_of(CARGO)
     assert max(abs(mimic.error) for mimic in found.values()) == WORST
     assert abs(found['locked_propeller'].error) == WORST
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ import pytest
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import ConstantAddedMass, Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.studies.sensitivity.coast import particulars
+from tests.runs import CARGO
 
-CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
 SPEED = 7.0
 
 

@@ -3,34 +3,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.manoeuvring.ship import mariner
 from shipdrag_ros.studies.manoeuvring.simulate import turn, zigzag
-from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting, steering
-from shipdrag_ros.studies.sensitivity.steering import experiment, study
-
-CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
+from shipdrag_ros.studies.sensitivity.steering import experiment
 
 
 def names(labels) -> list[str]:
     return [label.get_text() for label in labels]
-
-
-@pytest.fixture(scope='module')
-def steered():
-    return study(mariner(), zigzag(15.0), keep=24)
-
-
-@pytest.fixture(scope='module')
-def coasted():
-    return study_coast(CARGO, coast_from(CARGO))
 
 
 def test_bars_of_kept_and_dropped_derivatives(steered):

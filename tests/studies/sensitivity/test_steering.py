@@ -24,12 +24,7 @@ SHIP = mariner()
 ZIGZAG = zigzag(15.0)
 
 
-@pytest.fixture(scope='module')
-def found():
-    return study(SHIP, ZIGZAG, keep=24)
-
-
-def test_a_loss_is_that_of_two_manoeuvres(found):
+def test_a_loss_is_that_of_two_manoeuvres(steered):
     i, change = FORM.index('Nd'), CHANGES[2]
     values = SHIP.values
     values[i] *= 1.0 + change
@@ -39,18 +34,18 @@ def test_a_loss_is_that_of_two_manoeuvres(found):
     squares += ((one.sway_m_s - other.sway_m_s) / SHIP.speed_m_s) ** 2
     squares += ((one.yaw_rate_rad_s - other.yaw_rate_rad_s) * length_s) ** 2
     assert len(squares) == 1200
-    assert found.losses.table[i, 2] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
-    assert found.mean_norms.table[i, 2] == pytest.approx(np.mean(np.sqrt(squares)), rel=1e-12)
+    assert steered.losses.table[i, 2] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
+    assert steered.mean_norms.table[i, 2] == pytest.approx(np.mean(np.sqrt(squares)), rel=1e-12)
 
 
-def test_what_the_paper_saw_is_there_with_both_norms(found):
-    for losses in (found.losses, found.mean_norms):
+def test_what_the_paper_saw_is_there_with_both_norms(steered):
+    for losses in (steered.losses, steered.mean_norms):
         seen = Observations.of(losses)
         assert seen.unlike[0] < 0.01  # + and - 10 % alike
         assert seen.unlike[0] < seen.unlike[1] < 0.05  # + and - 50 % less so
         assert seen.growth == pytest.approx(5.0, abs=0.02)
         assert losses.mean.min() < 1e-4 * losses.mean.max()  # some are nearly 0
-    assert found.norms_agree
+    assert steered.norms_agree
 
 
 def test_a_helmsman_who_looks_now_and_then_hides_small_changes():
@@ -59,24 +54,24 @@ def test_a_helmsman_who_looks_now_and_then_hides_small_changes():
     assert seen.growth < 4.5
 
 
-def test_twenty_four_derivatives_are_eighteen_measurements(found):
-    assert len(found.selection.kept) == 24
-    assert len(found.selection.dropped) == 16
-    assert {'Nd', 'Yv', 'Yr', 'Nr', 'Nv', 'Xu', 'Xrv', 'Xvv'} <= set(found.selection.kept)
-    assert {'Yvdd', 'Nvdd', 'Yddd', 'Yuud', 'Y0uu', 'N0uu'} <= set(found.selection.dropped)
-    assert found.independent == 18
-    assert len(found.group_selection.kept) == 18
-    assert len(found.group_derivatives) == 29
+def test_twenty_four_derivatives_are_eighteen_measurements(steered):
+    assert len(steered.selection.kept) == 24
+    assert len(steered.selection.dropped) == 16
+    assert {'Nd', 'Yv', 'Yr', 'Nr', 'Nv', 'Xu', 'Xrv', 'Xvv'} <= set(steered.selection.kept)
+    assert {'Yvdd', 'Nvdd', 'Yddd', 'Yuud', 'Y0uu', 'N0uu'} <= set(steered.selection.dropped)
+    assert steered.independent == 18
+    assert len(steered.group_selection.kept) == 18
+    assert len(steered.group_derivatives) == 29
 
 
-def test_the_reduced_model_is_close_and_closer_by_measurements(found):
-    full, reduced = np.degrees(found.check.overshoots_rad)
+def test_the_reduced_model_is_close_and_closer_by_measurements(steered):
+    full, reduced = np.degrees(steered.check.overshoots_rad)
     np.testing.assert_allclose(full, [8.85, 7.01], rtol=0, atol=0.006)
     np.testing.assert_allclose(reduced, full, rtol=0, atol=1.0)
-    by_group = np.degrees(found.group_check.overshoots_rad[1])
+    by_group = np.degrees(steered.group_check.overshoots_rad[1])
     assert np.max(np.abs(by_group - full)) < 0.2 < np.max(np.abs(reduced - full))
-    for name, value in found.group_check.rms_difference.items():
-        assert value < found.check.rms_difference[name]
+    for name, value in steered.group_check.rms_difference.items():
+        assert value < steered.check.rms_difference[name]
 
 
 def test_keeping_all_changes_nothing():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of derivatives is what was found."""
+"""What is said of derivatives is what was steered."""
 
 from __future__ import annotations
 
@@ -13,14 +13,9 @@ from shipdrag_ros.studies.sensitivity.steering import experiment, study
 SHIP = mariner()
 
 
-@pytest.fixture(scope='module')
-def found():
-    return study(SHIP, zigzag(15.0), keep=24)
-
-
-def test_words_hold_the_figures(found):
-    assert 'of 40 derivatives 24' in words.sentence(found)
-    seen = ' '.join(words.notes(found))
+def test_words_hold_the_figures(steered):
+    assert 'of 40 derivatives 24' in words.sentence(steered)
+    seen = ' '.join(words.notes(steered))
     assert '50 % costs 5.00 times 10 %' in seen
     assert 'it keeps the same 24' in seen
     assert '26 measurements: the 24 kept hold 18' in seen
@@ -29,18 +24,18 @@ def test_words_hold_the_figures(found):
     assert 'not quite the same' in ' '.join(words.notes(study(SHIP, zigzag(15.0), keep=12)))
 
 
-def test_losses_are_in_the_order_of_what_is_kept(found):
-    table = words.loss_table(found)
-    assert [row[0] for row in table.rows] == list(found.losses.ranking)
+def test_losses_are_in_the_order_of_what_is_kept(steered):
+    table = words.loss_table(steered)
+    assert [row[0] for row in table.rows] == list(steered.losses.ranking)
     assert [row[-2] for row in table.rows] == ['yes'] * 24 + ['no'] * 16
     row = next(row for row in table.rows if row[0] == 'Nud')
     assert row[-1] == 'Nd'
-    i = found.losses.names.index('Nud')
-    assert float(row[1]) == pytest.approx(1e3 * found.losses.table[i, 0], abs=1e-3)
+    i = steered.losses.names.index('Nud')
+    assert float(row[1]) == pytest.approx(1e3 * steered.losses.table[i, 0], abs=1e-3)
 
 
-def test_the_check_has_a_row_a_model_even_where_one_does_not_turn(found):
-    full, kept, by_group = words.check_table(found).rows
+def test_the_check_has_a_row_a_model_even_where_one_does_not_turn(steered):
+    full, kept, by_group = words.check_table(steered).rows
     assert full[:5] == ('full', '40', '26', '8.85', '7.01')
     assert kept[:3] == ('kept', '24', '18')
     assert by_group[:3] == ('kept by measurement', '29', '18')

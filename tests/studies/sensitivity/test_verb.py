@@ -63,9 +63,7 @@ def test_manoeuvre_and_number_kept_count(capsys: pytest.CaptureFixture[str]) -> 
     assert circle['check']['manoeuvre'] == 'zigzag:25'
 
 
-def test_a_ship_file_coasts(
-    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_ship_file_coasts(ship_file: Path, tmp_path, capsys) -> None:
     page = tmp_path / 'ship.html'
     found, told = result(capsys, '--ship', str(ship_file), '--report', str(page))
     assert found['manoeuvre'].startswith('coastdown:')
@@ -103,13 +101,7 @@ def test_a_ship_file_coasts(
         (['--ship', 'BARE'], 'has no baseline resistance; add `baseline`'),
     ],
 )
-def test_what_cannot_be_answered_is_told(
-    line: list[str],
-    message: str,
-    ship_file: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_cannot_be_answered_is_told(line, message, ship_file, tmp_path, capsys):
     bare = tmp_path / 'bare.yaml'
     bare.write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
     files = {'SHIP': str(ship_file), 'BARE': str(bare)}

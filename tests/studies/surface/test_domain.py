@@ -26,9 +26,7 @@ def test_agrees_with_a_triangulation(variables: int) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 5), st.integers(2, 12), st.integers(0, 10**6))
-def test_means_of_data_are_inside_however_flat_they_lie(
-    variables: int, count: int, seed: int
-) -> None:
+def test_means_of_data_are_inside_however_flat_they_lie(variables, count, seed):
     rng = np.random.default_rng(seed)
     # all on a line, at sizes apart by orders
     data = np.outer(rng.normal(size=count), rng.normal(size=variables)) * 10.0 ** np.arange(

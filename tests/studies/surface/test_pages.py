@@ -84,9 +84,7 @@ def test_page_of_a_regression(residual: tuple[ResidualFit, Float64], tmp_path: P
     assert words.domain(found).rows[3] == ('Fr', '0.1', '0.2')
 
 
-def test_hulls_that_others_leave_open_have_no_picture(
-    residual: tuple[ResidualFit, Float64], tmp_path: Path
-) -> None:
+def test_hulls_that_others_leave_open_have_no_picture(residual, tmp_path):
     found, values = residual
     few = np.arange(len(values)) < 36
     nine = fit_residual(found.hulls.take(few), values[few], form='sirotina')

@@ -47,9 +47,7 @@ def test_json_to_the_letter(table: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert 'degree 4' in shown.err
 
 
-def test_exports_predicts_and_reports(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_exports_predicts_and_reports(table: Path, tmp_path, capsys) -> None:
     new, code, page = tmp_path / 'new.csv', tmp_path / 'c_x.py', tmp_path / 'page.html'
     new.write_text('beta,alpha\n10,20\n0,120\n')
     more = ('--predict', str(new), '--export', str(code), '--report', str(page), '--json')
@@ -77,9 +75,7 @@ def test_exports_predicts_and_reports(
     assert text.count('data:image/svg+xml') == 3
 
 
-def test_errors_say_what_to_mend(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_errors_say_what_to_mend(table: Path, tmp_path, capsys) -> None:
     line = ['surface', str(table), '--inputs']
     assert main([*line, 'alpha,gamma', '--target', 'c_y']) == 1
     told = capsys.readouterr().err
@@ -103,12 +99,3 @@ def test_errors_say_what_to_mend(
     )
     assert "'c-x' is no name in Python" in capsys.readouterr().err
     assert not code.exists()
-
-
-def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
-    root = Path(__file__).resolve().parents[3]
-    line = 'surface docs/data/c_x.csv --inputs alpha,beta --target c_x'
-    assert f'shipdrag {line}' in (root / 'docs' / 'method.md').read_text(encoding='utf-8')
-    verb, data, *rest = line.split()
-    assert main([verb, str(root / data), *rest, '--json']) == 0
-    assert json.loads(capsys.readouterr().out)['degree'] == 4

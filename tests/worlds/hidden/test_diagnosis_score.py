@@ -113,9 +113,7 @@ def diagnose(ship_file, runs):
 """
 
 
-def test_ten_cases_are_scored_and_a_broken_run_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ten_cases_are_scored_and_a_broken_run_goes_on(tmp_path, monkeypatch, capsys) -> None:
     (tmp_path / 'fake.py').write_text(FAKE, encoding='utf-8')
     monkeypatch.syspath_prepend(tmp_path)
     out = tmp_path / 'fake.jsonl'
@@ -134,9 +132,7 @@ def test_ten_cases_are_scored_and_a_broken_run_goes_on(
     assert figures['unknown, outside the library'].count == 0
 
 
-def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(monkeypatch) -> None:
     given = []
 
     def fake(arguments):

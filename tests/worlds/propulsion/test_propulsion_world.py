@@ -173,9 +173,7 @@ def test_a_case_is_its_name_and_seed() -> None:
 @pytest.mark.parametrize(
     ('kind', 'hull', 'seed'), [('direct drive, fuel cut', 'tanker', 1), ('declutched', 'ferry', 3)]
 )
-def test_a_filtered_log_and_wandering_positions_together_are_no_force(
-    kind: str, hull: str, seed: int
-) -> None:
+def test_a_filtered_log_and_wandering_positions_together_are_no_force(kind, hull, seed):
     # r was off by 0.68 and 1.16 of its largest where each input alone was right
     rms = {row.suite: row.rms for row in score(Case(kind, hull, 'calm', seed), INPUTS)}
     assert rms['both'] < 2.0 * max(rms['log'], rms['track'], 0.01)

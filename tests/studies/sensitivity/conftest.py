@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A study of each kind, made once."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.manoeuvring.simulate import zigzag
+from shipdrag_ros.studies.sensitivity.coast import coast_from
+from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from shipdrag_ros.studies.sensitivity.steering import study
+from tests.runs import CARGO
+
+
+@pytest.fixture(scope='session')
+def steered():
+    return study(mariner(), zigzag(15.0), keep=24)
+
+
+@pytest.fixture(scope='session')
+def coasted():
+    return study_coast(CARGO, coast_from(CARGO))
