@@ -40,7 +40,7 @@ _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S),
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
 _STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
-_APART = 3  # log less speed over ground
+_APART = 3  # log less speed over ground, or that of the fixes
 _DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
 
@@ -68,6 +68,8 @@ class NoiseFilters(NamedTuple):
         What will be used.
     used : (NOISES,)
     work : (2 states, states)
+    beside : (3, FILTERS / whites)
+        Log evidence in the other instrument, in what both differ by, and in both.
     """
 
     mean: Float64
@@ -81,6 +83,7 @@ class NoiseFilters(NamedTuple):
     queue: Float64
     used: Float64
     work: Float64
+    beside: Float64
 
     @classmethod
     def fresh(cls) -> NoiseFilters:
@@ -100,6 +103,7 @@ class NoiseFilters(NamedTuple):
             np.tile(first, (_DELAY, 1)),
             first,
             np.zeros((2 * _STATES, _STATES)),
+            np.zeros((3, _GUSTS * _WANDERS * _TIMES)),
         )
 
 
@@ -120,7 +124,11 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
     """
     for which in range(4):
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
-        value = said[LOG] - said[GROUND] if which == _APART else value
+        if which == _APART:
+            ground = said[GROUND]
+            if np.isnan(ground):
+                ground = said[ADVANCE] / setting.step_s
+            value = said[LOG] - ground
         if not np.isnan(value):
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
@@ -274,15 +282,35 @@ def _filter(
 
 
 @compiled(inline=True, uncounted=True)
-def _evidence(noise: NoiseFilters, which: int, k: int) -> float:
-    """Return that of a filter: neither of two speeds wanders by more than what they differ by."""
-    found = noise.evidence[which, k]
-    if which < 2 and noise.seen[_APART] >= 8:
-        first, most = k - k % (_GUSTS * _WHITES), -np.inf
-        for white in range(_WHITES):
-            most = max(most, noise.evidence[_APART, first + white * _GUSTS])
-        found += most
-    return float(found)
+def _kind_of(k: int) -> int:
+    """Return which gust and slow error a filter has, whatever its white noise."""
+    return k % _GUSTS + _GUSTS * (k // (_GUSTS * _WHITES))
+
+
+@compiled(uncounted=True)
+def _compare(noise: NoiseFilters, which: int) -> None:
+    """
+    Fill in what the other instrument, and what both differ by, say of gusts and slow errors.
+
+    The gusts are the same ship's; what they differ by is the larger of both slow errors.
+    """
+    alone, apart, found = noise.beside
+    alone[:], apart[:], found[:] = -np.inf, -np.inf, 0.0
+    other = LOG if which != LOG else GROUND if noise.seen[GROUND] >= 8 else 2
+    if noise.seen[_APART] < 8 or (which == 2 and noise.seen[GROUND] >= 8):
+        return
+    for k in range(FILTERS):
+        kind = _kind_of(k)
+        alone[kind] = max(alone[kind], noise.evidence[other, k])
+        none = kind - kind % _GUSTS  # no gust moves one of them alone
+        apart[none] = max(apart[none], noise.evidence[_APART, k - k % _GUSTS])
+    for kind in range(len(found)):
+        gust, own = kind % _GUSTS, kind // _GUSTS
+        found[kind] = -np.inf
+        for its in range(_WANDERS * _TIMES):
+            larger = its if its // _TIMES > own // _TIMES else own
+            both = alone[gust + _GUSTS * its] + apart[_GUSTS * larger]
+            found[kind] = max(found[kind], both)
 
 
 @compiled(uncounted=True)
@@ -292,12 +320,13 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
     for which in range(3):
         if noise.seen[which] < 8:
             continue
-        best = -np.inf
+        _compare(noise, which)
+        beside, best = noise.beside[2], -np.inf
         for k in range(FILTERS):
-            best = max(best, _evidence(noise, which, k))
+            best = max(best, noise.evidence[which, k] + beside[_kind_of(k)])
         total = g = b = t = w = 0.0
         for k in range(FILTERS):
-            share = math.exp(_evidence(noise, which, k) - best)
+            share = math.exp(noise.evidence[which, k] + beside[_kind_of(k)] - best)
             gust, wander, wander_s, white = _parts(which, k)
             total += share
             g += share * math.log(gust)
