@@ -2,7 +2,7 @@
 """
 The noise of a steady record: small filters of a driven ship, averaged by their evidence.
 
-What log and speed over ground differ by is followed too: what both say is the ship.
+What log and speed over ground, or fixes, differ by is followed too: what both say is the ship.
 """
 
 from __future__ import annotations
