@@ -254,9 +254,11 @@ def test_a_monitor_that_starts_later_says_the_same(ship, long_records, start_s, 
     assert known(whole)
 
 
-def test_a_slow_down_is_told_that_follows_a_glide_and_even_power(long_records) -> None:
-    slowed = [one for one in long_records[0][1] if isinstance(one, NotCoastdown)]
-    assert any(2300 * S < one.start_ns - START_NS < 2340 * S for one in slowed)
+def test_a_slow_down_that_follows_a_glide_and_even_power_is_no_coastdown(long_records) -> None:
+    told = [one for one in long_records[0][1] if isinstance(one, EndedCoastdown)]
+    begun = [(one.start_ns - START_NS) / S for one in told if not one.withdrawn]
+    assert len(begun) == 4
+    assert not any(2250.0 < at_s < 2700.0 for at_s in begun)
 
 
 def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:

@@ -259,7 +259,7 @@ def predict(
             old, gust = p[LN_U, k], p[GUST, k]
             new = l_l * old + l_a * p[LN_A, k] + l_o * p[OPEN, k] + l_g * gust
             p[LN_A, k] = p[LN_A, k] + power * (new - old) + change * p[POWER, k]
-            p[WAY, k] += dt * (u * old + p[CURRENT, k])
+            p[WAY, k] += dt * (u * old + p[CURRENT, k] + p[EDDY, k])
             p[LAG, k] = keep_f * p[LAG, k] - u * (new - old)
             p[LN_U, k], p[GUST, k] = new, gust * keep_g
             p[WANDER, k] *= keep_b
@@ -268,7 +268,7 @@ def predict(
             old, gust = p[k, LN_U], p[k, GUST]
             new = l_l * old + l_a * p[k, LN_A] + l_o * p[k, OPEN] + l_g * gust
             p[k, LN_A] += power * (new - old) + change * p[k, POWER]
-            p[k, WAY] += dt * (u * old + p[k, CURRENT])
+            p[k, WAY] += dt * (u * old + p[k, CURRENT] + p[k, EDDY])
             p[k, LAG] = keep_f * p[k, LAG] - u * (new - old)
             p[k, LN_U], p[k, GUST] = new, gust * keep_g
             p[k, WANDER] *= keep_b
@@ -298,7 +298,7 @@ def predict(
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
         p[EDDY, EDDY] += (1.0 - keep_e * keep_e) * noise[N_EDDY] ** 2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
-        x[WAY] += dt * (u + x[CURRENT])
+        x[WAY] += dt * (u + x[CURRENT] + x[EDDY])
         lagged = keep_f * x[LAG] - u * change
         mean_lag += 0.5 * (x[LAG] + lagged) / _PARTS
         x[LAG] = lagged

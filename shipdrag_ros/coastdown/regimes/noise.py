@@ -2,7 +2,7 @@
 """
 The noise of a steady record: small filters of a driven ship, averaged by their evidence.
 
-What log and speed over ground differ by is followed too: what both say is the ship.
+What log and speed over ground, or fixes, differ by is followed too: what both say is the ship.
 """
 
 from __future__ import annotations
@@ -37,11 +37,10 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
-_WALKS = len(n.TRACK_WALK)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
 _STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
-_APART = 3  # log less speed over ground
+_APART = 3  # log less speed over ground, or that of the fixes
 _DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
 
@@ -69,6 +68,8 @@ class NoiseFilters(NamedTuple):
         What will be used.
     used : (NOISES,)
     work : (2 states, states)
+    beside : (3, FILTERS / whites)
+        Log evidence in the other instrument, in what both differ by, and in both.
     """
 
     mean: Float64
@@ -82,6 +83,7 @@ class NoiseFilters(NamedTuple):
     queue: Float64
     used: Float64
     work: Float64
+    beside: Float64
 
     @classmethod
     def fresh(cls) -> NoiseFilters:
@@ -101,25 +103,18 @@ class NoiseFilters(NamedTuple):
             np.tile(first, (_DELAY, 1)),
             first,
             np.zeros((2 * _STATES, _STATES)),
+            np.zeros((3, _GUSTS * _WANDERS * _TIMES)),
         )
 
 
 @compiled(inline=True, uncounted=True)
-def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
-    """Return gust, slow error and its time, white noise and walk of a filter."""
+def _parts(which: int, k: int) -> tuple[float, float, float, float]:
+    """Return gust, slow error and its time, and white noise of a filter."""
     gust = 0.0 if which == _APART else n.GUST[k % _GUSTS]
     k //= _GUSTS
-    if which == 2:
-        return (
-            gust,
-            float(n.CURRENT[1]),
-            float(n.CURRENT_S),
-            n.WHITE[k % _WHITES],
-            n.TRACK_WALK[k // _WHITES % _WALKS],
-        )
     white = n.WHITE[k % _WHITES]
     k //= _WHITES
-    return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white, 0.0
+    return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white
 
 
 @compiled(uncounted=True)
@@ -129,7 +124,11 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
     """
     for which in range(4):
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
-        value = said[LOG] - said[GROUND] if which == _APART else value
+        if which == _APART:
+            ground = said[GROUND]
+            if np.isnan(ground):
+                ground = said[ADVANCE] / setting.step_s
+            value = said[LOG] - ground
         if not np.isnan(value):
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
@@ -201,9 +200,8 @@ def _one(
     spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
-    walks = _WALKS * _GUSTS * _WHITES
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
-    for k in range(0, walks if which == 2 else FILTERS, stride):
+    for k in range(0, FILTERS, stride):
         gained = _filter(noise, setting, which, k, value, spread, a)
         noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
 
@@ -232,7 +230,7 @@ def _filter(
 ) -> float:
     """Carry one filter over a bin; return the log density of the reading."""
     x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
-    gust, wander, wander_s, white, walk = _parts(which, k)
+    gust, wander, wander_s, white = _parts(which, k)
     dt, pace = setting.step_s, setting.pace
     keep = 1.0  # no hull brings back what they differ by
     if which != _APART:
@@ -264,7 +262,6 @@ def _filter(
         p[1, 1] += (n.POWER_DRIFT * x[1]) ** 2 * dt / (600.0 * pace)
     p[2, 2] += (1.0 - keep_g * keep_g) * (gust * a) ** 2
     p[3, 3] += (1.0 - keep_b * keep_b) * wander * wander
-    p[4, 4] += walk * walk * dt
     first, second = (4, 4) if which == 2 else (0, 3)
     variance = (white * spread) ** 2 + _rounding(noise, which) ** 2 + 1e-12
     off = -x[4] if which == 2 else value - x[0] - x[3]
@@ -285,15 +282,35 @@ def _filter(
 
 
 @compiled(inline=True, uncounted=True)
-def _evidence(noise: NoiseFilters, which: int, k: int) -> float:
-    """Return that of a filter: neither of two speeds wanders by more than what they differ by."""
-    found = noise.evidence[which, k]
-    if which < 2 and noise.seen[_APART] >= 8:
-        first, most = k - k % (_GUSTS * _WHITES), -np.inf
-        for white in range(_WHITES):
-            most = max(most, noise.evidence[_APART, first + white * _GUSTS])
-        found += most
-    return float(found)
+def _kind_of(k: int) -> int:
+    """Return which gust and slow error a filter has, whatever its white noise."""
+    return k % _GUSTS + _GUSTS * (k // (_GUSTS * _WHITES))
+
+
+@compiled(uncounted=True)
+def _compare(noise: NoiseFilters, which: int) -> None:
+    """
+    Fill in what the other instrument, and what both differ by, say of gusts and slow errors.
+
+    The gusts are the same ship's; what they differ by is the larger of both slow errors.
+    """
+    alone, apart, found = noise.beside
+    alone[:], apart[:], found[:] = -np.inf, -np.inf, 0.0
+    other = LOG if which != LOG else GROUND if noise.seen[GROUND] >= 8 else 2
+    if noise.seen[_APART] < 8 or (which == 2 and noise.seen[GROUND] >= 8):
+        return
+    for k in range(FILTERS):
+        kind = _kind_of(k)
+        alone[kind] = max(alone[kind], noise.evidence[other, k])
+        none = kind - kind % _GUSTS  # no gust moves one of them alone
+        apart[none] = max(apart[none], noise.evidence[_APART, k - k % _GUSTS])
+    for kind in range(len(found)):
+        gust, own = kind % _GUSTS, kind // _GUSTS
+        found[kind] = -np.inf
+        for its in range(_WANDERS * _TIMES):
+            larger = its if its // _TIMES > own // _TIMES else own
+            both = alone[gust + _GUSTS * its] + apart[_GUSTS * larger]
+            found[kind] = max(found[kind], both)
 
 
 @compiled(uncounted=True)
@@ -303,33 +320,34 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
     for which in range(3):
         if noise.seen[which] < 8:
             continue
-        filters = _WALKS * _GUSTS * _WHITES if which == 2 else FILTERS
-        best = -np.inf
-        for k in range(filters):
-            best = max(best, _evidence(noise, which, k))
-        total = g = b = t = w = q = 0.0
-        for k in range(filters):
-            share = math.exp(_evidence(noise, which, k) - best)
-            gust, wander, wander_s, white, walk = _parts(which, k)
+        _compare(noise, which)
+        beside, best = noise.beside[2], -np.inf
+        for k in range(FILTERS):
+            best = max(best, noise.evidence[which, k] + beside[_kind_of(k)])
+        total = g = b = t = w = 0.0
+        for k in range(FILTERS):
+            share = math.exp(noise.evidence[which, k] + beside[_kind_of(k)] - best)
+            gust, wander, wander_s, white = _parts(which, k)
             total += share
             g += share * math.log(gust)
             b += share * math.log(wander)
             t += share * math.log(wander_s)
             w += share * math.log(white)
-            q += share * math.log(max(walk, 1e-6))
         spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
         step = setting.step_s if which == 2 else 1.0
         spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
         white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
+        wander, wander_s = math.exp(b / total), math.exp(t / total)
         if which == 0:
-            out[N_WANDER], out[N_WANDER_S] = math.exp(b / total), math.exp(t / total)
-            out[N_LOG] = white
+            out[N_WANDER], out[N_WANDER_S], out[N_LOG] = wander, wander_s, white
         elif which == 1:
-            out[N_EDDY], out[N_EDDY_S] = math.exp(b / total), math.exp(t / total)
-            out[N_GROUND] = white
-        else:
-            out[N_FIX], out[N_WALK] = white, math.exp(q / total)
+            out[N_EDDY], out[N_EDDY_S], out[N_GROUND] = wander, wander_s, white
+        elif noise.seen[1] < 8:
+            out[N_EDDY], out[N_EDDY_S], out[N_FIX], out[N_WALK] = wander, wander_s, white, 0.0
+        else:  # the speed over ground has said what is common
+            out[N_FIX] = white
+            out[N_WALK] = wander * math.sqrt(2.0 * wander_s * setting.pace)
     if noise.rate[1] > 8.0:
         out[N_RATE] = math.sqrt(noise.rate[0]) + 1e-5

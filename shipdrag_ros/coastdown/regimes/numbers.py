@@ -98,7 +98,6 @@ WANDER = _grid('WANDER', (0.005, 0.012, 0.03, 0.07, 0.14), 'm/s', 'sd of the slo
 WANDER_S = _grid('WANDER_S', (12.0, 60.0), 's', 'its time')
 WHITE = _grid('WHITE', (0.4, 1.0), '1', 'white noise over the spread of differences of bins')
 WHITE_FLOOR = _number('WHITE_FLOOR', 0.0015, 'of the speed', 'no log resolves less')
-TRACK_WALK = _grid('TRACK_WALK', (0.05, 0.2, 0.6), 'm/sqrt(s)', 'wander of a fix')
 CURRENT = _grid('CURRENT', (0.3, 0.03), 'm/s', 'sd at first, and of its change')
 CURRENT_S = _number('CURRENT_S', 600.0, 's', 'time of its change: eddies of 5 to 60 min')
 POWER_DRIFT = _number('POWER_DRIFT', 0.01, 'ln in 10 min', 'sd of the speed under even power')
