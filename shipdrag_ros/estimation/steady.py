@@ -156,22 +156,15 @@ def steady_means(
     time_s, value, weight : (b,)
         The weight is the sum of those of the samples.
     """
-    # outliers are found by what is near in time: the record may drift
-    edges = _parts(time_s, 2.0 * _BLOCK_S)
+    # outliers are found by what is near in time: the record may drift, and at its end slow down
+    edges = _edges(time_s, 2.0 * _BLOCK_S, fine_s)
     near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
     away = np.abs(value - near)
     # of a coarse display most readings are the median itself: that does not show the scatter
     scatter = max(MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
     keep = away <= OUTLIER * scatter
     time_s, value, weight = time_s[keep], value[keep], weight[keep]
-    split = len(time_s)
-    if fine_s > 0.0:
-        split = np.searchsorted(time_s, time_s[-1] - fine_s)
-    edges = np.zeros(1, np.int64)
-    if split > 0:
-        edges = _parts(time_s[:split], bin_s)
-    if split < len(time_s):
-        edges = np.concatenate((edges, split + _parts(time_s[split:], FINE_S)[1:]))
+    edges = _edges(time_s, bin_s, fine_s)
     bins = len(edges) - 1
     mean_s, mean, total = np.zeros(bins), np.zeros(bins), np.zeros(bins)
     for i in range(bins):
@@ -180,6 +173,20 @@ def steady_means(
             mean_s[i] += weight[j] * time_s[j]
             mean[i] += weight[j] * value[j]
     return mean_s / total, mean / total, total
+
+
+@compiled
+def _edges(time_s: Float64, length_s: float, fine_s: float) -> Int64:
+    """Return where each part begins, of `FINE_S` in the last `fine_s`, and the end of the last."""
+    split = len(time_s)
+    if fine_s > 0.0:
+        split = np.searchsorted(time_s, time_s[-1] - fine_s)
+    edges = np.zeros(1, np.int64)
+    if split > 0:
+        edges = _parts(time_s[:split], length_s)
+    if split < len(time_s):
+        edges = np.concatenate((edges, split + _parts(time_s[split:], FINE_S)[1:]))
+    return edges
 
 
 @compiled

@@ -42,6 +42,7 @@ _WIND_POINTS = 25
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _ABOVE = 1.05  # of the highest median: she was hardly faster
+_LEAST_BEFORE = 12  # rows of the steady record: fewer show no speed
 _BLOCKS, _BLOCKS_OF_SPEED = 12, 48  # whose medians outliers do not reach
 
 
@@ -77,16 +78,7 @@ class InitialGuess:
         EstimationError
             If the ship does not slow down.
         """
-        code = min(np.unique(coast.kind).tolist(), key=lambda code: (code % KIND_COUNT, code))
-        kind, chosen = code % KIND_COUNT, coast.kind == code
-        time_s, value = coast.time_s[chosen], coast.value[chosen]
-        blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
-        count = min(blocks, len(time_s) // 4)
-        edges = np.linspace(0.0, len(time_s), count + 1).astype(np.int64)
-        when, speed = block_medians(time_s, edges), block_medians(value, edges)
-        if kind == POSITION:
-            speed = np.diff(speed) / np.diff(when)
-            when = 0.5 * (when[1:] + when[:-1])
+        when, speed = _speeds(coast)
         top = float(speed.max())
         if not top > 0.0:
             raise EstimationError(
@@ -99,9 +91,9 @@ class InitialGuess:
         mean_t, mean = np.average(when, weights=weight), np.average(inverse, weights=weight)
         t = when - mean_t
         slope = float((weight * t * (inverse - mean)).sum() / (weight * t * t).sum())
-        if not slope * float(np.ptp(time_s)) > _LEAST_LOSS * mean:
+        if not slope * float(np.ptp(coast.time_s)) > _LEAST_LOSS * mean:
             raise EstimationError(
-                f'no deceleration in {np.ptp(time_s):.4g} s: give a longer window, or one after '
+                f'no deceleration in {np.ptp(coast.time_s):.4g} s: give a longer window, or one after '
                 'the engine stop'
             )
         first = mean - slope * mean_t
@@ -112,6 +104,20 @@ class InitialGuess:
             float(np.clip(speed[-1] / v0, 0.05, 0.9)),
             np.stack([when, speed]),
         )
+
+
+def _speeds(rows: Rows) -> tuple[Float64, Float64]:
+    """Return times and median speeds of parts of what its best input says."""
+    code = min(np.unique(rows.kind).tolist(), key=lambda code: (code % KIND_COUNT, code))
+    kind, chosen = code % KIND_COUNT, rows.kind == code
+    time_s, value = rows.time_s[chosen], rows.value[chosen]
+    blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
+    edges = np.linspace(0.0, len(time_s), min(blocks, len(time_s) // 4) + 1).astype(np.int64)
+    when, speed = block_medians(time_s, edges), block_medians(value, edges)
+    if kind == POSITION:
+        speed = np.diff(speed) / np.diff(when)
+        when = 0.5 * (when[1:] + when[:-1])
+    return when, speed
 
 
 def estimate(
@@ -145,6 +151,9 @@ def estimate(
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
     rows, variance = record.condensed(guess.speed_m_s, halved_s, quick=quick)
+    before = _speeds(record.steady)[1] if len(record.steady.time_s) >= _LEAST_BEFORE else []
+    # the stop may be before the window: then the law reaches up to the speed there
+    top = float(max([guess.speed_m_s, np.median(before)])) if len(before) else guess.speed_m_s
     weather = _weather(window, run_down, guess.seen)
     problem = RunModel.of(
         rows,
@@ -153,7 +162,7 @@ def estimate(
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
         speed_m_s=guess.speed_m_s,
-        range_m_s=(guess.lowest * guess.speed_m_s, guess.speed_m_s),
+        range_m_s=(guess.lowest * guess.speed_m_s, top),
         weather=weather,
     )
     found = infer(problem, guess.seen, quick=quick)
