@@ -42,7 +42,6 @@ _WIND_POINTS = 25
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _ABOVE = 1.05  # of the highest median: she was hardly faster
-_LEAST_BEFORE = 12  # rows of the steady record: fewer show no speed
 _BLOCKS, _BLOCKS_OF_SPEED = 12, 48  # whose medians outliers do not reach
 
 
@@ -93,8 +92,8 @@ class InitialGuess:
         slope = float((weight * t * (inverse - mean)).sum() / (weight * t * t).sum())
         if not slope * float(np.ptp(coast.time_s)) > _LEAST_LOSS * mean:
             raise EstimationError(
-                f'no deceleration in {np.ptp(coast.time_s):.4g} s: give a longer window, or one after '
-                'the engine stop'
+                f'no deceleration in {np.ptp(coast.time_s):.4g} s: give a longer window, or one '
+                'after the engine stop'
             )
         first = mean - slope * mean_t
         v0 = min(1.0 / first, _ABOVE * top) if first > 0.0 else _ABOVE * top
@@ -118,6 +117,12 @@ def _speeds(rows: Rows) -> tuple[Float64, Float64]:
         speed = np.diff(speed) / np.diff(when)
         when = 0.5 * (when[1:] + when[:-1])
     return when, speed
+
+
+def _usual_speed(steady: Rows) -> float:
+    """Return the speed before the window, 0 where nothing shows it."""
+    speed = _speeds(steady)[1] if len(steady.time_s) else np.empty(0)
+    return float(np.median(speed)) if len(speed) else 0.0
 
 
 def estimate(
@@ -151,9 +156,6 @@ def estimate(
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
     rows, variance = record.condensed(guess.speed_m_s, halved_s, quick=quick)
-    before = _speeds(record.steady)[1] if len(record.steady.time_s) >= _LEAST_BEFORE else []
-    # the stop may be before the window: then the law reaches up to the speed there
-    top = float(max([guess.speed_m_s, np.median(before)])) if len(before) else guess.speed_m_s
     weather = _weather(window, run_down, guess.seen)
     problem = RunModel.of(
         rows,
@@ -162,7 +164,11 @@ def estimate(
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
         speed_m_s=guess.speed_m_s,
-        range_m_s=(guess.lowest * guess.speed_m_s, top),
+        # the stop may be before the window: the law reaches up to the speed there
+        range_m_s=(
+            guess.lowest * guess.speed_m_s,
+            max(guess.speed_m_s, _usual_speed(record.steady)),
+        ),
         weather=weather,
     )
     found = infer(problem, guess.seen, quick=quick)
