@@ -59,7 +59,7 @@ class World:
     first_speed
         And of the run.
     true_r
-        And of speeds and the run.
+        And of speeds and the run, in calm deep water.
     """
 
     count: int
@@ -76,7 +76,8 @@ class World:
         Return the first world.
         """
         of = cases_a
-        more = of.condition, of.observe, of.stops_ns, of.first_speed, of.true_r
+        true_r = partial(of.true_r, calm=True)
+        more = of.condition, of.observe, of.stops_ns, of.first_speed, true_r
         return cls(of.count(), lambda number: of.reveal(number).names, *more)
 
     @classmethod
@@ -85,7 +86,8 @@ class World:
         Return the world of another hand.
         """
         of, plans = cases_b, plans_of(seed)
-        more = of.condition, of.observe, of.stops_ns, of.first_speed, of.true_r
+        true_r = partial(of.true_r, calm=True)
+        more = of.condition, of.observe, of.stops_ns, of.first_speed, true_r
         seeded = (partial(each, seed=seed) for each in more)
         return cls(len(plans), lambda number: tuple(sorted(plans[number][0])), *seeded)
 

@@ -220,14 +220,16 @@ def first_speed(number: int, run: int = 0) -> float:
     return _case(number).voyages[run].leg.speed_m_s
 
 
-def true_r(number: int, speed_m_s: Array, run: int = 0) -> Array:
+def true_r(number: int, speed_m_s: Array, run: int = 0, *, calm: bool = False) -> Array:
     """
     Return the true r at speeds [m/s^2]: of hull, stopped propeller and what else goes with speed.
+
+    That in calm deep water leaves wind and depth out.
     """
     case = _case(number)
     return coasting_m_s2(
         case.voyages[run].leg,
-        _acting(case, run),
+        tuple(each for each in _acting(case, run) if not calm or each.name not in _WEATHER),
         np.asarray(speed_m_s, np.float64),
         first_heading_rad=case.voyages[0].heading_rad,
         world=case.world,
@@ -282,6 +284,9 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recor
         heading_rad=heading,
         streams=streams,
     )
+
+
+_WEATHER = 'wind', 'shallow_water'
 
 
 def _acting(case: _Case, which: int) -> tuple[Effect, ...]:

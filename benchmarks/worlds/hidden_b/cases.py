@@ -200,16 +200,19 @@ def reveal(number: int, seed: int = SEED) -> Truth:
     )
 
 
-def true_r(number: int, speed_m_s: Array, run: int = 0, seed: int = SEED) -> Array:
+def true_r(
+    number: int, speed_m_s: Array, run: int = 0, seed: int = SEED, *, calm: bool = False
+) -> Array:
     """
     Return the true r at speeds [m/s^2]: of hull, stopped propeller and what else goes with speed.
 
-    Wind, waves, current, helm and what comes and goes are no part of it.
+    Wind, waves, current, helm and what comes and goes are no part of it; nor is the depth, where
+    it is that in calm deep water.
     """
     setting = _case(number, seed).settings[run]
     speed = np.asarray(speed_m_s, np.float64)
     hull = setting.hull
-    still = np.interp(speed, hull.grid_m_s, setting.still_n())
+    still = np.interp(speed, hull.grid_m_s, setting.still_n(deep=calm))
     grid = np.linspace(0.0, 1.2 * hull.speed_m_s, 160)
     drag = setting.screw.drag_n(grid, steady_of(setting))
     return (still + np.interp(speed, grid, drag)) / setting.mass_kg
@@ -281,7 +284,7 @@ def fresh(base: Setting) -> Setting:
     """
     Return a copy whose lists are its own.
     """
-    lists = ('still', 'timed', 'wind', 'flow', 'helm', 'shear', 'waves')
+    lists = ('still', 'of_depth', 'timed', 'wind', 'flow', 'helm', 'shear', 'waves')
     return replace(base, **{name: list(getattr(base, name)) for name in lists})
 
 

@@ -121,7 +121,7 @@ def shallow_water(d: Draw) -> Hidden:
         return np.interp(v / (1.0 - np.clip(loss, 0.0, 0.35)), v, r)
 
     def apply(setting: Setting) -> None:
-        setting.still.append(still)
+        setting.of_depth.append(still)
         setting.depth_m = depth
         setting.added *= 1.0 + 0.8 * (hull.draught_m / depth) ** 2
 

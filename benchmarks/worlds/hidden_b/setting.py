@@ -56,8 +56,9 @@ class Setting:
         Time of day at the stop, for the tide.
     mass, added
         Factors of mass and of added mass.
-    still
-        What the resistance table becomes: functions (hull, speeds, resistance) -> resistance.
+    still, of_depth
+        What the resistance table becomes: functions (hull, speeds, resistance) -> resistance; the
+        latter are no part of it in deep water.
     timed
         Forces that come and go; part of no r(v).
     helm
@@ -85,6 +86,7 @@ class Setting:
     mass: float = 1.0
     added: float = 1.0
     still: list[Callable[[Hull, Array, Array], Array]] = field(default_factory=list)
+    of_depth: list[Callable[[Hull, Array, Array], Array]] = field(default_factory=list)
     timed: list[Timed] = field(default_factory=list)
     wind: list[tuple[float, float]] = field(default_factory=list)
     flow: list[tuple[float, float]] = field(default_factory=list)
@@ -109,12 +111,12 @@ class Setting:
         c, s = np.cos(self.first_rad), np.sin(self.first_rad)
         return float(along * c - port * s), float(along * s + port * c)
 
-    def still_n(self) -> Array:
+    def still_n(self, *, deep: bool = False) -> Array:
         """
-        Return the resistance on the hull's grid of speeds, propeller apart.
+        Return the resistance on the hull's grid of speeds, propeller apart; in deep water, if so.
         """
         found = self.hull.still_n
-        for change in self.still:
+        for change in self.still if deep else [*self.still, *self.of_depth]:
             found = change(self.hull, self.hull.grid_m_s, found)
         return found
 
