@@ -46,7 +46,7 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
     now[k + motion.EXTRAS :] += 0.5
     now[:k] += 0.01
     now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
-    now[k + motion.SCALE], now[k + motion.CURRENT] = 0.01, 0.2
+    now[k + motion.SCALE], now[k + motion.CURRENT], now[k + motion.LEFT] = 0.01, 0.2, 0.3
 
     def predicted(unknowns: Float64) -> Float64:
         return -predict(problem.forces, unknowns, problem.grid_s, problem.rows)[0][0]
@@ -59,6 +59,15 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
         size = max(float(np.abs(by).max()), 1e-3)
         # where a reading is taken at a node of a table, the slope jumps a little
         np.testing.assert_allclose(table[1 + place], by, rtol=0.0, atol=0.01 * size)
+
+
+def test_thrust_that_is_left_is_part_of_that_before_the_stop(ship: Ship) -> None:
+    problem = problem_of(ship)
+    now = problem.start.copy()
+    now[problem.coefficients + motion.LEFT] = 0.5
+    _, rate = motion.integrate(problem.forces, now, problem.grid_s)
+    assert rate[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert rate[:, 0].max() < 1e-9
 
 
 def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_current(ship):
