@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,13 @@ def note(found: Estimate, words: str) -> bool:
     return any(words in each for each in found.notes)
 
 
+def said(found: Estimate) -> tuple[float, float]:
+    """Return in % how much acts that no input shows, as a note says it, and two sigma of it."""
+    words = ' '.join(each for each in found.notes if 'of the resistance at the stop' in each)
+    share, spread = re.findall(r' (\d+) ± (\d+) % ', words)[0]
+    return float(share), float(spread)
+
+
 @pytest.fixture(scope='module')
 def towed() -> list[tuple[Estimate, Float64]]:
     """Coastdowns in which a tug's line holds her from the stop on, and her speed."""
@@ -52,10 +61,13 @@ def test_the_line_of_a_tug_is_in_the_band(towed: list[tuple[Estimate, Float64]])
 
 
 def test_a_force_that_is_likely_is_said(towed: list[tuple[Estimate, Float64]]) -> None:
-    said = [found for found, _ in towed if note(found, 'a force that no input shows slows her')]
-    assert said
-    for found in said:
+    likely = [found for found, _ in towed if note(found, 'a force that no input shows slows her')]
+    assert likely
+    for found in likely:
         assert np.all(found.whole.resistance_m_s2 > found.conditions.resistance_m_s2)
+        share, spread = said(found)
+        assert share - spread < 40.0
+        assert share + spread > 10.0
 
 
 def test_what_is_foretold_is_the_motion_with_that_force(
@@ -93,3 +105,4 @@ def test_thrust_that_is_left_is_in_the_band(by_shaft: bool) -> None:
     found = estimated(sense(truth, sensors, seed=3), 900.0, 1800.0)
     assert held(found) > 0.9
     assert by_shaft or note(found, 'thrust is left after the stop')
+    assert by_shaft or abs(said(found)[0] - 40.0) < said(found)[1]

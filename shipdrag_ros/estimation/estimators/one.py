@@ -7,6 +7,7 @@ An adapter: a window becomes rows and a prior of the stop, the posterior becomes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -223,17 +224,23 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
 
 def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
     """Yield what acts after the stop, where that is more likely than not."""
-    problem = found.problem
-    for name, at, what in (
-        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
-        (THRUST_LEFT, problem.coefficients + motion.LEFT, 'thrust is left after the stop,'),
+    problem, k = found.problem, found.problem.coefficients
+    at_stop = found.mean[k + motion.SPEED : k + motion.SPEED + 1]
+    r = read(found, at_stop, without=_CONDITIONS).resistance_m_s2[0]
+    unit = motion.shapes_at(problem.forces, at_stop)[1][0, problem.of_hull, 0]
+    for name, at, share, what in (
+        (HELD_FORCE, problem.of_hull, unit / r, 'a force that no input shows slows her by'),
+        (THRUST_LEFT, k + motion.LEFT, 1.0, 'thrust is left after the stop,'),
     ):
         chance = found.chance(name)
         if chance > 0.5:
+            # where it acts: it is 0 where not
+            mean = found.mean[at] / chance
+            spread = (sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2
             yield (
-                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the '
-                f'resistance at the stop (probability {chance:.2g}): it is no part of r, and '
-                'makes its band wide; give a window in which nothing acts but the water'
+                f'{what} {100.0 * share * mean:.0f} ± {200.0 * share * math.sqrt(spread):.0f} % '
+                f'of the resistance at the stop (probability {chance:.2g}): it is no part of r, '
+                'and makes its band wide; give a window in which nothing acts but the water'
             )
 
 
