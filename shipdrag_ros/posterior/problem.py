@@ -167,7 +167,7 @@ class RunModel:
         range_m_s
             Over which the law reaches: from the lowest to the highest speed, of other runs too.
         weather
-            None: wind and depth are part of r.
+            None: wind and depth are part of r, and no unseen force acts.
         """
         law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)

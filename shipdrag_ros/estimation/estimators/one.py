@@ -27,7 +27,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
-from shipdrag_ros.posterior.priors import HELD_FORCE, THRUST_LEFT
+from shipdrag_ros.posterior.priors import HELD_FORCE, LEFT_S, THRUST_LEFT
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
@@ -358,7 +358,7 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
 
 
 def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str, ...]) -> AtEnd:
-    """Return speed and r at the end of the window."""
+    """Return speed, r and thrust that is left at the end of the window."""
     problem, k = found.problem, found.problem.coefficients
     at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
@@ -367,11 +367,17 @@ def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str
     by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
     by[1 + k + motion.SCALE :] = 0.0
     speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    at_stop = read(found, found.mean[k + motion.SPEED : k + motion.SPEED + 1]).resistance_m_s2[0]
+    since_s = float(coast.time_s[-1] - found.mean[k + motion.STOP])
+    per_left = float(at_stop) * math.exp(-max(since_s, 0.0) / LEFT_S.mean)
+    left = k + motion.LEFT
     return AtEnd(
         last,
         speed_sd,
         float(at_end.resistance_m_s2[0]),
         float(at_end.sigma_m_s2[0]),
+        per_left * float(found.mean[left]),
+        per_left * math.sqrt(found.covariance[left, left]),
     )
 
 
