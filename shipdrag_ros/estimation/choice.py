@@ -279,17 +279,16 @@ def _mixed(one: Estimate, other: Estimate, doubt: float, note: str) -> Estimate:
         sigma_parts=parts,
         notes=(*one.notes, note),
     )
-    last = {}
-    for name, sigma in (
-        ('speed_m_s', 'speed_sigma_m_s'),
-        ('resistance_m_s2', 'sigma_m_s2'),
-        ('thrust_m_s2', 'thrust_sigma_m_s2'),
-    ):
+    last = {
+        f'last_{name}': (1.0 - doubt) * getattr(one, f'last_{name}')
+        + doubt * getattr(other, f'last_{name}')
+        for name in ('speed_m_s', 'resistance_m_s2', 'thrust_m_s2')
+    }
+    for name, sigma in (('speed_m_s', 'speed_sigma_m_s'), ('resistance_m_s2', 'sigma_m_s2')):
         two = [
             (getattr(each, f'last_{name}'), getattr(each, f'last_{sigma}'))
             for each in (one, other)
         ]
-        last[f'last_{name}'] = (1.0 - doubt) * two[0][0] + doubt * two[1][0]
         last[f'last_{sigma}'] = float(_sd(*two[0], *two[1], doubt))
     valid = mixed.valid_curve
     if len(valid) < 2:

@@ -109,4 +109,3 @@ class AtEnd(NamedTuple):
     last_resistance_m_s2: float
     last_sigma_m_s2: float
     last_thrust_m_s2: float = 0.0
-    last_thrust_sigma_m_s2: float = 0.0

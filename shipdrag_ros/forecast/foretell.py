@@ -53,7 +53,7 @@ class Beginning:
         Where distances are over ground; None: they are through water.
     run_down_s, run_down_sd_s
         Of a shaft that has not been stopped yet, or of thrust that is left.
-    thrust, thrust_sd
+    thrust
         Over what slows her now.
     """
 
@@ -67,7 +67,6 @@ class Beginning:
     run_down_s: float = 0.0
     run_down_sd_s: float = 0.0
     thrust: float = 1.0
-    thrust_sd: float = 0.0
 
     @classmethod
     def of(cls, estimate: Estimate) -> Beginning:
@@ -75,19 +74,18 @@ class Beginning:
         Return the end of a window; over ground where positions were used.
         """
         speeds = [sd for name, sd in estimate.noise_sd.items() if name.startswith('speed')]
-        whole = estimate.whole
-        slows = float(np.interp(estimate.last_speed_m_s, whole.speed_m_s, whole.resistance_m_s2))
+        last_m_s, whole = estimate.last_speed_m_s, estimate.whole
+        slows = float(np.interp(last_m_s, whole.speed_m_s, whole.resistance_m_s2))
         return cls(
             made_ns=estimate.end_ns,
             stop_m_s=float(estimate.curve.speed_m_s[-1]),
-            speed_m_s=estimate.last_speed_m_s,
+            speed_m_s=last_m_s,
             speed_sd_m_s=estimate.last_speed_sigma_m_s,
             white_m_s=min((sd for sd in speeds if math.isfinite(sd)), default=0.0),
             current_m_s=(estimate.current_m_s or 0.0) if estimate.by_position else None,
             current_sd_m_s=estimate.current_sigma_m_s or 0.0,
             run_down_s=LEFT_S.mean,
             thrust=estimate.last_thrust_m_s2 / slows,
-            thrust_sd=estimate.last_thrust_sigma_m_s2 / slows,
         )
 
 
@@ -170,8 +168,8 @@ def foretell_from(
     late = (now.speed_sd_m_s / a[0]) ** 2
     reading = (_reading_sd(now) / a[:-1]) ** 2
     held, held_way = _run_down(now.thrust, now.run_down_s, gliding, a[:-1], ground)
-    more, longer_s = now.thrust + now.thrust_sd, now.run_down_s + now.run_down_sd_s
-    longer, longer_way = _run_down(more, longer_s, gliding, a[:-1], ground)
+    longer_s = now.run_down_s + now.run_down_sd_s
+    longer, longer_way = _run_down(now.thrust, longer_s, gliding, a[:-1], ground)
     time = gliding + held
     times = _bands(
         time, time, _variance(weights, covariance), late + reading + (longer - held) ** 2

@@ -369,15 +369,13 @@ def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str
     speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
     at_stop = read(found, found.mean[k + motion.SPEED : k + motion.SPEED + 1]).resistance_m_s2[0]
     since_s = float(coast.time_s[-1] - found.mean[k + motion.STOP])
-    per_left = float(at_stop) * math.exp(-max(since_s, 0.0) / LEFT_S.mean)
-    left = k + motion.LEFT
+    left = float(found.mean[k + motion.LEFT]) * math.exp(-max(since_s, 0.0) / LEFT_S.mean)
     return AtEnd(
         last,
         speed_sd,
         float(at_end.resistance_m_s2[0]),
         float(at_end.sigma_m_s2[0]),
-        per_left * float(found.mean[left]),
-        per_left * math.sqrt(found.covariance[left, left]),
+        left * float(at_stop),
     )
 
 
