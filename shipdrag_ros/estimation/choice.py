@@ -282,7 +282,7 @@ def _mixed(one: Estimate, other: Estimate, doubt: float, note: str) -> Estimate:
     last = {
         f'last_{name}': (1.0 - doubt) * getattr(one, f'last_{name}')
         + doubt * getattr(other, f'last_{name}')
-        for name in ('speed_m_s', 'resistance_m_s2')
+        for name in ('speed_m_s', 'resistance_m_s2', 'thrust_m_s2')
     }
     for name, sigma in (('speed_m_s', 'speed_sigma_m_s'), ('resistance_m_s2', 'sigma_m_s2')):
         two = [

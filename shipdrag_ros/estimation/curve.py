@@ -101,10 +101,11 @@ class ValidRange(NamedTuple):
 
 class AtEnd(NamedTuple):
     """
-    Speed through water [m/s] and r [m/s^2] at the end of a window, with their sigmas.
+    Speed through water [m/s], r and thrust that is left [m/s^2] at the end of a window.
     """
 
     last_speed_m_s: float
     last_speed_sigma_m_s: float
     last_resistance_m_s2: float
     last_sigma_m_s2: float
+    last_thrust_m_s2: float = 0.0

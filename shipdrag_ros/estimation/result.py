@@ -138,6 +138,8 @@ class Estimate:
         repeatable sigma, as in S1. It says nothing about bias.
     last_speed_m_s, last_speed_sigma_m_s, last_resistance_m_s2, last_sigma_m_s2
         Estimates at `end_ns`.
+    last_thrust_m_s2
+        Thrust that is left at `end_ns`, no part of any curve; how well it is known is in theirs.
     tracks
         Measured and fitted values of each input used.
     current_m_s, current_sigma_m_s
@@ -184,6 +186,7 @@ class Estimate:
     reference: Reference = field(default_factory=Reference)
     sigma_parts: dict[str, Float64] = field(default_factory=dict)
     sigma_shared_m_s2: Float64 = field(default_factory=lambda: np.empty(0))
+    last_thrust_m_s2: float = 0.0
 
     @property
     def curve(self) -> ResistanceCurve:

@@ -236,8 +236,7 @@ def say(
     rate = np.abs(shaft.value[shaft.time_ns >= since_ns])
     low, high = (float(value) for value in np.quantile(rate, (0.05, 0.95)))
     if high < STANDS_RAD_S:
-        past = np.empty(0) if earlier is None else np.abs(earlier.value)
-        if len(past) >= _FEW and np.median(past) < STANDS_RAD_S:
+        if _stood(earlier):
             return f'{name} stood before the stop too: it shows nothing, or its sensor is dead'
         return f'{name} stands whenever it is received in the window: no thrust is left then'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
@@ -252,6 +251,12 @@ def say(
         f'{turns} and not as the water turns it: if it drives the ship, r is off by its thrust; '
         'give a window that begins after the shaft has stopped'
     )
+
+
+def _stood(earlier: Series | None) -> bool:
+    """Say whether a shaft is seen to stand in the record before the window."""
+    past = np.empty(0) if earlier is None else np.abs(earlier.value)
+    return len(past) >= _FEW and bool(np.median(past) < STANDS_RAD_S)
 
 
 def _ratio(value: Float64) -> float:
@@ -280,7 +285,7 @@ class RunDown:
     by_shaft
         Whether a shaft or pitch dates the stop.
     stands
-        Whether it stands after that, and drives no more.
+        Whether all propellers that are read are seen to stand after that, and drive no more.
     """
 
     stop_ns: int
@@ -301,11 +306,12 @@ class RunDown:
         """
         falls = list(_falls(window))
         others = tuple(_others(window, {number for number, _, _ in falls}))
+        stands = _stand(window, falls)
         if falls:
             _, seen, fall = max(falls, key=lambda one: one[2].stop_s)
             others += tuple(_kept(window, falls))
             if window.before is not None or fall.stop_s <= _AT_START * fall.run_down_s:
-                return cls._of_fall(window, seen, fall, others)
+                return cls._of_fall(window, seen, fall, others, stands)
             # nothing is known of the speed before it
             note = (
                 f'{seen} shows an engine stop {fall.stop_s:.3g} s after the start of the window: '
@@ -320,16 +326,19 @@ class RunDown:
                 f'neither shaft nor ship file says how the thrust ends: fitted, about '
                 f'{RUN_DOWN.mean:g} s beforehand (propulsion: in the ship file would say it)'
             )
-            return cls(*_dated(window), 0.0, 0.0, (note, *others))
+            return cls(*_dated(window), 0.0, 0.0, (note, *others), stands=stands)
         run_down_s = ship.propulsion.run_down_s
         note = (
             f'the thrust is taken to end within about {run_down_s:.3g} s, by the ship file: how '
             'it does is fitted'
         )
-        return cls(*_dated(window), run_down_s, ship.propulsion.sd, (note, *others))
+        sd_s = ship.propulsion.sd
+        return cls(*_dated(window), run_down_s, sd_s, (note, *others), stands=stands)
 
     @classmethod
-    def _of_fall(cls, window: Window, seen: str, fall: Fall, others: tuple[str, ...]) -> RunDown:
+    def _of_fall(
+        cls, window: Window, seen: str, fall: Fall, others: tuple[str, ...], stands: bool
+    ) -> RunDown:
         notes = [f'{seen} shows the time of the stop']
         if fall.run_down_s > 0.0:
             notes = [
@@ -343,7 +352,7 @@ class RunDown:
             fall.run_down_sd_s,
             (*notes, *others),
             by_shaft=True,
-            stands=fall.kept < TURNS,
+            stands=stands,
         )
 
 
@@ -381,6 +390,16 @@ def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
                 of_propeller.append((number, _name(window, what, number), fall))
         if of_propeller:
             yield min(of_propeller, key=lambda one: one[2].stop_s)
+
+
+def _stand(window: Window, falls: list[tuple[int, str, Fall]]) -> bool:
+    """Say whether propellers are read, and none of them turns after the stop."""
+    stand = {number: fall.kept < TURNS for number, _, fall in falls}
+    for number, shaft in enumerate(window.shafts):
+        earlier = None if window.before is None else window.before.shafts[number]
+        if len(shaft) and number not in stand and not _stood(earlier):
+            stand[number] = bool(np.quantile(np.abs(shaft.value), 0.95) < STANDS_RAD_S)
+    return bool(stand) and all(stand.values())
 
 
 def _kept(window: Window, falls: list[tuple[int, str, Fall]]) -> Iterator[str]:

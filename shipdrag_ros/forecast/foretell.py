@@ -22,6 +22,7 @@ from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Forecast, Z
 from shipdrag_ros.inference import priors as noise
 from shipdrag_ros.parameters import SPEEDS_M_S
+from shipdrag_ros.posterior.priors import LEFT_S
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -51,7 +52,9 @@ class Beginning:
     current_m_s, current_sd_m_s
         Where distances are over ground; None: they are through water.
     run_down_s, run_down_sd_s
-        Of a shaft that has not been stopped yet.
+        Of a shaft that has not been stopped yet, or of thrust that is left.
+    thrust
+        Over what slows her now.
     """
 
     made_ns: int
@@ -63,6 +66,7 @@ class Beginning:
     current_sd_m_s: float = 0.0
     run_down_s: float = 0.0
     run_down_sd_s: float = 0.0
+    thrust: float = 1.0
 
     @classmethod
     def of(cls, estimate: Estimate) -> Beginning:
@@ -70,14 +74,18 @@ class Beginning:
         Return the end of a window; over ground where positions were used.
         """
         speeds = [sd for name, sd in estimate.noise_sd.items() if name.startswith('speed')]
+        last_m_s, whole = estimate.last_speed_m_s, estimate.whole
+        slows = float(np.interp(last_m_s, whole.speed_m_s, whole.resistance_m_s2))
         return cls(
             made_ns=estimate.end_ns,
             stop_m_s=float(estimate.curve.speed_m_s[-1]),
-            speed_m_s=estimate.last_speed_m_s,
+            speed_m_s=last_m_s,
             speed_sd_m_s=estimate.last_speed_sigma_m_s,
             white_m_s=min((sd for sd in speeds if math.isfinite(sd)), default=0.0),
             current_m_s=(estimate.current_m_s or 0.0) if estimate.by_position else None,
             current_sd_m_s=estimate.current_sigma_m_s or 0.0,
+            run_down_s=LEFT_S.mean,
+            thrust=estimate.last_thrust_m_s2 / slows,
         )
 
 
@@ -159,8 +167,9 @@ def foretell_from(
     # the run-down
     late = (now.speed_sd_m_s / a[0]) ** 2
     reading = (_reading_sd(now) / a[:-1]) ** 2
-    held, held_way = _run_down(now.run_down_s, gliding, a[:-1], ground)
-    longer, longer_way = _run_down(now.run_down_s + now.run_down_sd_s, gliding, a[:-1], ground)
+    held, held_way = _run_down(now.thrust, now.run_down_s, gliding, a[:-1], ground)
+    longer_s = now.run_down_s + now.run_down_sd_s
+    longer, longer_way = _run_down(now.thrust, longer_s, gliding, a[:-1], ground)
     time = gliding + held
     times = _bands(
         time, time, _variance(weights, covariance), late + reading + (longer - held) ** 2
@@ -197,12 +206,12 @@ def _weights(u: Float64, a: Float64) -> Float64:
 
 
 def _run_down(
-    run_down_s: float, gliding_s: Float64, a: Float64, ground: Float64
+    thrust: float, run_down_s: float, gliding_s: Float64, a: Float64, ground: Float64
 ) -> tuple[Float64, Float64]:
-    """Return by how much a thrust a_0 exp(-t / run_down) delays each speed, and its way."""
+    """Return by how much a thrust exp(-t / run_down), over a_0, delays each speed, and its way."""
     delay = np.zeros_like(gliding_s)
     if run_down_s > 0.0:
-        over = a[0] / a
+        over = thrust * a[0] / a
         share = 0.5 * (over[1:] + over[:-1])
         for _ in range(_ROUNDS):
             left = -run_down_s * np.diff(np.exp(-(gliding_s + delay) / run_down_s))

@@ -44,7 +44,7 @@ HELD, WIND, DEPTH = 'held_force', 'wind', 'depth'
 
 class InfluenceState(NamedTuple):
     """
-    Probability of a state of wind or depth, and what it says of its columns (w,).
+    Probability of a state of an influence, and what it says of its columns (w,).
     """
 
     chance: float
@@ -125,7 +125,7 @@ class HullLaw:
         none = 0 if stated else None
         return cls(speed, parts, shapes, humps[:none], dry[:none], stated)
 
-    def forces(self, ship: Ship, tau_s: float, weather: Sequence[Influence] = ()) -> Forces:
+    def forces(self, ship: Ship, tau_s: float, influences: Sequence[Influence] = ()) -> Forces:
         """
         Return what the motion takes.
 
@@ -134,19 +134,19 @@ class HullLaw:
         ship
         tau_s
             Of the shaft; see `motion.Forces`.
-        weather
-            What wind and depth add.
+        influences
+            What else acts.
         """
         step = float(self.speed_m_s[1])
-        of_weather = [each.columns for each in weather]
-        columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry, *of_weather])
+        others = [each.columns for each in influences]
+        columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry, *others])
         columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
 
-        known = sum((each.known for each in weather), self.parts.sum(axis=0))
-        inertia = 1.0 + sum(each.inertia for each in weather)
+        known = sum((each.known for each in influences), self.parts.sum(axis=0))
+        inertia = 1.0 + sum(each.inertia for each in influences)
         return Forces(
             step,
             with_slope(known),

@@ -4,7 +4,7 @@ The motion with its derivatives by all unknowns, and what instruments read of it
 
     (1 + n_r(u) + n) du/dt = -r(u) + r(u_0) T(t)
     r(u) = known(u) + sum_j theta_j R_j(u)
-    T = (1 + q) nu^2 - q nu u / u_0 + l exp(-(t - t_0) / LEFT_S)  from t_0 on, 1 before
+    T = (1 - l) ((1 + q) nu^2 - q nu u / u_0) + l exp(-(t - t_0) / LEFT_S)  from t_0 on, 1 before
     nu = exp(-(t - t_0) / tau)
     log = (1 + b_1) u(t - lag) + b_0;  over ground = u(t - lag) + c;  place = x_0 + x + c t
 
@@ -141,15 +141,16 @@ def _rates(
     inertia, inertia_slope = _look(forces.inertia, forces.step_m_s, u)
     inertia += unknowns[k + INERTIA]
     _fill(forces.columns, forces.step_m_s, u, at)
-    thrust, by_u, by_u_0, by_q, by_tau, left = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    thrust, by_u, by_u_0, by_q, by_tau, by_left = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if forces.tau_s > 0.0:
         q, tau = unknowns[k + THRUST], forces.tau_s * np.exp(unknowns[k + TAU])
-        nu, ratio = np.exp(-t / tau), u / u_0
-        left = np.exp(-t / _LEFT_S)
-        thrust = (1.0 + q) * nu * nu - q * nu * ratio + unknowns[k + LEFT] * left
-        by_u, by_u_0 = -q * nu / u_0, q * nu * ratio / u_0
-        by_q = nu * nu - nu * ratio
-        by_tau = (2.0 * (1.0 + q) * nu - q * ratio) * nu * t / tau
+        gone, nu, ratio = 1.0 - unknowns[k + LEFT], np.exp(-t / tau), u / u_0
+        run_down = (1.0 + q) * nu * nu - q * nu * ratio
+        by_left = np.exp(-t / _LEFT_S) - run_down
+        thrust = run_down + unknowns[k + LEFT] * by_left
+        by_u, by_u_0 = -gone * q * nu / u_0, gone * q * nu * ratio / u_0
+        by_q = gone * (nu * nu - nu * ratio)
+        by_tau = gone * (2.0 * (1.0 + q) * nu - q * ratio) * nu * t / tau
     r_0 = start[k]
     a = (thrust * r_0 - r) / inertia
     own = (r_0 * by_u - slope - inertia_slope * a) / inertia
@@ -160,7 +161,7 @@ def _rates(
     rate[1 + k + THRUST] = r_0 * by_q / inertia
     rate[1 + k + TAU] = r_0 * by_tau / inertia
     rate[1 + k + INERTIA] = -a / inertia
-    rate[1 + k + LEFT] = r_0 * left / inertia
+    rate[1 + k + LEFT] = r_0 * by_left / inertia
     for j in range(p):
         rate[1 + j] += own * state[1 + j]
     for j in range(p + 1):

@@ -93,7 +93,7 @@ LEFT = Declared(
     '',
     'power taken off in steps; the effect residual_thrust',
 )
-LEFT_CHANCE = Declared('l', 'chance of it, where no shaft is seen to stand', 0.1, '', _TAKEN)
+LEFT_CHANCE = Declared('l', 'chance of it, unless all shafts that are read stand', 0.1, '', _TAKEN)
 LEFT_S = Declared('-', 'time in which it falls', 200.0, 's', 'the same')
 STOP = Declared(
     't_0',

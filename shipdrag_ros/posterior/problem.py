@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -46,7 +46,7 @@ class StopPrior:
     run_down_s, run_down_sd_s
         Of the shaft; 0: not known.
     stands
-        Whether the shaft is seen to stand after it: then no thrust is left.
+        Whether all shafts that are read stand after it: then no thrust is left.
     """
 
     sd_s: float
@@ -167,7 +167,7 @@ class RunModel:
         range_m_s
             Over which the law reaches: from the lowest to the highest speed, of other runs too.
         weather
-            None: wind and depth are part of r.
+            None: wind and depth are part of r, and no unseen force acts.
         """
         law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)
@@ -278,8 +278,6 @@ def _all_families(
     states = tuple(product(*(each.states for each in influences)))
     added = sum(len(each.columns) for each in influences)
     extra = 2 + len(zeros) + added
-    after_stop = tuple(_after_stop(stop, added)) if influences else (_Option(1.0),)
-    options = tuple(product(_lags(kinds), after_stop))
     for hull, state in product(_hulls(ship), states):
         others = [each.mean for each in state]
         mean = np.concatenate([[each[0] for each in hull.scales], zeros, *others, extra_mean])
@@ -291,36 +289,43 @@ def _all_families(
         precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
         chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
-        for lag, force in options:
+        for lag, force in product(_lags(kinds), _after_stop(stop, added, hull.level)):
             own, known = mean.copy(), precision.copy()
-            for place, prior in (*lag.unknown, *force.unknown):
-                own[extra + place], known[extra + place] = prior.mean, prior.sd**-2.0
+            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown):
+                own[extra + place], known[extra + place] = prior_mean, prior_sd**-2.0
             part = chance * lag.chance * force.chance
             yield Family(force.name or hull.name, part, own, known, hull.level, usual)
 
 
 class _Option(NamedTuple):
-    """One of some that exclude each other: an unknown by its place behind the coefficients."""
+    """
+    One of some that exclude each other: of an unknown its place behind the coefficients, mean, sd.
+    """
 
     chance: float
-    unknown: tuple[tuple[int, Declared], ...] = ()
+    unknown: tuple[tuple[int, float, float], ...] = ()
     name: str = ''
 
 
-def _after_stop(stop: StopPrior, added: int) -> Iterator[_Option]:
+def _after_stop(stop: StopPrior, added: int, level: float) -> Iterator[_Option]:
     """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
-    if stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
+    if added == 0 or stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
         yield _Option(1.0)
         return
     held, left = priors.HELD_CHANCE.mean, 0.0 if stop.stands else priors.LEFT_CHANCE.mean
     yield _Option(1.0 - held - left)
-    yield _Option(held, ((-added, priors.HELD),), priors.HELD_FORCE)
+    force, thrust = priors.HELD, priors.LEFT
+    yield _Option(held, ((-added, force.mean, level * force.sd),), priors.HELD_FORCE)
     if left > 0.0:
-        yield _Option(left, ((motion.LEFT, priors.LEFT),), priors.THRUST_LEFT)
+        yield _Option(left, ((motion.LEFT, thrust.mean, thrust.sd),), priors.THRUST_LEFT)
 
 
 def _held(law: HullLaw, speed_m_s: float) -> Influence:
-    """Return a force that no speed changes, over r at the stop; it acts in few families."""
+    """
+    Return a force that no speed changes, over r of a hull of level 1 at the stop.
+
+    It acts in few families.
+    """
     at_stop = np.interp(speed_m_s, law.speed_m_s, law.parts.sum(axis=0))
     none, unit = np.zeros(len(law.speed_m_s)), np.full((1, len(law.speed_m_s)), at_stop)
     state = InfluenceState(1.0, np.zeros(1), np.full(1, EXACT))
@@ -333,8 +338,11 @@ def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
         yield _Option(1.0)
         return
     unfiltered = priors.UNFILTERED_CHANCE.mean
-    yield _Option(unfiltered, ((motion.LAG, priors.LOG_UNFILTERED),))
-    yield _Option(1.0 - unfiltered, ((motion.LAG, priors.LOG_LAG),))
+    for chance, lag in (
+        (unfiltered, priors.LOG_UNFILTERED),
+        (1.0 - unfiltered, priors.LOG_LAG),
+    ):
+        yield _Option(chance, ((motion.LAG, lag.mean, lag.sd),))
 
 
 class _Hull(NamedTuple):

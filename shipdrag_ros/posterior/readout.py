@@ -25,9 +25,9 @@ class ReadOut:
     slope_1_s, slope_sigma_1_s : (m,)
         dr/dv.
     parts_m_s2
-        Parts of sigma by cause (m,): `n_r`, `log`, `wind`, `depth`, `law` and `noise`, whose
-        squares add up to its square. Each is what would go if the cause were known, of what
-        those before it leave.
+        Parts of sigma by cause (m,): `n_r`, `log`, `held_force`, `wind`, `depth`, `law` and
+        `noise`, whose squares add up to its square. Each is what would go if the cause were
+        known, of what those before it leave.
     shared_m_s2 : (m,)
         What the errors of the ship file's curve and of the log as they are expected, which are
         those of her other runs too, put into sigma.

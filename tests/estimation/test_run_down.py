@@ -77,6 +77,28 @@ def test_of_several_shafts_the_last_stop_counts() -> None:
     assert 'propeller 2 shows the stop' in found.notes[0]
 
 
+READ_LATE = TIME > STOP_S + 50.0
+
+
+@pytest.mark.parametrize(
+    ('shafts', 'stands'),
+    [
+        ([(TIME, falling(TIME, STOP_S))], True),
+        ([(TIME, falling(TIME, STOP_S)), (TIME, np.full(len(TIME), 12.0))], False),
+        ([(TIME, np.where(TIME < STOP_S, 12.0, 7.0)), (TIME, falling(TIME, STOP_S + 20))], False),
+        ([(TIME, falling(TIME, STOP_S)), (TIME, np.zeros(len(TIME)))], True),
+        ([(TIME, np.zeros(len(TIME)))], False),
+        ([(TIME[READ_LATE], np.zeros(READ_LATE.sum()))], True),
+    ],
+    ids=['one', 'one drives on', 'one drives at part', 'one dead', 'dead', 'read late'],
+)
+def test_no_thrust_is_left_where_all_shafts_that_are_read_stand(shafts, stands) -> None:
+    channels = Channel.SHAFT, Channel.SHAFT_2
+    of_shafts = [series(channel, *each) for channel, each in zip(channels, shafts)]
+    window = cut(*of_shafts, series(Channel.SPEED_THROUGH_WATER, TIME, SPEED))
+    assert RunDown.of(window, SHIP).stands is stands
+
+
 def test_the_pitch_of_a_propeller_dates_the_stop_where_the_shaft_goes_on() -> None:
     pitch = np.clip(1.0 - (TIME - STOP_S) / 12.0, 0.0, 1.0)
     window = cut(

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 import numpy as np
 import pytest
 
@@ -14,7 +17,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64
 from shipdrag_ros.ship import StatedEffect
-from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation import START_NS, Scenario, Sensor, Truth, sense, simulate
 
 
 def estimated(block: Block, first_s: float, last_s: float) -> Estimate:
@@ -35,6 +38,13 @@ def note(found: Estimate, words: str) -> bool:
     return any(words in each for each in found.notes)
 
 
+def said(found: Estimate) -> tuple[float, float]:
+    """Return in % how much acts that no input shows, as a note says it, and two sigma of it."""
+    words = ' '.join(each for each in found.notes if 'of the resistance at the stop' in each)
+    share, spread = re.findall(r' (\d+) ± (\d+) % ', words)[0]
+    return float(share), float(spread)
+
+
 @pytest.fixture(scope='module')
 def towed() -> list[tuple[Estimate, Float64]]:
     """Coastdowns in which a tug's line holds her from the stop on, and her speed."""
@@ -52,10 +62,13 @@ def test_the_line_of_a_tug_is_in_the_band(towed: list[tuple[Estimate, Float64]])
 
 
 def test_a_force_that_is_likely_is_said(towed: list[tuple[Estimate, Float64]]) -> None:
-    said = [found for found, _ in towed if note(found, 'a force that no input shows slows her')]
-    assert said
-    for found in said:
+    likely = [found for found, _ in towed if note(found, 'a force that no input shows slows her')]
+    assert likely
+    for found in likely:
         assert np.all(found.whole.resistance_m_s2 > found.conditions.resistance_m_s2)
+        share, spread = said(found)
+        assert share - spread < 40.0
+        assert share + spread > 10.0
 
 
 def test_what_is_foretold_is_the_motion_with_that_force(
@@ -82,14 +95,33 @@ def test_nothing_of_it_is_said_of_a_plain_glide() -> None:
         )
 
 
-@pytest.mark.parametrize('by_shaft', [False, True])
-def test_thrust_that_is_left_is_in_the_band(by_shaft: bool) -> None:
+@pytest.fixture(scope='module')
+def driven_on() -> Truth:
+    """A coastdown after which four tenths of the thrust are left."""
     sizes = {'fraction': Parameter(0.4), 'decay_s': Parameter(200.0)}
     scenario = Scenario(speed_m_s=8.0, lead_in_s=900.0, duration_s=900.0)
-    truth = simulate(SHIP, scenario, effects=[StatedEffect('residual_thrust', sizes)])
+    return simulate(SHIP, scenario, effects=[StatedEffect('residual_thrust', sizes)])
+
+
+@pytest.mark.parametrize('by_shaft', [False, True])
+def test_thrust_that_is_left_is_in_the_band(driven_on: Truth, by_shaft: bool) -> None:
     sensors = [Sensor(channel=Channel.SPEED_THROUGH_WATER, rate_hz=0.5, sd=0.04)]
     if by_shaft:
         sensors.append(Sensor(channel=Channel.SHAFT, rate_hz=0.5, sd=0.02))
-    found = estimated(sense(truth, sensors, seed=3), 900.0, 1800.0)
+    found = estimated(sense(driven_on, sensors, seed=3), 900.0, 1800.0)
     assert held(found) > 0.9
     assert by_shaft or note(found, 'thrust is left after the stop')
+    assert by_shaft or abs(said(found)[0] - 40.0) < said(found)[1]
+
+
+def test_what_is_foretold_is_the_motion_with_the_thrust_that_is_left(driven_on: Truth) -> None:
+    late = []
+    for seed in range(4):
+        sensors = [Sensor(channel=Channel.SPEED_THROUGH_WATER, rate_hz=0.5, sd=0.04)]
+        found = estimated(sense(driven_on, sensors, seed=seed), 900.0, 1200.0)
+        for each in foretell(found, SHIP, speeds_m_s=(4.0,)).milestones:
+            slow = driven_on.speed_through_water_m_s < each.speed_m_s
+            if slow.any():
+                after_s = float(driven_on.time_s[np.argmax(slow)]) - 1200.0
+                late.append(math.log(each.time_s.median / after_s))
+    assert abs(np.mean(late)) < 0.12

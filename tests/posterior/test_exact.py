@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,13 +16,19 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POS
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
+from shipdrag_ros.posterior.priors import HELD, HELD_CHANCE, HELD_FORCE
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
+from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 
 def problem_of(
-    ship: Ship, *, seed: int = 0, codes: Sequence[int] = (LOG, OVER_GROUND, POSITION)
+    ship: Ship,
+    *,
+    seed: int = 0,
+    codes: Sequence[int] = (LOG, OVER_GROUND, POSITION),
+    weather: Weather | None = None,
 ) -> RunModel:
     """Set up 120 rows of the model's own motion, of instruments with white noise."""
     rng = np.random.default_rng(seed)
@@ -28,14 +36,20 @@ def problem_of(
     kind = np.resize(codes, 120)
     variance = np.where(kind % KIND_COUNT == POSITION, 25.0, 0.02**2)
     rows = Rows(time_s, kind, np.zeros(120))
-    empty = RunModel.of(
-        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, range_m_s=(4.0, 8.0)
+    of_run = partial(
+        RunModel.of,
+        variance=variance,
+        steady=40,
+        ship=ship,
+        stop=StopPrior(5.0, 8.0, 2.0),
+        speed_m_s=8.0,
+        range_m_s=(4.0, 8.0),
+        weather=weather,
     )
+    empty = of_run(rows)
     exact = -predict(empty.forces, empty.start, empty.grid_s, rows)[0][0]
     rows = rows._replace(value=exact + np.sqrt(variance) * rng.standard_normal(120))
-    return RunModel.of(
-        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, range_m_s=(4.0, 8.0)
-    )
+    return of_run(rows)
 
 
 @pytest.mark.parametrize('codes', [(LOG, OVER_GROUND, POSITION), tuple(CODES.values())])
@@ -46,7 +60,7 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
     now[k + motion.EXTRAS :] += 0.5
     now[:k] += 0.01
     now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
-    now[k + motion.SCALE], now[k + motion.CURRENT] = 0.01, 0.2
+    now[k + motion.SCALE], now[k + motion.CURRENT], now[k + motion.LEFT] = 0.01, 0.2, 0.3
 
     def predicted(unknowns: Float64) -> Float64:
         return -predict(problem.forces, unknowns, problem.grid_s, problem.rows)[0][0]
@@ -59,6 +73,26 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
         size = max(float(np.abs(by).max()), 1e-3)
         # where a reading is taken at a node of a table, the slope jumps a little
         np.testing.assert_allclose(table[1 + place], by, rtol=0.0, atol=0.01 * size)
+
+
+def test_a_held_force_is_sized_by_r_of_the_hull_it_slows(ship: Ship) -> None:
+    problem = problem_of(replace(ship, baseline=None), weather=Weather(None, None))
+    held = [each for each in problem.families if each.name == HELD_FORCE]
+    sizes = {each.level: each.precision[problem.of_hull] ** -0.5 for each in held}
+    assert len(sizes) > 2
+    for level, size in sizes.items():
+        assert size == pytest.approx(HELD.sd * level)
+    assert sum(each.chance for each in problem.families) == pytest.approx(1.0)
+    assert sum(each.chance for each in held) == pytest.approx(HELD_CHANCE.mean)
+
+
+def test_thrust_that_is_left_is_part_of_that_before_the_stop(ship: Ship) -> None:
+    problem = problem_of(ship)
+    now = problem.start.copy()
+    now[problem.coefficients + motion.LEFT] = 0.5
+    _, rate = motion.integrate(problem.forces, now, problem.grid_s)
+    assert rate[0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert rate[:, 0].max() < 1e-9
 
 
 def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_current(ship):

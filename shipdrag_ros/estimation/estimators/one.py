@@ -7,6 +7,7 @@ An adapter: a window becomes rows and a prior of the stop, the posterior becomes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -26,7 +27,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
-from shipdrag_ros.posterior.priors import HELD_FORCE, THRUST_LEFT
+from shipdrag_ros.posterior.priors import HELD_FORCE, LEFT_S, THRUST_LEFT
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
@@ -238,17 +239,23 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
 
 def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
     """Yield what acts after the stop, where that is more likely than not."""
-    problem = found.problem
-    for name, at, what in (
-        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
-        (THRUST_LEFT, problem.coefficients + motion.LEFT, 'thrust is left after the stop,'),
+    problem, k = found.problem, found.problem.coefficients
+    at_stop = found.mean[k + motion.SPEED : k + motion.SPEED + 1]
+    r = read(found, at_stop, without=_CONDITIONS).resistance_m_s2[0]
+    unit = motion.shapes_at(problem.forces, at_stop)[1][0, problem.of_hull, 0]
+    for name, at, share, what in (
+        (HELD_FORCE, problem.of_hull, unit / r, 'a force that no input shows slows her by'),
+        (THRUST_LEFT, k + motion.LEFT, 1.0, 'thrust is left after the stop,'),
     ):
         chance = found.chance(name)
         if chance > 0.5:
+            # where it acts: it is 0 where not
+            mean = found.mean[at] / chance
+            spread = (sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2
             yield (
-                f'{what} {100.0 * found.mean[at]:.2g} ± {200.0 * sd[at]:.1g} % of the '
-                f'resistance at the stop (probability {chance:.2g}): it is no part of r, and '
-                'makes its band wide; give a window in which nothing acts but the water'
+                f'{what} {100.0 * share * mean:.0f} ± {200.0 * share * math.sqrt(spread):.0f} % '
+                f'of the resistance at the stop (probability {chance:.2g}): it is no part of r, '
+                'and makes its band wide; give a window in which nothing acts but the water'
             )
 
 
@@ -366,7 +373,7 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
 
 
 def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str, ...]) -> AtEnd:
-    """Return speed and r at the end of the window."""
+    """Return speed, r and thrust that is left at the end of the window."""
     problem, k = found.problem, found.problem.coefficients
     at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
@@ -375,11 +382,15 @@ def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str
     by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
     by[1 + k + motion.SCALE :] = 0.0
     speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    at_stop = read(found, found.mean[k + motion.SPEED : k + motion.SPEED + 1]).resistance_m_s2[0]
+    since_s = float(coast.time_s[-1] - found.mean[k + motion.STOP])
+    left = float(found.mean[k + motion.LEFT]) * math.exp(-max(since_s, 0.0) / LEFT_S.mean)
     return AtEnd(
         last,
         speed_sd,
         float(at_end.resistance_m_s2[0]),
         float(at_end.sigma_m_s2[0]),
+        left * float(at_stop),
     )
 
 
