@@ -251,7 +251,10 @@ def _as_on_board(
     for item in with_stop(inputs, told):
         if isinstance(item, StopMark) and item.receive_ns == told:
             if monitor.engine_stopped(told):
-                raise BagError(f'{run.name!r}: no speed was read before the stop that is given')
+                raise BagError(
+                    f'{run.name!r}: no speed was read before the stop that is given; give a later '
+                    'one, or a recording that begins before it'
+                )
             continue
         take(feed(monitor, item))
         if progress is not None:

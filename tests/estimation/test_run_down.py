@@ -114,7 +114,7 @@ def test_the_pitch_of_a_propeller_dates_the_stop_where_the_shaft_goes_on() -> No
     ('shaft', 'says'),
     [
         (np.zeros(len(TIME)), 'the shaft stands whenever it is received in the window'),
-        (np.where(TIME < 900.0, 30.0, 29.0), 'if it drives the ship, r is off by its thrust'),
+        (np.where(TIME < 900.0, 30.0, 29.0), 'if it drives the ship, r may be off by its thrust'),
         (0.6 * SPEED / 8.0 * 12.0, 'as the water turns it'),
     ],
 )
