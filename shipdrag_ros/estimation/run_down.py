@@ -248,8 +248,8 @@ def say(
                 return f'{turns}, as the water turns it: the drag of its propeller is part of r'
             break
     return (
-        f'{turns} and not as the water turns it: if it drives the ship, r may be off by its thrust; '
-        'give a window that begins after the shaft has stopped'
+        f'{turns} and not as the water turns it: if it drives the ship, r may be off by its '
+        'thrust; give a window that begins after the shaft has stopped'
     )
 
 
