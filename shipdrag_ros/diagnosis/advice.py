@@ -157,10 +157,10 @@ def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
 def _facts(case: Undecided) -> dict[str, float]:
     """Return the facts that would name something, and how probably."""
 
-    def names_one(after: Mapping[Names, float]) -> bool:
+    def decided(after: Mapping[Names, float]) -> bool:
         return decide(after, case.inseparable).verdict is Verdict.NAMED
 
-    found = case.facts.naming(case.found, names_one)
+    found = case.facts.naming(case.found, decided)
     return {name: named for name, named in found.items() if named >= _HARDLY}
 
 
