@@ -167,6 +167,13 @@ AIR_AREA = Declared(
     'merchant ships in ballast and laden: 0.25 to 1',
 )
 DEPTH_READ = Declared('h', 'relative error of an echo sounder', normal(0.03), '', _REALITY)
+DEPTH_FORMULA = Declared(
+    '-',
+    'relative error of what a known depth adds, over all speeds',
+    normal(0.3),
+    '',
+    'Lackenby (1963) has 1.2 to 2.5 times as much as Raven (2016)',
+)
 LENGTH_OVER_BREADTH = Declared(
     'L/B', 'for the effect of the depth, where the ship file states no breadth', 6.5, '', _REALITY
 )

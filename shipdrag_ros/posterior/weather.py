@@ -239,14 +239,14 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
 def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
     """Return what water of some depth adds to r in deep water."""
     ship = with_usual_shape(ship)
-    effect = _of('depth')
     if depth_m is not None:
         z, weight = _nodes(3, 3)
         depths = depth_m * (1.0 + priors.DEPTH_READ.sd * z[:, 0])
         forces, inertia = _shallow(ship, tuple(depths.tolist()), speed)
-        forces = forces * (1.0 + effect.formula_sd * z[:, 1:])
+        forces = forces * (1.0 + priors.DEPTH_FORMULA.sd * z[:, 1:])
         # the most probable reading is the middle one
         return _influence(DEPTH, [(1.0, weight, forces)], float(inertia[len(z) // 2]))
+    effect = _of('depth')
     shallow = _chance(effect.odds / (1.0 + effect.odds), effect, ship)
     z, weight = _nodes(5, 3)
     prior = effect.parameters_of(ship)[0].prior
