@@ -101,7 +101,8 @@ class ValidRange(NamedTuple):
 
 class AtEnd(NamedTuple):
     """
-    Speed through water [m/s], r and thrust that is left [m/s^2] at the end of a window.
+    Speed through water [m/s] and r [m/s^2] at the end of a window, with their sigmas, and the
+    thrust that is left [m/s^2].
     """
 
     last_speed_m_s: float

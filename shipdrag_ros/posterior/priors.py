@@ -172,7 +172,7 @@ DEPTH_FORMULA = Declared(
     'relative error of what a known depth adds, over all speeds',
     normal(0.3),
     '',
-    'Lackenby (1963) has 1.2 to 2.5 times as much as Raven (2016)',
+    'Lackenby (1963) has about half as much again as Raven (2016)',
 )
 LENGTH_OVER_BREADTH = Declared(
     'L/B', 'for the effect of the depth, where the ship file states no breadth', 6.5, '', _REALITY

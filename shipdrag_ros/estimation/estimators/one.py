@@ -120,7 +120,7 @@ def _speeds(rows: Rows) -> tuple[Float64, Float64]:
     return when, speed
 
 
-def _usual_speed(steady: Rows) -> float:
+def _speed_before(steady: Rows) -> float:
     """Return the speed before the window, 0 where nothing shows it."""
     speed = _speeds(steady)[1] if len(steady.time_s) else np.empty(0)
     return float(np.median(speed)) if len(speed) else 0.0
@@ -168,7 +168,7 @@ def estimate(
         # the stop may be before the window: the law reaches up to the speed there
         range_m_s=(
             guess.lowest * guess.speed_m_s,
-            max(guess.speed_m_s, _usual_speed(record.steady)),
+            max(guess.speed_m_s, _speed_before(record.steady)),
         ),
         weather=weather,
     )
@@ -239,16 +239,14 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
 
 def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
     """Yield what acts after the stop, where that is more likely than not."""
-    problem, k = found.problem, found.problem.coefficients
-    at_stop = found.mean[k + motion.SPEED : k + motion.SPEED + 1]
-    r = read(found, at_stop, without=_CONDITIONS).resistance_m_s2[0]
-    unit = motion.shapes_at(problem.forces, at_stop)[1][0, problem.of_hull, 0]
-    for name, at, share, what in (
-        (HELD_FORCE, problem.of_hull, unit / r, 'a force that no input shows slows her by'),
-        (THRUST_LEFT, k + motion.LEFT, 1.0, 'thrust is left after the stop,'),
+    problem = found.problem
+    for name, at, what in (
+        (HELD_FORCE, problem.of_hull, 'a force that no input shows slows her by'),
+        (THRUST_LEFT, problem.coefficients + motion.LEFT, 'thrust is left after the stop,'),
     ):
         chance = found.chance(name)
         if chance > 0.5:
+            share = _held_unit(found) if name == HELD_FORCE else 1.0
             # where it acts: it is 0 where not
             mean = found.mean[at] / chance
             spread = (sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2
@@ -257,6 +255,14 @@ def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
                 f'of the resistance at the stop (probability {chance:.2g}): it is no part of r, '
                 'and makes its band wide; give a window in which nothing acts but the water'
             )
+
+
+def _held_unit(found: RunPosterior) -> float:
+    """Return a held force of size 1, over the r that was found at the stop."""
+    problem, at = found.problem, found.problem.coefficients + motion.SPEED
+    at_stop = found.mean[at : at + 1]
+    unit = motion.shapes_at(problem.forces, at_stop)[1][0, problem.of_hull, 0]
+    return float(unit / read(found, at_stop, without=_CONDITIONS).resistance_m_s2[0])
 
 
 def _log_scale_note(scale: float, sd: float, which: str) -> str:
@@ -308,7 +314,11 @@ def _result(
         NAME,
         **ValidRange.of_branch(curve)._asdict(),
         **_at_end(
-            found, coast, last, without=_CONDITIONS if reference.unknown else _CALM
+            found,
+            coast,
+            last,
+            float(whole.resistance_m_s2[-1]),
+            without=_CONDITIONS if reference.unknown else _CALM,
         )._asdict(),
         calm=calm,
         conditions=conditions,
@@ -372,8 +382,10 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
     )
 
 
-def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str, ...]) -> AtEnd:
-    """Return speed, r and thrust that is left at the end of the window."""
+def _at_end(
+    found: RunPosterior, coast: Rows, last: float, at_stop: float, *, without: tuple[str, ...]
+) -> AtEnd:
+    """Return speed, r and thrust that is left at the end; `at_stop`: what slows her at the stop."""
     problem, k = found.problem, found.problem.coefficients
     at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
@@ -382,7 +394,6 @@ def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str
     by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
     by[1 + k + motion.SCALE :] = 0.0
     speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
-    at_stop = read(found, found.mean[k + motion.SPEED : k + motion.SPEED + 1]).resistance_m_s2[0]
     since_s = float(coast.time_s[-1] - found.mean[k + motion.STOP])
     left = float(found.mean[k + motion.LEFT]) * math.exp(-max(since_s, 0.0) / LEFT_S.mean)
     return AtEnd(
@@ -390,7 +401,7 @@ def _at_end(found: RunPosterior, coast: Rows, last: float, *, without: tuple[str
         speed_sd,
         float(at_end.resistance_m_s2[0]),
         float(at_end.sigma_m_s2[0]),
-        left * float(at_stop),
+        left * at_stop,
     )
 
 
