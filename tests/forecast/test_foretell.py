@@ -267,6 +267,7 @@ def test_the_second_of_a_kind_alone_is_foretold_and_followed(window, ship, kind)
         whole = estimate(each, ship, Parameters(estimator='one'))
         found.append(Followed.of(each, whole).beside(forecast, STOP_NS))
     for first, other in zip(found[0].milestones, found[1].milestones, strict=True):
-        # a noisy log crosses nearly the same speed some seconds sooner or later
-        assert first.was_s == pytest.approx(other.was_s, abs=15.0)
+        # a noisy log crosses nearly the same speed some seconds sooner or later; places do not
+        within_s = 10.0 if kind == 'speed_through_water' else 0.01
+        assert first.was_s == pytest.approx(other.was_s, abs=within_s)
     assert found[0].pairs

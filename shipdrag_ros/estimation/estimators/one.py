@@ -385,7 +385,7 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
 def _at_end(
     found: RunPosterior, coast: Rows, last: float, at_stop: float, *, without: tuple[str, ...]
 ) -> AtEnd:
-    """Return speed, r and thrust that is left at the end; `at_stop`: what slows her at the stop."""
+    """Return what is known of the end; `at_stop` [m/s^2] is what slows her at the stop."""
     problem, k = found.problem, found.problem.coefficients
     at_end = read(found, np.array([last]), without=without)
     row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
