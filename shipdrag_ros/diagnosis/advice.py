@@ -28,7 +28,7 @@ from shipdrag_ros.diagnosis.outcomes import (
     with_known,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.sights import sight
+from shipdrag_ros.diagnosis.sights import ship_runs, sight
 from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
@@ -294,12 +294,12 @@ def _read(
     windows: Sequence[Window], case: Undecided, fits: Sequence[Fitted]
 ) -> tuple[list[PredictedOutcome], list[Float64]]:
     """Return what rivals predict of an instrument in each run."""
-    runs = []
+    seen = []
     for run, window in zip(case.seen, windows, strict=True):
         context = Context.of(window, case.ship, run.time_s, run.context.stop)
         alone = replace(context, value=np.zeros(len(context)))
-        runs.append(sight(replace(run, across=None, context=alone), case.seen, case.ship))
-    return of_instrument(case.comparing, fits, runs)
+        seen.append(replace(run, across=None, context=alone))
+    return of_instrument(case.comparing, fits, ship_runs(seen, case.ship).runs)
 
 
 def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observation:

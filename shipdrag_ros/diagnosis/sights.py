@@ -95,6 +95,9 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         speed_m_s=run.speed_m_s,
         range_m_s=(low, top),
     )
+    # whether a free propeller stands is the ship's, not the run's: it is odd once
+    odd = next((each for each in seen if each.context.odd), None) is run
+    run = replace(run, context=replace(run.context, odd=odd))
     across = run.across
     value, blocks = [run.context.value], [run.context.whitener]
     if across is not None:

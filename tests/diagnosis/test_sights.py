@@ -21,6 +21,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+from tests.runs import coasted
 
 
 def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(seen_of, cargo):
@@ -33,6 +34,16 @@ def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(seen_of, car
             assert family.mean[at] == pytest.approx(slow.speed_m_s)
             assert family.precision[at] == pytest.approx((0.3 * slow.speed_m_s) ** -2)
     assert alone.law.speed_m_s[-1] < fast.speed_m_s < beside.law.speed_m_s[-1]
+
+
+def test_a_free_propeller_that_stands_is_odd_once_however_many_runs_show_it(cargo):
+    def odds(count: int) -> float:
+        runs = [coasted('fouling=0.3', name=f'run {i}', seed=i) for i in range(count)]
+        found = diagnose(runs, cargo, Parameters(), advise=False)
+        share = {each.names: each.probability for each in found.candidates}
+        return share['fouling',] / share['locked_propeller',]
+
+    assert odds(3) > 0.7 * odds(1)
 
 
 LEAD_IN_S = 900.0
