@@ -105,16 +105,17 @@ def of_another_run(
         at.append(begun)
         places.append(place)
     found = []
-    tables = runs.linearise_run(number, hypotheses, at)
+    tables = [each for each in runs.linearise_run(number, hypotheses, at) if each is not None]
+    if len(tables) < len(fits):
+        return []
     for fit, hypothesis, begun, place, table in zip(fits, hypotheses, at, places, tables):
-        if table is None:
-            return []
         family = comparing.prior_of(fit)[0]
         matrix = np.diag(runs.priors(hypothesis, begun).precision[family])
         learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
         matrix[np.ix_(place, place)] += learnt
         covariance = inverse_of(matrix)[np.ix_(table.place, table.place)]
-        lines = np.hstack([comparing.white(0, table, run), table.rest])
+        alike = table._replace(white=tables[0].white)  # each reads what any of them draws
+        lines = np.hstack([comparing.white(0, alike, run), table.rest])
         found.append(PredictedOutcome(-lines[0], lines[1:], covariance, inverse_of(covariance)))
     return found
 

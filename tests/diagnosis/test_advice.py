@@ -103,6 +103,13 @@ def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> No
     assert ranked.index(Measure.WITHOUT_CABLE) < ranked.index(Measure.CLEAN_HULL)
 
 
+def test_a_run_that_shows_the_same_again_is_not_said_to_decide() -> None:
+    first, again = (run('fouling=0.3', seed=seed) for seed in (1, 2))
+    found = diagnose([first], SHIP, Parameters())
+    assert (resolves(found).get(Measure.ANOTHER_RUN) or 0.0) < 0.3
+    assert diagnose([first, again], SHIP, Parameters()).verdict is Verdict.ONE_OF
+
+
 def test_what_is_measured_already_is_not_advised(current: DiagnosisResult) -> None:
     assert Measure.RADAR not in resolves(current)
     with_wind = diagnose([run('current=0.2', 'wind_apparent')], SHIP, Parameters())
