@@ -115,6 +115,11 @@ class Ship:
         ]
         if problems:
             raise ShipFileError('Ship(...)', problems)
+        for (
+            name
+        ) in _SIZES:  # whole numbers and those of numpy too: what is compiled takes no other
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, float(value))
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:

@@ -273,6 +273,7 @@ def test_a_ship_made_in_python_has_sizes_above_zero(values: dict[str, Any], key:
 def test_numbers_of_numpy_are_numbers() -> None:
     ship = Ship(length_m=np.float32(80.0), displaced_volume_m3=np.int64(4000))  # type: ignore[arg-type]
     assert ship.mass_kg == 4000 * 1025.0
+    assert type(ship.length_m) is type(ship.displaced_volume_m3) is float
 
 
 def test_text_is_read_with_or_without_a_mark(tmp_path: Path) -> None:
