@@ -167,7 +167,7 @@ class _Judge:
         if kept is None:
             cuts = self._cuts(self._binned.before, len(self._binned.said), gaps, None)
             why = '; '.join(dict.fromkeys(f'{cut.reason.value}: {cut.text}' for cut in cuts))
-            failure = f'nothing of it is a coastdown: {why}'
+            failure = f'nothing of it is a coastdown: {why}; give another window'
             return GivenPart(
                 window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
             )

@@ -371,6 +371,6 @@ def _cuts(result: ReplayResult, window: WindowSpan | None) -> Iterator[str]:
         if window is not None and coastdown.withdrawn:
             raise DiagnosisError(
                 f'{result.run.name!r}: no coastdown from {window[0]:g} to {window[1]:g} s: '
-                f'{coastdown.failure}; give another window'
+                f'{coastdown.failure}'
             )
         yield from cut_lines(coastdown, result.run.span_ns)

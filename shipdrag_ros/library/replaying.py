@@ -163,7 +163,7 @@ def replay_run(
             if coastdown.estimate is None:
                 raise EstimationError(
                     f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
-                    f'{coastdown.failure}; give another window'
+                    f'{coastdown.failure}'
                 )
         beyond = _beyond(each, window[1])
         if beyond:

@@ -150,8 +150,7 @@ COMMANDS = (
     _use(
         'a window of 3 s',
         _replay('--window', '100', '103'),
-        'no estimate from 100 to 103 s',
-        'give another window',
+        'a fit of the motion needs 12 of one of them: give a longer window\n',
     ),
     _use(
         'a window of steady sailing',
