@@ -399,6 +399,8 @@ def _fitted(cuts: list[NotCoastdown], start_ns: int, end_ns: int) -> list[NotCoa
             cut = replace(cut, end_ns=min(cut.end_ns, start_ns))
         elif cut.end_ns > end_ns:
             cut = replace(cut, start_ns=max(cut.start_ns, end_ns))
+        else:  # the part that is kept reaches over it: a shaft dates it better than the bins
+            continue
         fitted.append(cut)
     before = [cut for cut in fitted if cut.start_ns < start_ns]
     if before:

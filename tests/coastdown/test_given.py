@@ -88,6 +88,18 @@ def test_the_glide_begins_where_the_shaft_stops() -> None:
     assert 'the shaft turns' in found.cuts[0].text
 
 
+def test_what_is_kept_from_where_the_shaft_stops_is_not_said_to_be_cut() -> None:
+    time_s = np.arange(-100.0, LENGTH_S)
+    # she loses a quarter of her speed in four seconds, then glides
+    speed = np.interp(time_s, [0.0, 4.0], [4.0, 3.0])
+    speed = np.where(time_s < 4.0, speed, glide(time_s, start_s=4.0, speed=3.0))
+    shaft = block(SHAFT, np.where(time_s < 0.0, 12.0, 0.0), time_s)
+    claimed = window(block(LOG, noisy(speed), time_s), shaft, before_s=100.0)
+    found = judge(claimed, BOAT, Parameters())
+    assert kept_s(found) == (0.0, LENGTH_S)
+    assert found.cuts == ()
+
+
 def test_the_last_of_several_shafts_to_stop_counts() -> None:
     shafts = [
         block(channel, np.where(end_s > TIME_S, 12.0, 0.0))
