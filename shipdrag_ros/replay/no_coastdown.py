@@ -21,7 +21,6 @@ _SLOWED = 0.1  # of the speed; what falls less is the sea
 _STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
 _STILL_READINGS = 60  # ... so often, is none
 _SHOWN = 3  # of the stretches that were dismissed
-_LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
 
 class _SpeedLoss(NamedTuple):
@@ -86,10 +85,9 @@ def _why(result: ReplayResult) -> str:
         f'the speed by {name} fell most from {fall.from_m_s:.2f} to {fall.to_m_s:.2f} m/s, at '
         f'{fall.start_s:.0f} to {fall.end_s:.0f} s of the record'
     )
-    least_s = _LEAD_WINDOWS * window_s
-    if fall.start_s < least_s:
+    if fall.start_s < window_s:
         return (
-            f'{fell}, with only {fall.start_s:.0f} s before it where at least {least_s:.0f} s of '
+            f'{fell}, with only {fall.start_s:.0f} s before it where at least {window_s:.0f} s of '
             'steady sailing are needed; if the engine was stopped there, say so with --window '
             'START END'
         )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,3 +44,17 @@ def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(tmp_path, steady: f
     path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
     (run,) = open_runs([path])
     assert 'stood still' not in why_no_coastdown(replay(run, ship=BOAT))
+
+
+@pytest.mark.parametrize('lead_s', [40, 90])
+def test_as_much_steady_sailing_is_asked_for_as_the_monitor_needs(tmp_path, lead_s: int) -> None:
+    time_s = np.arange(400)
+    # she gathers a little way, then brakes
+    speed = np.interp(time_s, [0, lead_s, lead_s + 60, 400], [4.0, 4.1, 2.0, 1.9])
+    log = Block.of(Channel.SPEED_THROUGH_WATER, STAMPS[:400], speed)
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', log)])
+    result = replay(run, ship=BOAT)
+    why = why_no_coastdown(replace(result, coastdowns=(), events=(), steady_lead_s=None))
+    assert 'the speed by speed_through_water fell most' in why
+    needed_s = result.parameters.slope_window_s
+    assert (f'at least {needed_s:.0f} s of steady sailing' in why) == (lead_s < needed_s)
