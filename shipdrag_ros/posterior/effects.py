@@ -17,6 +17,7 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
+from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
@@ -131,8 +132,23 @@ class EffectWay:
 def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     """
     Return an effect of the ship file, as well known as the file says.
+
+    Raises
+    ------
+    SimulationError
+        Naming an effect or a parameter that is not known.
     """
-    effect = effects_of(ship)[stated.name]
+    if stated.name not in (known := effects_of(ship)):
+        raise SimulationError(
+            f'effects: {stated.name!r} is not known; known are {", ".join(known)}'
+        )
+    effect = known[stated.name]
+    names = [q.name for q in effect.parameters_of(ship)]
+    if strange := [key for key in stated.parameters if key not in names]:
+        raise SimulationError(
+            f'effects: {effect.name}: parameter {strange[0]!r} is not known; known are '
+            f'{", ".join(names)}'
+        )
     unknowns = []
     for q in effect.parameters_of(ship):
         given = stated.parameters.get(q.name, Parameter(float(np.nan_to_num(q.value)), 0.0))
