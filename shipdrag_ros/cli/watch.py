@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     Serve until SIGINT or SIGTERM.
     """
     # a server takes long to import
-    from shipdrag_ros.live.app import LivePage
+    from shipdrag_ros.live.app import FLEET, LivePage
     from shipdrag_ros.live.serve import listen, serve
 
     output = Output()
@@ -118,6 +118,8 @@ def run(options: argparse.Namespace) -> int:
 
         def announce() -> None:
             output.say(f'the page: http://{shown}:{port}/')
+            if fleet is not None:
+                output.say(f'the fleet: http://{shown}:{port}{FLEET}')
             if deltas is not None:
                 output.say(f'Signal K deltas: tcp://{LOOPBACK}:{deltas.getsockname()[1]}')
             if token is not None:

@@ -346,6 +346,10 @@ def test_the_checklist_says_what_holds(check: Check, held: Held) -> None:
     assert check.text
 
 
+def test_a_shaft_that_stands_has_no_sign() -> None:
+    assert shaft_check(-0.001).text == shaft_check(0.001).text == '0 rpm'
+
+
 @pytest.mark.parametrize(
     ('check', 'text'),
     [
