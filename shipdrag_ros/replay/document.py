@@ -9,9 +9,8 @@ from typing import Any
 from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.replay import InputCounts, Recorded
-from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import together
+from shipdrag_ros.replay.together import Ranking, together
 
 
 def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> dict[str, Any]:
