@@ -247,8 +247,7 @@ def _of_old_runs(hypothesis: Explanation) -> Explanation:
 def inverse_of(matrix: Float64) -> Float64:
     """Return the inverse of a positive definite matrix whose unknowns have many units."""
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    result: Float64 = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
-    return result
+    return np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
 
 
 def probability_of_naming(
