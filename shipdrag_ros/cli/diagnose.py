@@ -129,22 +129,8 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
 def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     from shipdrag_ros.diagnosis import tables as diagnosis_cells
     from shipdrag_ros.diagnosis import words as diagnosis_words
-    from shipdrag_ros.estimation import words as estimate_words
 
-    if found.no_coastdown:
-        output.say(found.no_coastdown)
-    output.say(diagnosis_words.sentence(found))
-    if found.runs_differ:
-        output.say(diagnosis_words.differing(found))
-    if ship is not None and not found.question:
-        for line in estimate_words.in_service(found.estimates, ship):
-            output.say(line)
-    if said := diagnosis_words.examined(found):
-        output.say(said)
-    if found.where is not None:
-        output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
-    weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
-    for line in (*weighed, *found.notes):
+    for line in found.summary(ship):
         output.say(line)
     if found.question:
         return

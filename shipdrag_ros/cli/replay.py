@@ -42,9 +42,8 @@ from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
-from shipdrag_ros.replay.hulls import Ranking, rank
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import Together, together
+from shipdrag_ros.replay.together import Ranking, Together, rank, together
 from shipdrag_ros.ship import Ship
 
 REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'

@@ -32,7 +32,7 @@ from __future__ import annotations
 import argparse
 import csv
 from collections import Counter
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -191,11 +191,7 @@ def _write_truth(
             'changes': [
                 {
                     'time_ns': voyages.FLEET_START_NS + round(change.day * voyages.DAY_NS),
-                    'kind': change.kind,
-                    'known': change.known,
-                    'keeps': change.keeps,
-                    'adds': change.adds,
-                    'growth': change.growth,
+                    **{key: value for key, value in asdict(change).items() if key != 'day'},
                 }
                 for change in each.history.changes
             ],

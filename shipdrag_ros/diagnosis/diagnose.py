@@ -10,11 +10,10 @@ from functools import partial
 from typing import TypeVar
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
-from shipdrag_ros.diagnosis.carried import Carried, carried
-from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
+from shipdrag_ros.diagnosis.earlier import Carried, EarlierDiagnosis, carried
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import gap_of, held_out, traces, where
-from shipdrag_ros.diagnosis.observation import CoastRun, Observation
+from shipdrag_ros.diagnosis.observation import CoastRun, Observation, ship_runs
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
@@ -22,7 +21,6 @@ from shipdrag_ros.diagnosis.result import (
     EffectEstimate,
     SeenRun,
 )
-from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.verdict import (
     asked,
     judge,

@@ -119,8 +119,7 @@ def _given_shared(
     fixed[own] = 0.0
     right = products[1 + own, 0] - products[1 + own, 1:] @ fixed + precision[own] * mean[own]
     matrix = products[np.ix_(1 + own, 1 + own)] + np.diag(precision[own])
-    result: Float64 = np.linalg.solve(matrix, right)
-    return result
+    return np.linalg.solve(matrix, right)
 
 
 def where(

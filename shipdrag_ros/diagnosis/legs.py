@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,15 +173,10 @@ class Legs:
         )
 
     def __getitem__(self, part: Int64) -> Legs:
-        return replace(
-            self,
-            record=self.record[part],
-            time_s=self.time_s[part],
-            log_m_s=self.log_m_s[part],
-            ground_m_s=self.ground_m_s[part],
-            acceleration_m_s2=self.acceleration_m_s2[part],
-            direction_rad=self.direction_rad[part],
-        )
+        parts: dict[str, Any] = {
+            name: each[part] for name, each in vars(self).items() if isinstance(each, np.ndarray)
+        }
+        return replace(self, **parts)
 
     def through_water(self, current_m_s: tuple[float, float]) -> Float64:
         """

@@ -100,8 +100,7 @@ def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     # beyond what the baseline states, as its square
     r = ship.resistance_n(stated) / ship.mass_kg * (speed / stated) ** 2
     glided_s = cumulative_trapezoid((1.0 + ship.n_r(stated)) / r, -speed, initial=0.0)
-    result: Float64 = np.interp(after_s, glided_s, speed)
-    return result
+    return np.interp(after_s, glided_s, speed)
 
 
 def yaw_wander(time_s: Float64) -> Float64:
@@ -115,8 +114,7 @@ def yaw_wander(time_s: Float64) -> Float64:
     time_s : (n,)
     """
     apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
-    result: Float64 = priors.YAW_WANDERS.sd**2 * np.exp(-apart)
-    return result
+    return priors.YAW_WANDERS.sd**2 * np.exp(-apart)
 
 
 def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 
 from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.words import in_service
 from shipdrag_ros.inference.decision import CERTAIN, Verdict, smallest_set
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import Fact
 
 FORCE = 'force'  # on the ship, against her baseline
@@ -409,9 +411,14 @@ class DiagnosisResult:
         probability = {each.names: each.probability for each in self.candidates}
         return self.candidates[: len(smallest_set(probability, CERTAIN))]
 
-    def summary(self) -> tuple[str, ...]:
+    def summary(self, ship: Ship | None = None) -> tuple[str, ...]:
         """
         Say what was found: that there is no coastdown, the verdict, what was examined, and where.
+
+        Parameters
+        ----------
+        ship
+            With her, also what she needs at her usual speed.
 
         Returns
         -------
@@ -420,9 +427,10 @@ class DiagnosisResult:
         """
         from shipdrag_ros.diagnosis import words  # it shows what this module holds
 
+        needs = () if ship is None or self.question else in_service(self.estimates, ship)
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self))
-        lines = (*first, words.examined(self), where)
+        lines = (*first, *needs, words.examined(self), where)
         more = (*words.facts(self), *words.earlier(self), *self.notes)
         return (*filter(None, lines), *more)
 

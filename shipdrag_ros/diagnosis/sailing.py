@@ -21,8 +21,7 @@ from shipdrag_ros.diagnosis.result import (
     Gap,
     Where,
 )
-from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, shown
-from shipdrag_ros.diagnosis.standing import StandingLog
+from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, StandingLog, shown
 from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict

@@ -118,6 +118,7 @@ def coastdown_row(
     estimate = None if coastdown.withdrawn else coastdown.estimate
     own_flags = (*flags, *_flags(coastdown), *(() if diagnosis else ('no_diagnosis',)))
     return {
+        **{name: None for _, names in _OF_COASTDOWN for name in names.split()},
         **context,
         'time_ns': coastdown.start_ns,
         'end_ns': coastdown.end_ns,
@@ -131,9 +132,7 @@ def coastdown_row(
         'draught_m': ship.draught_m,
         'displaced_volume_m3': ship.displaced_volume_m3,
         'water_density_kg_m3': ship.water.density_kg_m3,
-        'verdict': None if diagnosis is None else diagnosis.verdict.value,
-        'effects': None if diagnosis is None else _json(sized(diagnosis.effects)),
-        'candidates': None if diagnosis is None else _json(candidates(diagnosis)),
+        **({} if diagnosis is None else _diagnosis(diagnosis)),
         'flags': sorted(set(own_flags)),
         'error': _error(coastdown),
     }
@@ -192,18 +191,19 @@ def clean(ship: Ship) -> Float64 | None:
     return found
 
 
+def _diagnosis(found: DiagnosisResult) -> Row:
+    return {
+        'verdict': found.verdict.value,
+        'effects': json.dumps(sized(found.effects), sort_keys=True),
+        'candidates': json.dumps(candidates(found), sort_keys=True),
+    }
+
+
 def _curve(estimate: Estimate | None) -> Row:
     names = ('resistance_m_s2', 'sigma_m_s2', 'sigma_repeatable_m_s2')
     of_conditions = ('conditions_resistance_m_s2', 'conditions_sigma_m_s2')
     if estimate is None:
-        return {
-            'estimator': None,
-            'speed_at_stop_m_s': None,
-            **{name: np.full(len(FROUDE), np.nan) for name in (*names, *of_conditions)},
-            'reference': None,
-            'froude_valid_min': None,
-            'froude_valid_max': None,
-        }
+        return {name: np.full(len(FROUDE), np.nan) for name in (*names, *of_conditions)}
     (low, high) = estimate.froude_valid
     inside = (low <= FROUDE) & (high >= FROUDE)
     on_grid = {}
@@ -244,10 +244,6 @@ def _error(coastdown: EndedCoastdown) -> str | None:
     if coastdown.estimate is None:
         return coastdown.failure or 'no estimate was possible'
     return None
-
-
-def _json(value: object) -> str:
-    return json.dumps(value, sort_keys=True)
 
 
 KINDS = ('cleaning', 'docking', 'propeller_polish', 'coating')

@@ -18,6 +18,7 @@ from functools import partial
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
+from shipdrag_ros.diagnosis.advice import inverse_of
 from shipdrag_ros.diagnosis.diagnose import (
     ComparedRuns,
     effects_about,
@@ -26,10 +27,8 @@ from shipdrag_ros.diagnosis.diagnose import (
     stated_in,
 )
 from shipdrag_ros.diagnosis.gaps import held_out, where
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.outcomes import inverse_of
+from shipdrag_ros.diagnosis.observation import Observation, day_of, lowest_m_s, ship_runs
 from shipdrag_ros.diagnosis.result import Where
-from shipdrag_ros.diagnosis.sights import day_of, lowest_m_s, ship_runs
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG

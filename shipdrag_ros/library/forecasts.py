@@ -18,9 +18,8 @@ from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Checked, Followed, Passed
-from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
 from shipdrag_ros.forecast.result import Forecast, Milestone
-from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.library.shown import Shown, drawing
 from shipdrag_ros.replay import accepted_samples
 from shipdrag_ros.replay.coasts import coast_windows

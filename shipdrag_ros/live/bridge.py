@@ -126,13 +126,20 @@ class Bridge:
         Before the node names its own.
     bag
         Name of what is played; '' of a node that runs.
+
+    Attributes
+    ----------
+    ship
+        None while she is not known.
+    resistance
+        The latest r [m/s^2].
     """
 
     def __init__(self, ship: Ship | None = None, *, bag: str = '') -> None:
         self._bag = bag
         self.trace = Trace()
         self.past: list[outputs.PastRun] = []
-        self._ship = ship
+        self.ship = ship
         self._heard_s: float | None = None
         self._health: topics.Health | None = None
         self._recent = Recent()
@@ -142,7 +149,7 @@ class Bridge:
         self._coast_ns: int | None = None
         self._bands: list[tuple[float, float]] = []
         self._speed: outputs.Figure | None = None
-        self._resistance: outputs.Figure | None = None
+        self.resistance: outputs.Figure | None = None
         self._curve: outputs.Curve | None = None
         self._ahead = Ahead()
         self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
@@ -173,9 +180,9 @@ class Bridge:
                     self._note_unread(name, error)
             case topics.ShipFile(text):
                 try:
-                    self._ship = Ship.from_yaml(text, subject="the node's ship file")
+                    self.ship = Ship.from_yaml(text, subject="the node's ship file")
                 except ShipdragError as error:
-                    self._notes.append((self._now_ns, str(error)))
+                    self._notes.append((self.now_ns, str(error)))
 
     def _note_unread(self, name: str, error: Exception) -> None:
         """Say of each topic once that it brings what is not understood."""
@@ -183,7 +190,7 @@ class Bridge:
             self._unread.add(name)
             why = f'{type(error).__name__}: {printable(str(error))}'
             text = f'~/{name} brings what is not understood ({why}); find who publishes it'
-            self._notes.append((self._now_ns, text))
+            self._notes.append((self.now_ns, text))
 
     def keep_alive(self, now_s: float) -> None:
         """
@@ -226,7 +233,7 @@ class Bridge:
     @property
     def now_ns(self) -> int:
         """The ship's time: the latest stamp, 0 before the first [ns]."""
-        return self._now_ns
+        return self.trace.newest_s * 1_000_000_000
 
     def speed(self, now_s: float) -> SpeedNow | None:
         """
@@ -257,16 +264,6 @@ class Bridge:
         age_s = min((age for age in ages if age is not None), default=None)
         return None if age_s is None else age_s + now_s - self._heard_s
 
-    @property
-    def ship(self) -> Ship | None:
-        """The ship, if she is known."""
-        return self._ship
-
-    @property
-    def resistance(self) -> outputs.Figure | None:
-        """The latest r [m/s^2]."""
-        return self._resistance
-
     def _note_course(self) -> None:
         second, course = self._now_s, self._recent.direction(self._now_s)
         if course is not None and (not self._courses or self._courses[-1][0] != second):
@@ -295,17 +292,17 @@ class Bridge:
             self._speed = outputs.read_speed(payload)
             self.trace.add_estimate(self._speed.stamp_ns, self._speed.value)
         elif name == 'resistance':
-            self._resistance = outputs.read_resistance(payload)
+            self.resistance = outputs.read_resistance(payload)
         elif name == 'resistance_curve':
             curve = outputs.read_curve(payload)
             if curve is not None:
                 self._curve = curve
                 if self._coast_ns is not None and curve.stamp_ns > self._coast_ns:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
-                    self._bands.append((age_s, curve.band(self._ship)))
+                    self._bands.append((age_s, curve.band(self.ship)))
         elif name == 'forecast':
             self._ahead.take(
-                outputs.read_forecast(payload), self._ship, self._speed, self._coast_ns
+                outputs.read_forecast(payload), self.ship, self._speed, self._coast_ns
             )
         elif name == 'forecast_path':
             self._ahead.take_path(outputs.read_path(payload), self._coast_ns)
@@ -334,7 +331,7 @@ class Bridge:
 
     def _begin(self, start_ns: int) -> None:
         self._coast_ns, self._bands = start_ns, []
-        self._curve = self._resistance = self._speed = None
+        self._curve = self.resistance = self._speed = None
         self._ahead.begin()
         before = [course for second, course in self._courses if second * 10**9 <= start_ns]
         self._course_at_stop = before[-1] if before else self._recent.direction(self._now_s)
@@ -344,10 +341,6 @@ class Bridge:
     @property
     def _now_s(self) -> int:
         return self.trace.newest_s
-
-    @property
-    def _now_ns(self) -> int:
-        return self.trace.newest_s * 1_000_000_000
 
     def parts(self, now_s: float) -> dict[str, _AnyPart]:
         """
@@ -363,7 +356,7 @@ class Bridge:
         of_run = _is_of_run(now)
         return {
             'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
-            'ship': ship_part(self._ship),
+            'ship': ship_part(self.ship),
             'figures': self._figures(now_s),
             'curve': curve_part(self._curve),
             'forecast': self._ahead.forecast if of_run else None,
@@ -372,7 +365,7 @@ class Bridge:
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
             'verdict': self._found if self._done else self._verdict,
-            'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
+            'past': [past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
 
@@ -380,7 +373,7 @@ class Bridge:
         speed = self.speed(now_s)
         read = speed is not None and (speed.age_s or 0.0) <= _OLD_S
         value = speed.value_m_s if speed is not None and read else None
-        return self._ahead.if_stopped(self._ship, value, self.past, self._now_s)
+        return self._ahead.if_stopped(self.ship, value, self.past, self._now_s)
 
     @property
     def _done(self) -> bool:
@@ -429,7 +422,7 @@ class Bridge:
         return Ended(
             by=last.ended_by,
             ago_s=self._now_s - last.end_ns * 1e-9,
-            band=None if last.curve is None else last.curve.band(self._ship),
+            band=None if last.curve is None else last.curve.band(self.ship),
             why_not=last.why_not,
         )
 
@@ -454,16 +447,16 @@ class Bridge:
                 'speed_kind': speed.kind,
                 'speed_old_s': int(speed.age_s or 0.0) if old else None,
             }
-        if self._resistance is not None:
-            figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
+        if self.resistance is not None:
+            figures |= {'r': self.resistance.value, 'r_sigma': self.resistance.sigma}
         estimate = None if self._health is None else self._health.of('estimate')
         if estimate is not None and topics.OF_CONDITIONS in estimate.values:
             figures['r_of'] = estimate.values[topics.OF_CONDITIONS]
         ended = [run for run in self.past if run.curve is not None]
         if self._curve is not None:
-            figures['usual'] = at_usual_speed(self._curve, self._ship)
+            figures['usual'] = at_usual_speed(self._curve, self.ship)
         elif ended and self._coast_ns is None and ended[-1].curve is not None:
-            figures['usual'] = at_usual_speed(ended[-1].curve, self._ship)
+            figures['usual'] = at_usual_speed(ended[-1].curve, self.ship)
         if 'usual' in figures and self._coast_ns is None and ended:
             figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
         return figures
@@ -513,7 +506,7 @@ class Bridge:
         checks = [
             lead_check(lead_s, now.ready_s),
             wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
-            depth_check(depth and depth[0], speed_m_s, self._ship),
+            depth_check(depth and depth[0], speed_m_s, self.ship),
             rudder_check(rudder and rudder[0]),
             shaft_check(min((each[0] for each in shafts if each is not None), default=None)),
             course_check(turned, coasting=coasting),

@@ -19,8 +19,8 @@ from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
+from shipdrag_ros.forecast.foretell import HullNow, if_stopped
 from shipdrag_ros.forecast.result import places
-from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure, PastRun
 from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
 from shipdrag_ros.ship import Ship

@@ -86,27 +86,26 @@ def outputs(event: events.Event, *, node: str = topics.DEFAULT_NODE) -> list[top
 
 def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[topics.OutputMessage]:
     """Speed, resistance and the curve of one estimate."""
-    speed = types.make(
-        topics.SPEED.type,
-        {
-            'header': types.header(stamp_ns, FRAME),
-            'twist.twist.linear.x': float(estimate.last_speed_m_s),
-            'twist.covariance[0]': float(estimate.last_speed_sigma_m_s) ** 2,
-        },
-    )
-    resistance = types.make(
-        topics.RESISTANCE.type,
-        {
-            'header': types.header(stamp_ns, FRAME),
-            'accel.accel.linear.x': float(estimate.last_resistance_m_s2),
-            'accel.covariance[0]': float(estimate.last_sigma_m_s2) ** 2,
-        },
-    )
+    speed = estimate.last_speed_m_s, estimate.last_speed_sigma_m_s
+    resistance = estimate.last_resistance_m_s2, estimate.last_sigma_m_s2
     return [
-        topics.output_message(topics.SPEED, speed, stamp_ns, node),
-        topics.output_message(topics.RESISTANCE, resistance, stamp_ns, node),
+        _figure(topics.SPEED, 'twist', speed, stamp_ns, node),
+        _figure(topics.RESISTANCE, 'accel', resistance, stamp_ns, node),
         _curve(stamp_ns, estimate, node),
     ]
+
+
+def _figure(
+    topic: topics.OutputTopic, part: str, figure: tuple[float, float], stamp_ns: int, node: str
+) -> topics.OutputMessage:
+    """Return a figure and its sigma as the part of a message that has a covariance."""
+    value, sigma = figure
+    fields = {
+        'header': types.header(stamp_ns, FRAME),
+        f'{part}.{part}.linear.x': float(value),
+        f'{part}.covariance[0]': float(sigma) ** 2,
+    }
+    return topics.output_message(topic, types.make(topic.type, fields), stamp_ns, node)
 
 
 def _curve(stamp_ns: int, estimate: Estimate, node: str) -> topics.OutputMessage:

@@ -177,6 +177,11 @@ class Diagnosing:
         Without a baseline none is possible, and the status says so.
     enabled
         False: only says that it is off.
+
+    Attributes
+    ----------
+    status
+        Of the last coastdown.
     """
 
     def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:
@@ -186,17 +191,12 @@ class Diagnosing:
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
-        self._status = DiagnosisStatus(DiagnosisState.NONE_YET)
+        self.status = DiagnosisStatus(DiagnosisState.NONE_YET)
         if not enabled:
-            self._status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
+            self.status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
         elif ship.baseline is None:
-            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, NO_CLEAN_HULL)
-        self._possible = self._status.state is DiagnosisState.NONE_YET
-
-    @property
-    def status(self) -> DiagnosisStatus:
-        """Of the last coastdown."""
-        return self._status
+            self.status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, NO_CLEAN_HULL)
+        self._possible = self.status.state is DiagnosisState.NONE_YET
 
     def begin(self, coastdown: EndedCoastdown, window: Window) -> None:
         """
@@ -206,11 +206,11 @@ class Diagnosing:
             return
         if coastdown.estimate is None:
             reason = f'the coastdown gave no estimate: {coastdown.failure}'
-            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
+            self.status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
             return
-        self._status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
+        self.status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
         task = _Task(window, self._ship, self._parameters)
-        self._queue.submit(self._diagnose, task, self._status)
+        self._queue.submit(self._diagnose, task, self.status)
 
     def close(self) -> None:
         """
@@ -231,11 +231,11 @@ class Diagnosing:
             answer = {'state': 'failed', 'reason': str(error) or type(error).__name__}
         if 'reason' in answer:
             state = DiagnosisState(answer['state'])
-            self._status = replace(running, state=state, reason=answer['reason'])
+            self.status = replace(running, state=state, reason=answer['reason'])
             return
         about = {'start_ns': running.coastdown.start_ns, 'end_ns': running.coastdown.end_ns}
         found = {**answer, 'coastdown': about, 'caveat': running.caveat}
-        self._status = replace(running, state=DiagnosisState.DONE, found=found)
+        self.status = replace(running, state=DiagnosisState.DONE, found=found)
 
     def _answer(self, task: _Task) -> dict[str, Any]:
         """Return what a process says."""

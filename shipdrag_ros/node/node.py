@@ -168,16 +168,10 @@ class CoastdownNode(LifecycleNode):
         return self._attempt(lambda: self._deactivate('deactivated'))
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Drop the topics; parameters may be set again."""
+        """Drop the topics; parameters may be set again, after an error too."""
         return self._attempt(self._release)
 
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """End what is running, for good."""
-        return self._attempt(self._release)
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Go back to where the node can be configured again."""
-        return self._attempt(self._release)
+    on_shutdown = on_error = on_cleanup
 
     def _attempt(self, action: Callable[[], None]) -> TransitionCallbackReturn:
         """Run a transition; rclpy would swallow what it raises."""

@@ -8,10 +8,11 @@ from typing import Any
 
 from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.replay import InputCounts, Recorded
-from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import together
+from shipdrag_ros.replay.tables import COLUMNS, OF_CONDITIONS
+from shipdrag_ros.replay.together import Ranking, together
 
 
 def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> dict[str, Any]:
@@ -57,80 +58,61 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
 def _combined(combined: Combined | None) -> dict[str, Any] | None:
     if combined is None:
         return None
-    current = None
-    if combined.current_m_s is not None:
-        current = {'value': combined.current_m_s, 'sd': combined.current_sigma_m_s}
     return {
         'runs': combined.runs,
-        'speed_m_s': combined.speed_m_s,
-        'resistance_m_s2': combined.resistance_m_s2,
-        'sigma_m_s2': combined.sigma_m_s2,
-        'sigma_repeatable_m_s2': combined.sigma_repeatable_m_s2,
+        **{name: getattr(combined, name) for name in COLUMNS},
         'scatter_m_s2': combined.scatter_m_s2,
-        'froude': combined.froude,
         'froude_valid': (float(combined.froude[0]), float(combined.froude[-1])),
-        'current_m_s': current,
+        'current_m_s': _current(combined),
     }
 
 
+def _current(found: Combined | Estimate) -> dict[str, Any] | None:
+    if found.current_m_s is None:
+        return None
+    return {'value': found.current_m_s, 'sd': found.current_sigma_m_s}
+
+
 def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
-    estimate = coastdown.estimate
-    found: dict[str, Any] = {
+    return {
         'bag': bag,
         'start_ns': coastdown.start_ns,
         'end_ns': coastdown.end_ns,
         'onset_detected_ns': coastdown.onset_detected_ns,
         'ended_by': coastdown.ended_by.value,
         'failure': coastdown.failure,
-        'estimator': None,
-        'order': None,
-        'samples': {},
-        'speed_m_s': [],
-        'resistance_m_s2': [],
-        'sigma_m_s2': [],
-        'sigma_repeatable_m_s2': [],
-        'conditions_resistance_m_s2': [],
-        'conditions_sigma_m_s2': [],
-        'reference': None,
-        'sigma_parts': {},
-        'froude': [],
-        'froude_valid': None,
-        'froude_max_by': None,
-        'froude_max_argmax': None,
-        'w': None,
-        'noise_sd': {},
-        'current_m_s': None,
+        **_estimate(coastdown.estimate),
         'regimes': _regimes(coastdown),
         'explained': None if coastdown.regimes is None else coastdown.regimes.explained,
-        'notes': [],
     }
+
+
+def _estimate(estimate: Estimate | None) -> dict[str, Any]:
     if estimate is None:
-        return found
-    curve, conditions = estimate.valid_calm, estimate.valid_conditions
+        conditions_too = (f'conditions_{name}' for name in OF_CONDITIONS)
+        return {
+            **dict.fromkeys(('estimator', 'order', 'reference', 'froude_valid', 'froude_max_by')),
+            **dict.fromkeys(('froude_max_argmax', 'w', 'current_m_s')),
+            **{name: [] for name in (*COLUMNS, *conditions_too, 'notes')},
+            **{name: {} for name in ('samples', 'sigma_parts', 'noise_sd')},
+        }
+    calm, conditions = estimate.valid_calm, estimate.valid_conditions
     low, high = estimate.froude_valid
     inside = (estimate.calm.froude >= low) & (estimate.calm.froude <= high)
-    current = None
-    if estimate.current_m_s is not None:
-        current = {'value': estimate.current_m_s, 'sd': estimate.current_sigma_m_s}
-    return found | {
+    return {
         'estimator': estimate.estimator,
         'order': estimate.order,
         'samples': estimate.samples,
-        'speed_m_s': curve.speed_m_s,
-        'resistance_m_s2': curve.resistance_m_s2,
-        'sigma_m_s2': curve.sigma_m_s2,
-        'sigma_repeatable_m_s2': curve.sigma_repeatable_m_s2,
-        'conditions_resistance_m_s2': conditions.resistance_m_s2,
-        'conditions_sigma_m_s2': conditions.sigma_m_s2,
+        **{name: getattr(calm, name) for name in COLUMNS},
+        **{f'conditions_{name}': getattr(conditions, name) for name in OF_CONDITIONS},
         'reference': {name: how.value for name, how in vars(estimate.reference).items()},
         'sigma_parts': {name: part[inside] for name, part in estimate.sigma_parts.items()},
-        'froude': curve.froude,
         'froude_valid': estimate.froude_valid,
         'froude_max_by': estimate.froude_max_by.value,
         'froude_max_argmax': estimate.froude_max_argmax,
         'w': estimate.max_relative_sigma,
         'noise_sd': estimate.noise_sd,
-        'current_m_s': current,
+        'current_m_s': _current(estimate),
         'notes': estimate.notes,
     }
 

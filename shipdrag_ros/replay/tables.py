@@ -15,8 +15,8 @@ from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.result import FroudeMax
 from shipdrag_ros.estimation.words import FROUDE_MAX_BY
 from shipdrag_ros.replay import InputCounts, words
-from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import Ranking
 
 COLUMNS = (
     'speed_m_s',

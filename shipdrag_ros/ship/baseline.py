@@ -167,8 +167,7 @@ def ittc57(reynolds: Float64) -> Float64:
     -----
     C_F = 0.075 / (log10 Re - 2)^2, held below `REYNOLDS_MIN`.
     """
-    result: Float64 = 0.075 / (np.log10(np.maximum(reynolds, REYNOLDS_MIN)) - 2.0) ** 2
-    return result
+    return 0.075 / (np.log10(np.maximum(reynolds, REYNOLDS_MIN)) - 2.0) ** 2
 
 
 def _inside(table: Any, at: Float64, key: str, points: tuple[float, ...], unit: str) -> Float64:

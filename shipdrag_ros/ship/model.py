@@ -333,8 +333,7 @@ class Ship:
         v = np.asarray(speed_m_s, np.float64)
         magnitude = np.abs(v)
         if isinstance(base, TableBaseline):
-            table: Float64 = np.sign(v) * base.resistance(magnitude)
-            return table
+            return np.sign(v) * base.resistance(magnitude)
         assert self.wetted_surface_m2 is not None  # the ship file was checked
         reynolds = magnitude * self.length_m / self.water.kinematic_viscosity_m2_s
         coefficient = base.viscous(reynolds) + base.wave(self.froude(magnitude))

@@ -208,8 +208,7 @@ class _Acting:
         force = np.broadcast_to(self.at(inside), np.shape(speed_m_s))
         beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0)
         power = 2.0 if np.all(beyond >= 1.0) else self._power()
-        found: Float64 = force * np.where(beyond < 1.0, beyond**power, beyond**2)
-        return found
+        return force * np.where(beyond < 1.0, beyond**power, beyond**2)
 
     def _power(self) -> float:
         """Return the power of the speed that a force is at the lowest that it holds for."""
@@ -228,8 +227,7 @@ class _Acting:
         """
         inside = self.term.inside('u', np.abs(speed_m_s))
         share = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), np.sign(speed_m_s))
-        found: Float64 = share * self.at(inside, np.maximum(since_s, 0.0))
-        return found
+        return share * self.at(inside, np.maximum(since_s, 0.0))
 
 
 def force_n(

@@ -67,8 +67,7 @@ class GaussMarkov:
         """
         white = rng.standard_normal(len(time_s))
         decay = np.exp(-np.diff(time_s) / self.correlation_time_s)
-        realisation: Float64 = self.sd * _filter(white, decay)
-        return realisation
+        return self.sd * _filter(white, decay)
 
 
 @compiled
@@ -151,8 +150,7 @@ class Turn:
         if grown <= begins or ends <= falls:  # an edge of nothing, or lost beside the times
             return ((time >= begins) & (time < ends)).astype(np.float64)
         risen = np.clip((time - begins) / (grown - begins), 0.0, 1.0)
-        result: Float64 = risen - np.clip((time - falls) / (ends - falls), 0.0, 1.0)
-        return result
+        return risen - np.clip((time - falls) / (ends - falls), 0.0, 1.0)
 
     def turned_rad(self, after_lead_in_s: ArrayLike) -> Float64:
         """
@@ -160,10 +158,7 @@ class Turn:
         """
         time = np.asarray(after_lead_in_s, np.float64)
         begins, _, falls, _ = self.corners_s
-        result: Float64 = self.rate_rad_s * (
-            self._risen_s(time - begins) - self._risen_s(time - falls)
-        )
-        return result
+        return self.rate_rad_s * (self._risen_s(time - begins) - self._risen_s(time - falls))
 
     def _risen_s(self, since_s: Float64) -> Float64:
         """Return the integral of what grows to 1 within an edge."""
@@ -171,8 +166,7 @@ class Turn:
         if self.edge_s == 0.0:
             return positive
         within = np.minimum(positive, self.edge_s)
-        result: Float64 = positive - within + 0.5 * within**2 / self.edge_s
-        return result
+        return positive - within + 0.5 * within**2 / self.edge_s
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,8 +52,7 @@ def log_reading(
     flow = (1.0 + action.log_factor) * flow + action.log_offset_m_s
     if action.log_lag_s > 0.0:
         flow = lagged(time_s, flow, action.log_lag_s)
-    reading: Float64 = np.interp(at_s - action.log_late_s, time_s, flow)
-    return reading
+    return np.interp(at_s - action.log_late_s, time_s, flow)
 
 
 @compiled

@@ -275,8 +275,7 @@ def turning(speed_m_s: Float64, stall_m_s: Float64 | float) -> Float64:
     stall = np.maximum(stall_m_s, 1e-9)
     load = np.minimum(stall / np.maximum(speed_m_s, 1e-9), 1.0)
     stands = 0.5 * (1.0 - np.tanh((speed_m_s / stall - 1.0) / _LULL))
-    found: Float64 = (1.0 - (1.0 - _STALLS) * load**2) * (1.0 - stands)
-    return found
+    return (1.0 - (1.0 - _STALLS) * load**2) * (1.0 - stands)
 
 
 def _shaft_rad_s(

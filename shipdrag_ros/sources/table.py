@@ -410,8 +410,7 @@ class Numbers:
         """
         Return (n,) values of a column that is there.
         """
-        values: Float64 = self.values[:, self.names.index(name)]
-        return values
+        return self.values[:, self.names.index(name)]
 
 
 def read_numbers(

@@ -135,15 +135,13 @@ class LinearFit:
     def covariance(self) -> Float64:
         """(p, p) Of the coefficients; of its determined part where `rank` < p."""
         root = self._root / self.scale
-        product: Float64 = self.variance * (root.T @ root)
-        return product
+        return self.variance * (root.T @ root)
 
     def predict(self, columns: Float64) -> Float64:
         """
         Return fitted values of (m, p) columns.
         """
-        values: Float64 = columns @ self.coefficients
-        return values
+        return columns @ self.coefficients
 
     def leverage(self, columns: Float64) -> Float64:
         """
@@ -173,8 +171,7 @@ class LinearFit:
     @cached_property
     def _root(self) -> Float64:
         """(rank, p) R with R'R the pseudo-inverse of the scaled products."""
-        root: Float64 = self.directions[: self.rank] / self.singular[: self.rank, None]
-        return root
+        return self.directions[: self.rank] / self.singular[: self.rank, None]
 
 
 def least_squares(columns: Float64, values: Float64) -> LinearFit:

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, with_known
+from shipdrag_ros.diagnosis.advice import PredictedOutcome, with_known
+from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose, words
-from shipdrag_ros.diagnosis.carried import Carried, carried
-from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
+from shipdrag_ros.diagnosis.earlier import Carried, EarlierCandidate, EarlierDiagnosis, carried
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun
 from shipdrag_ros.errors import DiagnosisError

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.gaps import gap_of, held_out
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.sights import ship_runs
+from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing
 from shipdrag_ros.samples import Float64

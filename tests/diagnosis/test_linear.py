@@ -8,8 +8,7 @@ import pytest
 
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.sights import ship_runs
+from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.effects import ways_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, probability_of_naming
+from shipdrag_ros.diagnosis.advice import PredictedOutcome, probability_of_naming
 from shipdrag_ros.inference.decision import CERTAIN
 from shipdrag_ros.inference.decision import WeighedHypothesis as Rival
 

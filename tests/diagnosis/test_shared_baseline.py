@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.shared_baseline import Normals, factor, share
+from shipdrag_ros.diagnosis.learn_baseline import Normals, factor, share
 
 ALONG = np.array([1.0, 1.0])
 PRIOR = np.zeros(2)  # wide beside what the runs know, as its sd is 1

@@ -11,8 +11,7 @@ import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.diagnose import effects_about
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.sights import ship_runs, sight
+from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters

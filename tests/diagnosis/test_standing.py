@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import SailingRecord, diagnose_sailing
-from shipdrag_ros.diagnosis.standing import StandingLog
+from shipdrag_ros.diagnosis.sailing_model import StandingLog
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.forecast.stopped import HullNow, if_stopped
+from shipdrag_ros.forecast.foretell import HullNow, if_stopped
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.ship.sections import Propulsion

@@ -10,8 +10,8 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
-from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import rank
 
 
 def coasted(estimate: Estimate, top: float, rule: FroudeMax) -> Estimate:

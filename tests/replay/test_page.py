@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
-from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.page import write_report
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import rank
 from tests.page import Page
 
 

@@ -11,8 +11,8 @@ import pytest
 from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown, Regimes
 from shipdrag_ros.coastdown.regimes.bank import OUT
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
-from shipdrag_ros.replay import pictures
-from shipdrag_ros.replay.hulls import RankedHull
+from shipdrag_ros.replay import page
+from shipdrag_ros.replay.together import RankedHull
 
 
 def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
@@ -20,7 +20,7 @@ def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
         RankedHull(f'hull {n}', 0.1, FroudeMax.INFLECTION, (), estimate.valid_curve)
         for n in range(8)
     ]
-    axis = pictures.comparison_picture(hulls).axes[0]
+    axis = page.comparison_picture(hulls).axes[0]
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
         hull.label for hull in hulls
     ]
@@ -45,7 +45,7 @@ def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdo
         0.5,
     )
     shown = replace(coastdown, cuts=cuts, regimes=regimes)
-    axis, strip = pictures.cut_picture(shown, None, 2e7).axes
+    axis, strip = page.cut_picture(shown, None, 2e7).axes
     assert [text.get_text() for text in axis.texts] == [cuts[0].reason.value]
     assert len(axis.patches) == len(cuts)
     assert axis.get_xlim() == pytest.approx((0.0, length_ns * 1e-9))

@@ -11,9 +11,9 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
 from shipdrag_ros.replay import tables as cells
-from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.tables import write_curves
+from shipdrag_ros.replay.together import rank
 
 
 def test_facts_leave_out_what_is_not_known(coastdown: EndedCoastdown) -> None:

@@ -27,23 +27,6 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import effect_of, effects_in
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
-__all__ = [
-    'LIBRARY',
-    'action_of',
-    'carrying',
-    'confounders',
-    'declared',
-    'discriminating_measurements',
-    'effects_of',
-    'find',
-    'inseparable',
-    'parse',
-    'terms',
-    'using',
-    'values_of',
-]
-
-
 GROUP = 'shipdrag.effects'
 
 

@@ -106,14 +106,8 @@ class Hulls:
         """
         Return some of the rows.
         """
-        return Hulls(
-            L_B=self.L_B[rows],
-            B_T=self.B_T[rows],
-            C_B=self.C_B[rows],
-            slenderness=self.slenderness[rows],
-            Fr=self.Fr[rows],
-            lcb=None if self.lcb is None else self.lcb[rows],
-        )
+        known = {name: column for name, column in vars(self).items() if column is not None}
+        return replace(self, **{name: column[rows] for name, column in known.items()})
 
     def at(self, froude: Float64) -> Hulls:
         """
@@ -134,8 +128,7 @@ class Hulls:
         """
         shapes = [self.L_B, self.B_T, self.C_B, *(() if self.lcb is None else (self.lcb,))]
         _, number = np.unique(np.column_stack(shapes), axis=0, return_inverse=True)
-        found: NDArray[np.intp] = number.reshape(-1)
-        return found
+        return number.reshape(-1)
 
     def longer(self, factor: float) -> Hulls:
         """

@@ -4,10 +4,16 @@ S1's estimator as published: a window in, r(v) with its range out.
 
 A pure function of the window, the ship and the parameters: no memory, no
 random numbers, no clock, and sums that do not depend on the number of threads.
+
+S1's three problems: speed alone, position alone, both together.
+
+Each returns the fitted polynomial with the covariance of its coefficients, and
+the order table it was chosen from.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,18 +22,211 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.estimators import Estimator
-from shipdrag_ros.estimation.result import Estimate, Track
+from shipdrag_ros.estimation.result import Estimate, OrderTrial, Track
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.least_squares import inverse, triangle
+from shipdrag_ros.studies.order import OrderTable, fit_orders, rounding
 from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.studies.s1.motion import at_end, resistance_curve
-from shipdrag_ros.studies.s1.problems import (
-    ScalarInput,
-    Solution,
-    solve_joint,
-    solve_one,
-)
+from shipdrag_ros.studies.s1.motion import PolynomialMotion, at_end, resistance_curve
+
+
+@dataclass(frozen=True)
+class ScalarInput:
+    """
+    One input as a scalar function of time.
+
+    Attributes
+    ----------
+    name
+        Of the input.
+    time_ns : (n,) int64
+        Strictly ascending.
+    value : (n,)
+        Speed [m/s], or distance along the track [m].
+    known_sigma
+        A-priori standard deviation, 0 where unknown.
+    scale, basis
+        Polynomials on these times.
+    """
+
+    name: str
+    time_ns: Int64
+    value: Float64
+    known_sigma: float
+    scale: TimeScale
+    basis: OrthogonalBasis
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it is a distance."""
+        return self.name == 'position'
+
+
+@dataclass(frozen=True)
+class Solution:
+    """
+    A problem solved at every order, and at the one chosen.
+
+    Attributes
+    ----------
+    fit
+        The polynomial of the order chosen.
+    order
+        Number of its coefficients.
+    trials
+        The order table.
+    noise_sd
+        Residual standard deviation of each input, by name.
+    reorthogonalised
+        How many basis columns needed a second orthogonalisation.
+    notes
+        What a reader must know, a sentence each.
+    """
+
+    fit: PolynomialMotion
+    order: int
+    trials: tuple[OrderTrial, ...]
+    noise_sd: dict[str, float]
+    reorthogonalised: int
+    notes: tuple[str, ...]
+
+
+def solve_one(data: ScalarInput) -> Solution:
+    """
+    Fit the speed alone, or the position alone, whose derivative is the speed.
+
+    Notes
+    -----
+    S1 (5, 6, 9, 11).
+    """
+    basis = data.basis
+    coefficients, table = fit_orders(basis, data.value)
+    known = data.known_sigma**2
+    row, trusted, notes = _choose(table, known)
+    order = int(table.coefficients[row])
+    variance = known if trusted else float(table.variance[row])
+    root = np.diag(np.sqrt(variance / basis.squared_norm[:order]))
+    unused = np.full(len(table.sse), np.nan)
+    speed, position = (unused, table.variance) if data.is_place else (table.variance, unused)
+    return Solution(
+        PolynomialMotion(data.scale, basis, coefficients[:order], root, int(data.is_place)),
+        order,
+        _trials(table, speed, position),
+        {data.name: math.sqrt(table.variance[row])},
+        basis.reorthogonalised,
+        notes,
+    )
+
+
+def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
+    """
+    Fit one polynomial to the position and its derivative to the speed.
+
+    Notes
+    -----
+    S1 (7, 10, 11), with the noise of each input first from its own problem
+    where it is not known. The polynomials are orthogonal on the stamps of both
+    inputs; where these agree, as in S1, that is S1's basis. Derivative columns
+    are not orthogonal, so the weighted matrix is factored. Its columns are
+    nested: one factorisation serves all orders. The residual variance of each
+    input is its sum of squares over n_i less the trace of its part of the hat
+    matrix.
+    """
+    alone = solve_one(position), solve_one(speed)
+    inputs = (position, speed)
+    sigmas = np.array(
+        [
+            data.known_sigma or max(solution.noise_sd[data.name], _least_sigma(data.value))
+            for data, solution in zip(inputs, alone)
+        ]
+    )
+    scale = TimeScale.of(position.time_ns, speed.time_ns)
+    counts = np.array([len(position.value), len(speed.value)])
+    times = scale.normalise(np.concatenate([position.time_ns, speed.time_ns]))
+    # of full rank: no more columns than either input carries by itself
+    basis = OrthogonalBasis.on(times, max(position.basis.order, speed.basis.order))
+    rates = basis.evaluate(times[counts[0] :], derivatives=1)[1] / scale.half_s
+    # each input condensed once; weights and orders are then a matter of small matrices
+    factors = np.concatenate(
+        [
+            triangle(_with_values(rows, data.value)) / sigma
+            for rows, data, sigma in zip((basis.columns[:, : counts[0]], rates), inputs, sigmas)
+        ]
+    )
+    q, r = np.linalg.qr(factors)
+    projected = r[:, -1]
+    parts = np.stack([q[: len(r)], q[len(r) :]])
+    # residual of each order: what the columns from that order on take of the data
+    residual = np.cumsum((parts * projected)[:, :, ::-1], axis=2)[:, :, ::-1]
+    sse = np.einsum('ijk,ijk->ik', residual, residual)[:, 1:]
+    traces = np.cumsum(np.einsum('ijk,ijk->ik', parts, parts)[:, :-1], axis=1)
+    # an input that the fit follows exactly keeps a degree of freedom, so as not to divide by 0
+    variances = sse * sigmas[:, None] ** 2 / np.maximum(counts[:, None] - traces, 1.0)
+
+    squares = sum(
+        float((data.value * data.value).sum()) / sigma**2 for data, sigma in zip(inputs, sigmas)
+    )
+    tail = np.cumsum((projected**2)[::-1])[::-1]
+    table = OrderTable.of(
+        np.arange(1, basis.order + 1),
+        tail[1:],
+        rows=int(counts.sum()),
+        rounding=rounding(squares),
+    )
+    row, trusted, notes = _choose(table, float(all(data.known_sigma for data in inputs)))
+    order = int(table.coefficients[row])
+    unscaled = inverse(r[:order, :order])
+    coefficients = np.einsum('ij,j->i', unscaled, projected[:order])
+    root = unscaled if trusted else unscaled * math.sqrt(table.variance[row])
+    return Solution(
+        PolynomialMotion(scale, basis, coefficients, root, speed_at=1),
+        order,
+        _trials(table, variances[1], variances[0]),
+        {data.name: math.sqrt(variances[i, row]) for i, data in enumerate(inputs)},
+        basis.reorthogonalised + sum(solution.reorthogonalised for solution in alone),
+        notes,
+    )
+
+
+def _with_values(rows: Float64, values: Float64) -> Float64:
+    """Return [H | z], (n, k + 1), from H' (k, n) and z (n,)."""
+    return np.concatenate([rows, values[None]]).T
+
+
+def _least_sigma(values: Float64) -> float:
+    """Return a standard deviation above 0 for data that a fit follows exactly."""
+    return float(np.finfo(np.float64).eps * np.abs(values).max()) or 1.0
+
+
+def _choose(table: OrderTable, known: float) -> tuple[int, bool, tuple[str, ...]]:
+    """
+    Choose the order; say whether a known variance (0: unknown) was trusted.
+    """
+    if known == 0.0:
+        return table.plateau(), False, ()
+    row = table.plateau_at(known)
+    if row is None:
+        note = (
+            'the residuals of every order are too large for the stated standard deviation: '
+            'it was not used for the order and the band'
+        )
+        return table.plateau(), False, (note,)
+    if table.is_below(row, known):
+        note = 'the residuals are too small for the stated standard deviation: the band is wide'
+        return row, True, (note,)
+    return row, True, ()
+
+
+def _trials(table: OrderTable, speed: Float64, position: Float64) -> tuple[OrderTrial, ...]:
+    columns = (table.variance, speed, position, table.f, table.p)
+    return tuple(
+        OrderTrial(int(order), *map(float, values))
+        for order, *values in zip(table.coefficients, *columns)
+    )
+
 
 _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is evaluated
 

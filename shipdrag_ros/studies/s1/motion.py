@@ -50,14 +50,7 @@ class Motion:
     jerk_error: Float64
 
     def __getitem__(self, part: slice) -> Motion:
-        return Motion(
-            self.speed[part],
-            self.acceleration[part],
-            self.jerk[part],
-            self.speed_error[part],
-            self.acceleration_error[part],
-            self.jerk_error[part],
-        )
+        return Motion(*(each[part] for each in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -164,7 +157,7 @@ def _of_motion(
 
 
 def _resistance(motion: Motion, ship: Ship) -> Float64:
-    found: Float64 = _of_motion(
+    return _of_motion(
         motion.speed,
         motion.acceleration,
         motion.jerk,
@@ -173,7 +166,6 @@ def _resistance(motion: Motion, ship: Ship) -> Float64:
         ship.n_r_polynomial(),
         ship.added_mass.sd,
     )
-    return found
 
 
 def specific_resistance(motion: Motion, ship: Ship) -> tuple[Float64, Float64, Float64]:

@@ -91,9 +91,9 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
         yield Particular('baseline.C_V', np.nan, base.relative_sd.friction, _viscous)
         if any(base.wave_coefficient):
             wave = base.relative_sd.wave
-            yield Particular('baseline.wave_coefficient', np.nan, wave, _wave)
+            yield _field('wave_coefficient', ship, section='baseline', sd=wave)
     elif isinstance(base, TableBaseline):
-        yield Particular('baseline.resistance_n', np.nan, base.relative_sd, _table)
+        yield _field('resistance_n', ship, section='baseline', sd=base.relative_sd)
     for effect in ship.effects:
         for name, stated in effect.parameters.items():
             sd = stated.sd / abs(stated.value) if stated.sd and stated.value else np.nan
@@ -102,18 +102,22 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
 
 
 def _field(name: str, ship: Ship, *, section: str = '', sd: float = np.nan) -> Particular:
-    """Return a single number of the ship or of a section of hers."""
+    """Return a number of the ship or of a section of hers, or all numbers of a table there."""
 
     def scaled(changed: Ship, factor: float) -> Ship:
         if not section:
             return replace(changed, **{name: factor * getattr(changed, name)})
         part: Any = getattr(changed, section)
-        values = {name: factor * getattr(part, name)}
-        return replace(changed, **{section: replace(part, **values)})
+        value = getattr(part, name)
+        if isinstance(value, tuple):
+            value = tuple(factor * each for each in value)
+        else:
+            value *= factor
+        return replace(changed, **{section: replace(part, **{name: value})})
 
-    holder = getattr(ship, section) if section else ship
+    value = getattr(getattr(ship, section) if section else ship, name)
     key = f'{section}.{name}' if section else name
-    return Particular(key, float(getattr(holder, name)), sd, scaled)
+    return Particular(key, np.nan if isinstance(value, tuple) else float(value), sd, scaled)
 
 
 def _added_mass(ship: Ship, factor: float) -> Ship:
@@ -136,20 +140,6 @@ def _viscous(ship: Ship, factor: float) -> Ship:
         correlation_allowance=factor * base.correlation_allowance,
     )
     return replace(ship, baseline=changed)
-
-
-def _wave(ship: Ship, factor: float) -> Ship:
-    base = ship.baseline
-    assert isinstance(base, CoefficientBaseline)
-    values = tuple(factor * value for value in base.wave_coefficient)
-    return replace(ship, baseline=replace(base, wave_coefficient=values))
-
-
-def _table(ship: Ship, factor: float) -> Ship:
-    base = ship.baseline
-    assert isinstance(base, TableBaseline)
-    values = tuple(factor * value for value in base.resistance_n)
-    return replace(ship, baseline=replace(base, resistance_n=values))
 
 
 def _effect(name: str, parameter: str) -> _Change:

@@ -237,8 +237,7 @@ def simulator(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0
     scale = np.array([1.0, 1.0, 1.0 / ship.length_m]) * ship.speed_m_s
 
     def simulate(derivatives: Float64) -> Float64:
-        motions: Float64 = steer(ship, manoeuvre, derivatives, control_s=control_s).speeds / scale
-        return motions
+        return steer(ship, manoeuvre, derivatives, control_s=control_s).speeds / scale
 
     return simulate
 

@@ -116,8 +116,7 @@ class Polynomial:
         """
         Return the derivatives by each variable at (m, d) points; (m, d).
         """
-        slopes: Float64 = self._at(points, len(self.centre))[1:].T / self.half
-        return slopes
+        return self._at(points, len(self.centre))[1:].T / self.half
 
     def derivative(self, variable: int) -> Polynomial:
         """
@@ -133,8 +132,7 @@ class Polynomial:
 
     def _at(self, points: Float64, slopes: int) -> Float64:
         scaled = np.ascontiguousarray(((points - self.centre) / self.half).T)
-        result: Float64 = _evaluate(scaled, self._steps, self.coefficients, slopes)
-        return result
+        return _evaluate(scaled, self._steps, self.coefficients, slopes)
 
     @cached_property
     def _steps(self) -> Powers:
@@ -408,8 +406,7 @@ class Surface:
     @cached_property
     def coefficients(self) -> Float64:
         """(terms,) Of raw powers of the inputs, in the order of `polynomial.powers`."""
-        values: Float64 = self._raw @ self.fit.coefficients
-        return values
+        return self._raw @ self.fit.coefficients
 
     @cached_property
     def sd(self) -> Float64:

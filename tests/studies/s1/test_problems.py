@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.studies.s1.estimate import ScalarInput, Solution, solve_joint, solve_one
 from shipdrag_ros.studies.s1.motion import sigma
-from shipdrag_ros.studies.s1.problems import ScalarInput, Solution, solve_joint, solve_one
 
 START_NS = 1_700_000_000_123_456_789
 
