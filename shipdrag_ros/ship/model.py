@@ -115,9 +115,8 @@ class Ship:
         ]
         if problems:
             raise ShipFileError('Ship(...)', problems)
-        for (
-            name
-        ) in _SIZES:  # whole numbers and those of numpy too: what is compiled takes no other
+        # whole numbers, and those of numpy, become floats: what is compiled takes no other
+        for name in _SIZES:
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, float(value))
 
