@@ -24,7 +24,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Scope
-from shipdrag_ros.simulation.effects import effects_of
+from shipdrag_ros.simulation.effects import effects_of, not_known
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
@@ -138,17 +138,9 @@ def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     SimulationError
         Naming an effect or a parameter that is not known.
     """
-    if stated.name not in (known := effects_of(ship)):
-        raise SimulationError(
-            f'effects: {stated.name!r} is not known; known are {", ".join(known)}'
-        )
-    effect = known[stated.name]
-    names = [q.name for q in effect.parameters_of(ship)]
-    if strange := [key for key in stated.parameters if key not in names]:
-        raise SimulationError(
-            f'effects: {effect.name}: parameter {strange[0]!r} is not known; known are '
-            f'{", ".join(names)}'
-        )
+    if wrong := [*not_known(stated, ship)]:
+        raise SimulationError(f'effects: {"; ".join(wrong)}')
+    effect = effects_of(ship)[stated.name]
     unknowns = []
     for q in effect.parameters_of(ship):
         given = stated.parameters.get(q.name, Parameter(float(np.nan_to_num(q.value)), 0.0))

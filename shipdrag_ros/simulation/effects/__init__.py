@@ -252,7 +252,7 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
             problems.append(f'{one.name} and {other.name} cannot be there at the same time')
     for item in stated:
         if item.name not in known:
-            problems.append(f'{item.name!r} is not known; known are {", ".join(known)}')
+            problems.extend(not_known(item, frame.ship))
             continue
         effect = known[item.name]
         before = len(problems)
@@ -266,16 +266,27 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
     return total
 
 
+def not_known(stated: StatedEffect, ship: Ship) -> Iterator[str]:
+    """
+    Say which effect, or which of its parameters, no effect of a ship has.
+    """
+    effects = effects_of(ship)
+    if stated.name not in effects:
+        yield f'{stated.name!r} is not known; known are {", ".join(effects)}'
+        return
+    names = [parameter.name for parameter in effects[stated.name].parameters_of(ship)]
+    for key in stated.parameters:
+        if key not in names:
+            yield f'{stated.name}: parameter {key!r} is not known; known are {", ".join(names)}'
+
+
 def _problems(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[str]:
     missing = effect.missing(frame.ship)
     if missing:
         yield f'{effect.name} needs {", ".join(missing)} in the ship file'
         return
-    known = {parameter.name: parameter for parameter in effect.parameters_of(frame.ship)}
-    for key in stated.parameters:
-        if key not in known:
-            yield f'{effect.name}: parameter {key!r} is not known; known are {", ".join(known)}'
-    for parameter in known.values():
+    yield from not_known(stated, frame.ship)
+    for parameter in effect.parameters_of(frame.ship):
         given = stated.parameters.get(parameter.name)
         if given is None:
             if not parameter.is_given:
