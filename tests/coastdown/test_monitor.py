@@ -334,7 +334,7 @@ def on_another_mark(block: Block, at_s: float, seed: int = 0) -> Block:
 def test_a_radar_that_takes_another_mark_is_no_turn(watch, record, sensors) -> None:
     both = record(sensors=(sensors['log'], sensors['radar']))
     start_ns = the_coastdown(watch(both)).start_ns
-    for seed, at_s in enumerate((-30.0, 60.0, 300.0, 700.0)):
+    for seed, at_s in enumerate((-30.0, 60.0, 700.0)):
         coastdown = the_coastdown(watch(on_another_mark(both, at_s, seed)))
         assert coastdown.ended_by is EndedBy.RECORD_END, at_s
         assert abs(coastdown.start_ns - start_ns) <= 5 * S, at_s
