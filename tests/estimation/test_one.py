@@ -33,6 +33,10 @@ def window(block: Block, end_ns: int = END_NS) -> Window:
     return Window.from_block(block, START_NS, end_ns)
 
 
+def cut(block: Block) -> Window:
+    return Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
+
+
 def only(block: Block, *channels: Channel) -> Block:
     return block[np.isin(block.channel, channels)]
 
@@ -67,6 +71,11 @@ def error(found: Estimate, coast: Any, ship: Ship) -> Float64:
     truth = coast.resistance(speed, ship)
     result: Float64 = (r - truth) / coast.resistance(8.2, ship)
     return result
+
+
+def away_from(found: Estimate, coast, ship: Ship) -> Float64:
+    curve = found.valid_curve
+    return curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
 
 
 def rmse(found: Estimate, coast: Any, ship: Ship) -> float:
@@ -254,7 +263,7 @@ def test_a_track_of_something_else_costs_no_figure(track: str) -> None:
         if track == 'circle':
             place += 5e3 * np.c_[np.cos(time_s / 50.0), np.sin(time_s / 50.0)]
         blocks.append(Block.of(Channel.POSITION, stamps, place))
-    window = Window.from_block(in_arrival_order(blocks), int(stamps[0]), int(stamps[-1]))
+    window = cut(in_arrival_order(blocks))
     found = estimate_final(window, SHIP, Parameters())
     curve = found.valid_curve
     r = np.interp(5.0, curve.speed_m_s, curve.resistance_m_s2)
@@ -273,18 +282,14 @@ def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> 
     place = size + np.c_[size * time_s / 900.0, 0.0 * time_s]
     log = Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed)
     track = Block.of(Channel.POSITION, stamps, place)
-    alone = Window.from_block(track, int(stamps[0]), int(stamps[-1]))
+    alone = cut(track)
     with pytest.raises(EstimationError, match='no ship has'):
         estimate_final(alone, SHIP, Parameters(estimator=estimator))
     if estimator == 'one':
         both = in_arrival_order([log, track])
-        window = Window.from_block(both, int(stamps[0]), int(stamps[-1]))
+        window = cut(both)
         found = estimate_final(window, SHIP, Parameters())
         assert found.samples == {'speed_through_water': 900}
-
-
-def cut(block: Block) -> Window:
-    return Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
 
 
 def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None:
@@ -296,27 +301,16 @@ def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None
         time_s = (block.stamp_ns[rows] - block.stamp_ns[0]) * 1e-9
         block.value[rows, 0] += GaussMarkov(0.05, 60.0).sample(time_s, np.random.default_rng(seed))
         found = estimate_final(cut(block), ship, Parameters())
-        curve = found.valid_curve
-        away = curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
-        covered.append(np.mean(np.abs(away) <= 2.0 * curve.sigma_repeatable_m_s2))
+        away = away_from(found, coast, ship)
+        covered.append(np.mean(np.abs(away) <= 2.0 * found.valid_curve.sigma_repeatable_m_s2))
         said += any('slow disturbances learnt' in note for note in found.notes)
     assert said >= 18
     assert np.mean(covered) > 0.7
 
 
-def window_with(coast, n: int = 500, **noise: float) -> Window:
-    return cut(coast.block(n, **noise))
-
-
-def away_from(found: Estimate, coast, ship: Ship) -> Float64:
-    curve = found.valid_curve
-    return curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
-
-
 def test_quadratic_drag_is_found_without_noise(coast, ship) -> None:
-    plain = replace(ship, added_mass=replace(ship.added_mass))
     found = estimate_final(
-        window_with(coast, speed_sigma=0.0, position_sigma=0.0), plain, Parameters()
+        cut(coast.block(500, speed_sigma=0.0, position_sigma=0.0)), ship, Parameters()
     )
     largest = float(found.curve.resistance_m_s2.max())
     # filter, scale and offset of the log stay open: 1 % at the top
@@ -356,10 +350,10 @@ def test_a_late_onset_is_found_with_all_families(coast, ship) -> None:
             ]
         )
         start_ns = int(block.stamp_ns[0]) - 8_000_000_000
-        cut = Window.from_block(
+        late = Window.from_block(
             both, start_ns, int(block.stamp_ns[-1]), before_ns=int(both.stamp_ns[0])
         )
-        found = estimate_final(cut, ship, Parameters())
+        found = estimate_final(late, ship, Parameters())
         away = away_from(found, coast, ship)
         largest = float(found.curve.resistance_m_s2.max())
         assert np.sqrt(np.mean(away**2)) < 0.03 * largest
@@ -403,8 +397,8 @@ def test_log_and_positions_are_no_worse_than_either(coast, ship) -> None:
         ]
         one = []
         for part in parts:
-            cut = Window.from_block(part, start_ns, int(part.stamp_ns[-1]), before_ns=0)
-            found = estimate_final(cut, ship, Parameters())
+            late = Window.from_block(part, start_ns, int(part.stamp_ns[-1]), before_ns=0)
+            found = estimate_final(late, ship, Parameters())
             largest = float(found.curve.resistance_m_s2.max())
             one.append(np.sqrt(np.mean(away_from(found, coast, ship) ** 2)) / largest)
         rms.append(one)
