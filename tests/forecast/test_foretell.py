@@ -56,6 +56,11 @@ def early(window: Window, ship: Ship) -> Estimate:
     return after(window, 600.0, ship, 'one')
 
 
+@pytest.fixture(scope='module')
+def whole(window: Window, ship: Ship) -> Estimate:
+    return estimate(window, ship, Parameters(estimator='one'))
+
+
 @pytest.mark.parametrize('estimator', ['one', 's1_joint'])
 def test_it_comes_as_it_was_foretold(window, truth, ship, estimator):
     found = foretell(after(window, 600.0, ship, estimator), ship, froude_min=0.05)
@@ -188,8 +193,8 @@ def test_a_current_may_set_her_back(early: Estimate, ship: Ship) -> None:
     assert np.abs(way).max() < still.milestones[-1].distance_m.high
 
 
-def test_what_followed_may_be_behind(window: Window, ship: Ship, early: Estimate) -> None:
-    whole = replace(estimate(window, ship, Parameters(estimator='one')), current_m_s=-2.0)
+def test_what_followed_may_be_behind(window, whole, ship, early):
+    whole = replace(whole, current_m_s=-2.0)
     position = window.position
     track = position.value[-1] - position.value[0]
     since_s = (position.time_ns - window.start_ns) / SECOND_NS
@@ -213,8 +218,7 @@ def test_it_takes_less_than_five_milliseconds(early: Estimate, ship: Ship) -> No
     assert np.median(spent) < 5e-3
 
 
-def test_what_followed_is_read_from_the_instruments(window, truth, early, ship):
-    whole = estimate(window, ship, Parameters(estimator='one'))
+def test_what_followed_is_read_from_the_instruments(window, whole, truth, early, ship):
     checked = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
     gliding = truth.time_s >= LEAD_IN_S
     speed = truth.speed_through_water_m_s[gliding]
@@ -228,8 +232,7 @@ def test_what_followed_is_read_from_the_instruments(window, truth, early, ship):
     assert checked.inside is not None
 
 
-def test_a_spike_is_not_what_followed(window: Window, ship: Ship, early: Estimate) -> None:
-    whole = estimate(window, ship, Parameters(estimator='one'))
+def test_a_spike_is_not_what_followed(window, whole, ship, early):
     sound = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
     log = window.speed_through_water
     value = log.value.copy()
