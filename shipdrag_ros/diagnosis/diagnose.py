@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,7 +32,6 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
@@ -300,14 +298,13 @@ def compare(
         return facts.log_likelihood(hypothesis) + before
 
     effects = effects_about(seen)
-    together = ship_runs(seen, ship)
     return Comparing(
-        together,
+        ship_runs(seen, ship),
         ship,
         effects,
         log_known,
         () if earlier is None else earlier.ways(effects),
-        math.log((priors.DIFFERS_LATER if together.apart else priors.DIFFERS).mean),
+        effects,
     )
 
 
