@@ -51,6 +51,7 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Scope
+from shipdrag_ros.simulation.effects import checked
 
 _ITERATIONS = 8  # of Gauss and Newton
 _CLOSE = 0.1  # of -2 ln posterior
@@ -239,7 +240,7 @@ class Comparing:
     ) -> None:
         self.runs, self.effects, self.log_known = runs, tuple(effects), log_known
         self.may_differ = tuple(each for each in may_differ if each.scope is Scope.HULL)
-        self.stated = tuple(stated_way(each, ship) for each in ship.effects)
+        self.stated = tuple(stated_way(each, ship) for each in checked(ship).effects)
         self.base = Explanation(self.stated)
         self.noise: list[_RunNoise] = []
         kinds = {int(k) for run in runs.runs for k in np.unique(run.model.rows.kind)}
