@@ -416,7 +416,8 @@ def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
     begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
     return (
         f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
-        f'at: {begins or "there is none"}'
+        f'at: {begins or "there is none"}; where none is the stop that is meant, check its '
+        'time and zone, or give the window in which she glided'
     )
 
 
