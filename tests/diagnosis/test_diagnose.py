@@ -12,7 +12,9 @@ from shipdrag_ros.diagnosis import CoastRun, diagnose, with_effects
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import Verdict
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import StatedEffect
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -90,3 +92,16 @@ def test_what_is_hidden_is_named_and_then_no_longer_missing() -> None:
     assert found.held_out_after.chi2_per_sample < 1.2
     again = diagnose(runs, with_effects(SHIP, found.effects), PARAMETERS)
     assert again.verdict is Verdict.NONE
+
+
+def test_water_and_air_of_one_day_in_a_ship_file_are_said_to_be_that() -> None:
+    run = coasted(name='today', coast_s=600.0, rate_hz=0.5)
+    stated = (
+        StatedEffect('current', {'along_track_m_s': Parameter(0.0, 0.1)}),
+        StatedEffect('fouling', {'friction_factor': Parameter(0.0, 0.1)}),
+    )
+    found = diagnose([run], replace(SHIP, effects=stated), Parameters(), advise=False)
+    (said,) = [note for note in found.notes if 'one day' in note]
+    assert said.startswith('the ship file states current, which')
+    assert 'along the heading of today' in said
+    assert said in found.summary()
