@@ -31,7 +31,7 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
     assert abs(last.value - sizes[1]) < 3.0 * last.sd
     if sizes[0] == sizes[1]:
         assert found.runs_differ == ()
-        assert words.differing(found) == ''
+        assert words.differing(found.runs_differ) == ''
         return
     assert [each.run for each in found.runs_differ] == ['0', '1']
     for each, size in zip(found.runs_differ, sizes, strict=True):
