@@ -7,15 +7,17 @@ import json
 import math
 import re
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+T = TypeVar('T')
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
@@ -167,6 +169,18 @@ def day(time_ns: int) -> str:
     Return the day of a time, UTC, in ISO 8601.
     """
     return datetime.fromtimestamp(time_ns // 1_000_000_000, UTC).strftime('%Y-%m-%d')
+
+
+def dated(items: Iterable[tuple[int, T]]) -> list[tuple[str, T]]:
+    """
+    Return each with `utc` of its time [ns], numbered where several are alike.
+    """
+    shown = [(utc(time_ns), item) for time_ns, item in items]
+    texts = [text for text, _ in shown]
+    return [
+        (f'{text} ({texts[:i].count(text) + 1})' if texts.count(text) > 1 else text, item)
+        for i, (text, item) in enumerate(shown)
+    ]
 
 
 def duration(seconds: float) -> str:

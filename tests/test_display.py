@@ -29,6 +29,11 @@ def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:
     assert display.utc(2**62) == '2116-02-20 23:53:38 UTC'
 
 
+def test_what_begins_in_one_second_is_told_apart() -> None:
+    items = [(153_200_000_000, 'a'), (153_900_000_000, 'b'), (10**12, 'c')]
+    assert display.dated(items) == [('153 s (1)', 'a'), ('153 s (2)', 'b'), ('1000 s', 'c')]
+
+
 def test_a_long_time_is_also_given_in_minutes() -> None:
     assert display.duration(40.0) == '40 s'
     assert display.duration(1500.0) == '1500 s (25 min)'

@@ -43,6 +43,7 @@ from shipdrag_ros.cli.arguments import add_ship, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.nmea.live import parse_addresses
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import checked
 
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 LOCAL_ONLY = 'ROS_LOCALHOST_ONLY'
@@ -65,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     """
     Run the node until SIGINT or SIGTERM.
     """
-    Ship.load(options.ship)  # here its problems are said before ROS starts
+    checked(Ship.load(options.ship))  # here its problems are said before ROS starts
     output = Output()
     for line in overruled(options.ros_args, ship=options.ship, out=options.out):
         output.log(line)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -29,17 +28,17 @@ from shipdrag_ros.diagnosis.verdict import (
     runs_differ,
     waiting,
 )
+from shipdrag_ros.diagnosis.words import names_text
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
 _NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
@@ -270,6 +269,7 @@ def settled(
         case = compared(seen)
     return case, (
         *notes,
+        *_of_one_day(case),
         *(
             f'{name}: after {_LOOKS} looks the likeliest stop is still {by_s:+.0f} s from the one '
             'that effects are simulated from; tell the stop, or record the shaft'
@@ -277,6 +277,17 @@ def settled(
             if abs(by_s) > _NEAR_S
         ),
     )
+
+
+def _of_one_day(case: ComparedRuns) -> Iterator[str]:
+    """Say which effects of the ship file are of the water and air of one day, and taken as so."""
+    earth = [way.effect for way in case.comparing.stated if way.effect.scope is Scope.EARTH]
+    if earth:
+        yield (
+            f'the ship file states {names_text([effect.name for effect in earth])}, which is of '
+            f'the water and air of one day: it is taken for these runs, along the heading of '
+            f'{case.seen[0].name}; take it out of the file for runs of another day'
+        )
 
 
 def compare(
@@ -300,14 +311,13 @@ def compare(
         return facts.log_likelihood(hypothesis) + before
 
     effects = effects_about(seen)
-    together = ship_runs(seen, ship)
     return Comparing(
-        together,
+        ship_runs(seen, ship),
         ship,
         effects,
         log_known,
         () if earlier is None else earlier.ways(effects),
-        math.log((priors.DIFFERS_LATER if together.apart else priors.DIFFERS).mean),
+        effects,
     )
 
 

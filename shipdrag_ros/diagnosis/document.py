@@ -12,6 +12,7 @@ from shipdrag_ros.diagnosis.result import (
     DiagnosisResult,
     EffectEstimate,
     Gap,
+    RunSize,
     SeenRun,
     WeighedEarlier,
     WeighedFact,
@@ -52,16 +53,7 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         'examined': list(found.examined),
         'no_coastdown': found.no_coastdown or None,
         'notes': list(found.notes),
-        'runs_differ': [
-            {
-                'bag': each.run,
-                'effect': each.effect,
-                'parameter': each.parameter,
-                'value': each.size.value,
-                'sd': each.size.sd,
-            }
-            for each in found.runs_differ
-        ],
+        'runs_differ': sizes_of_runs(found.runs_differ),
         'facts': [_fact(each) for each in found.facts],
         'ship': None
         if ship is None
@@ -109,6 +101,22 @@ def _earlier(given: WeighedEarlier) -> dict[str, Any]:
         'effects': [{**asdict(each), 'contradicted': each.contradicted} for each in given.effects],
         'unused': list(given.unused),
     }
+
+
+def sizes_of_runs(sizes: Sequence[RunSize]) -> list[dict[str, Any]]:
+    """
+    Return the size of an effect in each of some runs that differ.
+    """
+    return [
+        {
+            'bag': each.run,
+            'effect': each.effect,
+            'parameter': each.parameter,
+            'value': each.size.value,
+            'sd': each.size.sd,
+        }
+        for each in sizes
+    ]
 
 
 def sized(effects: Sequence[EffectEstimate]) -> list[dict[str, Any]]:

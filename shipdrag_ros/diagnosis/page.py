@@ -9,7 +9,7 @@ from pathlib import Path
 from shipdrag_ros.diagnosis import pictures, tables, words
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.tables import Score
-from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, utc
+from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, dated
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.pictures import curves_picture, power_picture
 from shipdrag_ros.estimation.result import Estimate
@@ -90,11 +90,12 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
     usable = [each for each in estimates if len(each.valid_curve)]
     if ship is None or not usable:
         return
+    curves = dated((each.start_ns, each.valid_curve) for each in usable)
     clean = ship.baseline is not None
     over = ', over that of the clean hull with what is known of it' if clean else ''
     drawn = [
         picture(
-            curves_picture([(utc(each.start_ns), each.valid_curve) for each in usable], ship),
+            curves_picture(curves, ship),
             f'Resistance of each coastdown as measured{over}. A gap is there to be explained: by '
             'the effect named above, where one is.',
         ),
@@ -111,10 +112,10 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
         pictures=drawn,
         tables=[
             (
-                f'{utc(each.start_ns)}: resistance and effective power',
-                estimate_tables.force_table(each.valid_curve, ship),
+                f'{date}: resistance and effective power',
+                estimate_tables.force_table(curve, ship),
             )
-            for each in usable
+            for date, curve in curves
         ],
     )
 

@@ -429,8 +429,9 @@ class DiagnosisResult:
 
         needs = () if ship is None or self.question else in_service(self.estimates, ship)
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
-        first = (self.no_coastdown, words.sentence(self), words.differing(self))
-        lines = (*first, *needs, words.examined(self), where)
+        first = (self.no_coastdown, words.sentence(self), words.differing(self.runs_differ))
+        last = 'Sizes elsewhere are those of the last run.' if self.runs_differ else ''
+        lines = (*first, last, *needs, words.examined(self), where)
         more = (*words.facts(self), *words.earlier(self), *self.notes)
         return (*filter(None, lines), *more)
 

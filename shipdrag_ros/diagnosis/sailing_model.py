@@ -275,7 +275,8 @@ class SailingModel:
     @cached_property
     def _splines(self) -> Float64:
         """What neither a scale nor an offset is, (6, n) [m/s]."""
-        speed = self.legs.ground_m_s
+        # not by the way over ground: its noise is in what is left, and would bend with itself
+        speed = np.abs(self.legs.log_m_s)
         splines = bsplines(speed / speed.max(), SMOOTH).T
         line = np.array([np.ones(len(speed)), speed]).T
         bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]

@@ -13,6 +13,7 @@ from shipdrag_ros.diagnosis.result import (
     DiagnosisResult,
     EffectEstimate,
     Limit,
+    RunSize,
     WeighedEarlier,
 )
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
@@ -151,21 +152,20 @@ def _effort(least: float, limit: Limit) -> float:
     return 1.0 / needed if needed and limit.bound == 'lower_95' else needed
 
 
-def differing(found: DiagnosisResult) -> str:
+def differing(sizes: Sequence[RunSize]) -> str:
     """
     Say how the runs differ; '' where one state of the hull fits all.
     """
-    if not found.runs_differ:
+    if not sizes:
         return ''
-    effects = names_text(list(dict.fromkeys(each.effect for each in found.runs_differ)))
-    sizes = '; '.join(
-        f'{each.run}: {plus_minus(each.size.value, 2.0 * each.size.sd)}'
-        for each in found.runs_differ
+    effects = names_text(list(dict.fromkeys(each.effect for each in sizes)))
+    of_runs = '; '.join(
+        f'{each.run}: {plus_minus(each.size.value, 2.0 * each.size.sd)}' for each in sizes
     )
-    name = found.runs_differ[0].parameter.replace('_', ' ')
+    name = sizes[0].parameter.replace('_', ' ')
     return (
-        f'These runs differ: no one state of the hull fits all. {effects}, {name}: {sizes} (two '
-        'standard deviations). Sizes elsewhere are those of the last run.'
+        f'These runs differ: no one state of the hull fits all. {effects}, {name}: {of_runs} (two '
+        'standard deviations).'
     )
 
 

@@ -89,9 +89,17 @@ class Force:
         """
         Return the place nearest to a speed [m/s], if it can be where the clean hull is known.
         """
-        away = np.abs(self.speed_m_s - speed_m_s)
-        known = np.isfinite(self.over)
-        return int(np.argmin(np.where(known, away, np.inf) if known.any() else away))
+        known = np.flatnonzero(np.isfinite(self.over))
+        places = known if len(known) else np.arange(len(self.over))
+        return self.shown(int(places[np.argmin(np.abs(self.speed_m_s[places] - speed_m_s))]))
+
+    def shown(self, place: int) -> int:
+        """
+        Return the place whose figures are those of all speeds that are one in text.
+        """
+        texts = [ship_speed(speed, self.mass_kg) for speed in self.speed_m_s.tolist()]
+        alike = [i for i, text in enumerate(texts) if text == texts[place]]
+        return next(filter(self.has_clean, alike), alike[0])
 
     def cells(self, place: int) -> tuple[str, str, str, str]:
         """

@@ -42,7 +42,7 @@ def force_table(curve: ForceCurve, ship: Ship) -> Table:
     if clean:
         columns = (*columns, f'clean hull [{newtons}]', 'over the clean hull [%]', '±')
     rows = []
-    for i in _chosen(force.speed_m_s):
+    for i in dict.fromkeys(map(force.shown, _chosen(force.speed_m_s).tolist())):
         speed = float(force.speed_m_s[i])
         cells: tuple[str, ...] = (
             f'{speed / knot:.{1 if knot != 1.0 else 3}f}',

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.display import plus_minus, ship_speed, speed_text, utc
+from shipdrag_ros.display import dated, plus_minus, ship_speed, speed_text
 from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.force import Force, no_clean_text, usual_speed_m_s
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
@@ -81,12 +81,12 @@ def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
         return ()
     usual = usual_speed_m_s(usable, ship)
     lines, missing = [], ''
-    for each in usable:
+    for date, each in dated((each.start_ns, each) for each in usable):
         curve = each.valid_curve
         force = Force.of(curve, ship)
         low, high = (ship_speed(float(curve.speed_m_s[end]), ship.mass_kg) for end in (0, -1))
         low = low.partition(' ')[0]  # the unit stands behind the other end
-        date = f'{utc(each.start_ns)}: ' if len(usable) > 1 else ''
+        date = f'{date}: ' if len(usable) > 1 else ''
         lines.append(
             f'{date}{force.at(force.near(usual))} Known from {low} to {high}, '
             f'{conditions(each)}; ± is two standard deviations.'

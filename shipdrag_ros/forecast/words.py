@@ -17,15 +17,15 @@ _T = TypeVar('_T')
 
 def clock(seconds: float) -> str:
     """
-    Return a length of time as minutes and seconds; below a minute and a half in s.
+    Return a length of time as minutes and seconds; below ten seconds with a tenth.
 
     Examples
     --------
     >>> clock(460.0), clock(8.31), clock(4000.0)
-    ('7:40', '8.3 s', '66:40')
+    ('7:40', '0:08.3', '66:40')
     """
-    if seconds < 90.0:
-        return f'{seconds:.1f} s'
+    if seconds < 9.95:
+        return f'0:{seconds:04.1f}'
     minutes, rest = divmod(round(seconds), 60)
     return f'{minutes}:{rest:02d}'
 
@@ -53,7 +53,16 @@ def sentence(milestone: Milestone, mass_kg: float, was_s: float | None = None) -
         f'{ship_speed(milestone.speed_m_s, mass_kg)} in {clock(time.median)} '
         f'({clock(time.low)} to {clock(time.high)}), {way(milestone.distance_m.median, mass_kg)}'
     )
-    return text if was_s is None else f'{text}; was {clock(was_s)}'
+    if was_s is None:
+        return text
+    return f'{text}; was {clock(was_s)}' if was_s >= 0.0 else f'{text}; passed before'
+
+
+def _was(value: float | None, was_s: float | None, show: Callable[[float], str]) -> str:
+    """Return what was; a speed may have been passed before it was foretold."""
+    if value is None or was_s is None:
+        return _NOT_SHOWN
+    return show(value) if was_s >= 0.0 else 'before'
 
 
 def cells(band: Band, show: Callable[[float], str]) -> tuple[str, str]:
@@ -89,9 +98,9 @@ def table(compared: Sequence[Passed], mass_kg: float) -> Table:
         (
             ship_speed(each.foretold.speed_m_s, mass_kg),
             *cells(each.foretold.time_s, clock),
-            _NOT_SHOWN if each.was_s is None else clock(each.was_s),
+            _was(each.was_s, each.was_s, clock),
             *cells(each.foretold.distance_m, far),
-            _NOT_SHOWN if each.was_m is None else far(each.was_m),
+            _was(each.was_m, each.was_s, far),
         )
         for each in apart_passed(compared, mass_kg)
     )

@@ -28,7 +28,8 @@ from shipdrag_ros.diagnosis.diagnose import (
 )
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation, day_of, lowest_m_s, ship_runs
-from shipdrag_ros.diagnosis.result import Where
+from shipdrag_ros.diagnosis.result import RunSize, Where
+from shipdrag_ros.diagnosis.verdict import runs_differ
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.rows import LOG
@@ -36,6 +37,7 @@ from shipdrag_ros.learning.forms import LearnableForm, Span, forms
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.effects import EffectWay
+from shipdrag_ros.posterior.hypotheses import RunSight
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -82,6 +84,8 @@ class Learnt:
         its reading. NaN without one.
     runs
         Names of the runs that were used.
+    runs_differ
+        Sizes of an effect of the library, where it explains the runs and no one size fits all.
     notes
         On those that were not, and on the way.
     """
@@ -94,6 +98,7 @@ class Learnt:
     likeliest: tuple[str, str, str] | None
     largest_percent: float
     runs: tuple[str, ...]
+    runs_differ: tuple[RunSize, ...]
     notes: tuple[str, ...]
 
 
@@ -237,7 +242,7 @@ def _comparing(
     own = effects_about(seen) if library else []
     effects = [*own, *(each[0].effect for each in ways.values())]
     known = stated_in(runs, seen, ship).log_likelihood
-    comparing = Comparing(ship_runs(seen, ship), ship, effects, known)
+    comparing = Comparing(ship_runs(seen, ship), ship, effects, known, may_differ=own)
     comparing.ways.update(ways)
     return comparing
 
@@ -288,7 +293,17 @@ class _Judged:
             kinds[kind] = kinds.get(kind, 0.0) + p
         kinds = dict(sorted(kinds.items(), key=lambda each: -each[1]))
         best = next((n for n in case.found.probability if case.is_form(n)), None)
-        reason = self._reason(kinds, best)
+        by_library = {
+            names: p
+            for names, p in case.found.probability.items()
+            if names not in (NONE, UNKNOWN) and not set(names) & set(case.forms)
+        }
+        explained = math.fsum(by_library.values())
+        reason = self._reason(kinds, best, explained)
+        differ: tuple[RunSize, ...] = ()
+        if explained > 0.5:
+            likeliest = case.found.best[next(iter(by_library))]
+            differ = runs_differ(likeliest, [run.name for run in case.seen])
         term = None
         if not reason and best is not None:
             agree, why = self._halves(best)
@@ -303,27 +318,23 @@ class _Judged:
             reason,
             '' if term else self._next_run(kinds),
             kinds,
-            self._where(kinds),
+            self._where(kinds, of_force=bool(differ)),
             None if best is None else case.forms[best[0]].kind,
             math.nan if best is None else self._percent(best),
             tuple(run.name for run in case.seen),
+            differ,
             self.notes,
         )
 
-    def _reason(self, kinds: dict[str, float], best: Names | None) -> str:
+    def _reason(self, kinds: dict[str, float], best: Names | None, by_library: float) -> str:
         """Say why nothing may be written before the halves are looked at; '' where it may."""
         first, probability = next(iter(kinds.items()))
         count = len(self.case.seen)
         if first == self.case.of_kind(NONE):
             return f'nothing is missing in {count} run(s), probability {probability:.2f}'
-        by_name = math.fsum(
-            p
-            for names, p in self.case.found.probability.items()
-            if names not in (NONE, UNKNOWN) and not set(names) & set(self.case.forms)
-        )
-        if by_name > 0.5:
+        if by_library > 0.5:
             return (
-                f'effects of the library explain it, probability {by_name:.2f}, first {first}, '
+                f'effects of the library explain it, probability {by_library:.2f}, first {first}, '
                 f'{kinds[first]:.2f}; `shipdrag diagnose` says which, or what would decide'
             )
         if count < 2:
@@ -395,11 +406,11 @@ class _Judged:
         ]
         return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
 
-    def _where(self, kinds: dict[str, float]) -> Where | None:
+    def _where(self, kinds: dict[str, float], *, of_force: bool) -> Where | None:
         case, stated = self.case, self.case.comparing.as_stated
         if next(iter(kinds)) == case.of_kind(NONE):
             return None
-        return where(case.seen, case.comparing, case.found, stated, of_force=False)
+        return where(case.seen, case.comparing, case.found, stated, of_force=of_force)
 
     def _percent(self, best: Names) -> float:
         """Return how large a form is, of the resistance, where it is largest."""
@@ -407,19 +418,25 @@ class _Judged:
         way = fit.hypothesis.ways[-1]
         assert fit.z is not None
         values = [q.prior.at(z) for q, z in zip(way.unknowns, fit.z[-len(way.unknowns) :])]
-        run = case.comparing.runs.runs[0]
-        speed = np.linspace(lowest_m_s(case.seen[0]), case.seen[0].speed_m_s, 50)
+        runs = zip(case.comparing.runs.runs, case.seen, strict=True)
+        return max(self._percent_in(run, seen, way, values) for run, seen in runs)
+
+    def _percent_in(
+        self, run: RunSight, seen: Observation, way: EffectWay, values: Sequence[float]
+    ) -> float:
+        """Return the same in one run."""
+        speed = np.linspace(lowest_m_s(seen), seen.speed_m_s, 50)
         action = way.effect.action(run.frame, *values)
         if action.log_error:
-            after = np.linspace(0.0, case.seen[0].duration_s, 50)
+            after = np.linspace(0.0, seen.duration_s, 50)
             wrong = [error(speed[::-1], after) / speed[::-1] for error in action.log_error]
             return float(100.0 * np.max(np.abs(wrong)))
         force = action.resistance_n(speed)
         if action.turns:  # one after the other
             areas = np.cumsum([turn.drag_area_m2 for turn in action.turns])
-            density = case.ship.water.density_kg_m3
+            density = self.case.ship.water.density_kg_m3
             force = quadratic_n(density, float(np.abs(areas).max()), speed)
-        return float(100.0 * np.max(np.abs(force) / case.ship.resistance_n(speed)))
+        return float(100.0 * np.max(np.abs(force) / self.case.ship.resistance_n(speed)))
 
     def _next_run(self, kinds: dict[str, float]) -> str:
         """Say which run would decide."""

@@ -6,6 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from shipdrag_ros.diagnosis.document import sizes_of_runs
+from shipdrag_ros.diagnosis.words import differing
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.fields import plain
 from shipdrag_ros.learning.search import Learnt, kind_text
@@ -36,7 +38,8 @@ def lines(found: Learnt) -> list[str]:
     """
     Return what else is to be said.
     """
-    said = list(found.notes)
+    said = [differing(found.runs_differ)] if found.runs_differ else []
+    said += found.notes
     if found.where is not None:
         begin, end = found.where.time_s
         low, high = found.where.speed_m_s
@@ -110,6 +113,7 @@ def document(found: Learnt) -> dict[str, Any]:
         'where': plain(found.where),
         'likeliest': found.likeliest and kind_text(found.likeliest),
         'largest_percent': found.largest_percent,
+        'runs_differ': sizes_of_runs(found.runs_differ),
         'runs': list(found.runs),
         'notes': list(found.notes),
     }

@@ -23,6 +23,7 @@ from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
 from shipdrag_ros.progress import Progress, silent
+from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.term import check_name
 from shipdrag_ros.simulation.effects import find
@@ -233,6 +234,7 @@ def diagnose(
     facts: Sequence[str] = (),
     earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
     window: replaying.WindowSpan | None = None,
+    stop: StopTime | None = None,
 ) -> Diagnosis:
     """
     Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.
@@ -253,6 +255,8 @@ def diagnose(
     window
         Begin and end of the coastdown [s from the start of each run], instead of
         looking for one.
+    stop
+        When the engine was stopped, as of `estimate`.
 
     Returns
     -------
@@ -293,7 +297,9 @@ def diagnose(
     ]
     before = [earlier] if isinstance(earlier, str | PathLike | Diagnosis) else earlier
     known = [_earlier(each, place) for place, each in enumerate(before, start=1)]
-    found, used = diagnose_runs(listener, runs, ship or parts[0].given, given, earlier=known)
+    found, used = diagnose_runs(
+        listener, runs, ship or parts[0].given, given, earlier=known, stop=stop
+    )
     return Diagnosis(found, used, tuple(listener.lines))
 
 

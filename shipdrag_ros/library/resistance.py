@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.display import Table, utc
+from shipdrag_ros.display import Table, dated
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
@@ -20,6 +20,7 @@ from shipdrag_ros.library.shown import ShownResistance, says_it_in_python, writi
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
+from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.ship import Ship
@@ -167,8 +168,8 @@ class Resistance(ShownResistance):
             raise EstimationError(' '.join(self.summary().splitlines()))
         if len(usable) == 1:
             return usable[0]._drawing()
-        dated = [(utc(each.start_ns), each.curve) for each in usable]
-        return lambda axis: draw_curves(axis, dated, self.ship, combined=self.combined)
+        shown = dated((each.start_ns, each.curve) for each in usable)
+        return lambda axis: draw_curves(axis, shown, self.ship, combined=self.combined)
 
     def report(self, path: str | PathLike[str]) -> None:
         """
@@ -205,7 +206,9 @@ class Resistance(ShownResistance):
 def estimate(
     records: Record | Sequence[Record],
     *,
+    ship: Ship | None = None,
     window: WindowSpan | None = None,
+    stop: StopTime | None = None,
     parameters: Parameters | None = None,
 ) -> Resistance:
     """
@@ -215,9 +218,14 @@ def estimate(
     ----------
     records
         Of one ship, from `read` or `simulate`.
+    ship
+        To estimate with; None: that of the records.
     window
         Begin and end of the coastdown [s from the start of each run], instead of
         looking for one; what in it is no coastdown is cut.
+    stop
+        When the engine was stopped [s from the start of each run], or a date with its zone:
+        evidence that is weighed with the rest.
     parameters
         Of the monitor and the estimator; None: those attached to each run.
 
@@ -229,7 +237,7 @@ def estimate(
     Raises
     ------
     BagError
-        Without a ship, or without a usable input.
+        Without a ship or a usable input, or if a stop is outside of a run.
     EstimationError
         If a window was given and nothing can be estimated from it.
 
@@ -250,7 +258,14 @@ def estimate(
     listener = Notes()
     return Resistance(
         tuple(
-            replay_run(run, listener, ship=record.given, parameters=parameters, window=window)
+            replay_run(
+                run,
+                listener,
+                ship=ship or record.given,
+                parameters=parameters,
+                window=window,
+                stop=stop,
+            )
             for record in records_of(records)
             for run in record.runs
         )

@@ -58,7 +58,7 @@ from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import carrying
+from shipdrag_ros.simulation.effects import carrying, checked
 
 NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
@@ -191,7 +191,7 @@ class CoastdownNode(LifecycleNode):
         if not settings.ship_file:
             raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
         _, directory = settings.paths()
-        self._ship = carrying(Ship.load(settings.ship_file))
+        self._ship = carrying(checked(Ship.load(settings.ship_file)))
         self._settings = settings
         self.get_logger().info(f'recordings are written to {directory}')
         self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)

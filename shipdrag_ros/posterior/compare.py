@@ -51,6 +51,7 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Scope
+from shipdrag_ros.simulation.effects import checked
 
 _ITERATIONS = 8  # of Gauss and Newton
 _CLOSE = 0.1  # of -2 ln posterior
@@ -63,7 +64,6 @@ _PAIRED, _PAIRS = 4, 10
 _PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
 LIKELY = 0.03  # probability of names that may leave something smooth
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
-_DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
 class WeighedFit:
@@ -225,8 +225,8 @@ class Comparing:
         Logarithm of how probable facts and earlier diagnoses are, under a hypothesis.
     kept
         Further ways, of effects that are as an earlier diagnosis found them.
-    log_differs
-        Prior log odds that an effect of the hull differs between the runs.
+    may_differ
+        Effects that, where they are of the hull, may have another size in each run.
     """
 
     def __init__(
@@ -236,11 +236,11 @@ class Comparing:
         effects: Sequence[Effect],
         log_known: Callable[[Explanation], float] = lambda hypothesis: 0.0,
         kept: Sequence[EffectWay] = (),
-        log_differs: float = -math.inf,
+        may_differ: Sequence[Effect] = (),
     ) -> None:
         self.runs, self.effects, self.log_known = runs, tuple(effects), log_known
-        self.log_differs = log_differs
-        self.stated = tuple(stated_way(each, ship) for each in ship.effects)
+        self.may_differ = tuple(each for each in may_differ if each.scope is Scope.HULL)
+        self.stated = tuple(stated_way(each, ship) for each in checked(ship).effects)
         self.base = Explanation(self.stated)
         self.noise: list[_RunNoise] = []
         kinds = {int(k) for run in runs.runs for k in np.unique(run.model.rows.kind)}
@@ -723,19 +723,17 @@ class Comparing:
         return list(kept.values())[:_PAIRS]
 
     def _differing(self, fits: Sequence[Fitted]) -> list[Fitted]:
-        """Return the likeliest effects of the hull, with a size for each run."""
+        """Return effects of the hull with a size for each run: how one fits all tells nothing."""
         count = len(self.runs.runs)
-        if count < 2 or not math.isfinite(self.log_differs):
+        if count < 2:
             return []
         best = ComparedHypotheses(self.effects, tuple(fits)).best
-        of_hull = [
-            best[e.name,] for e in self.effects if e.scope is Scope.HULL and (e.name,) in best
-        ]
+        odds = (priors.DIFFERS_LATER if self.runs.apart else priors.DIFFERS).mean
         found = []
-        for alike in sorted(of_hull, key=lambda fit: -fit.log_weight)[:_DIFFERING]:
+        for alike in (best[e.name,] for e in self.may_differ if (e.name,) in best):
             *stated, way = alike.hypothesis.ways
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
-            own[0] = replace(own[0], log_odds=way.log_odds + self.log_differs)
+            own[0] = replace(own[0], log_odds=way.log_odds + math.log(odds))
             hypothesis = Explanation((*stated, *own))
             at = self.widened(self.nothing, hypothesis)
             first = self.runs.size + len(self.base.unknowns)

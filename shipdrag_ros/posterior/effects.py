@@ -17,14 +17,13 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
-from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Scope
-from shipdrag_ros.simulation.effects import effects_of, not_known
+from shipdrag_ros.simulation.effects import effects_of
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
@@ -132,14 +131,7 @@ class EffectWay:
 def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     """
     Return an effect of the ship file, as well known as the file says.
-
-    Raises
-    ------
-    SimulationError
-        Naming an effect or a parameter that is not known.
     """
-    if wrong := [*not_known(stated, ship)]:
-        raise SimulationError(f'effects: {"; ".join(wrong)}')
     effect = effects_of(ship)[stated.name]
     unknowns = []
     for q in effect.parameters_of(ship):

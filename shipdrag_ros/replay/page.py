@@ -364,13 +364,13 @@ def _all(runs: Sequence[RunResult]) -> Section:
         ]
     elif found.why_not:
         lead.append(f'Not combined: {found.why_not}.')
-    dated = [
-        (f'{display.utc(part.start_ns)}', part.estimate.valid_curve)
+    dated = display.dated(
+        (part.start_ns, part.estimate.valid_curve)
         for part in sorted(
             (part for run in runs for part in run.coastdowns), key=lambda part: part.start_ns
         )
         if part.estimate is not None and len(part.estimate.valid_curve)
-    ]
+    )
     many = '; the darker the line, the earlier' if estimate_pictures.is_shaded(len(dated)) else ''
     whole = ', all together with their band' if found.combined is not None else ''
     drawn: list[Picture] = []

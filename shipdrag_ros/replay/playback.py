@@ -36,6 +36,7 @@ from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Reason
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import checked
 
 SHIP_FILE = 'ship.yaml'
 PARAMETERS_FILE = 'parameters.yaml'
@@ -196,6 +197,8 @@ def settings_of(
         If the run has no input, or no ship file where none is given.
     ShipFileError, ParameterError
         If those attached cannot be used.
+    SimulationError
+        Naming an effect of the ship file that is not known.
     """
     if not any(topic.input for topic in run.topics):
         raise BagError(_no_input(run))
@@ -336,10 +339,10 @@ def _counts(
 
 def _ship(run: Run, given: Ship | None) -> Ship:
     if given is not None:
-        return given
+        return checked(given)
     if SHIP_FILE not in run.attachments:
         raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
-    return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
+    return checked(Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}'))
 
 
 def _parameters(run: Run, given: Parameters | None) -> Parameters:
@@ -413,7 +416,8 @@ def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
     begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
     return (
         f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
-        f'at: {begins or "there is none"}'
+        f'at: {begins or "there is none"}; where none is the stop that is meant, check its '
+        'time and zone, or give the window in which she glided'
     )
 
 

@@ -37,6 +37,11 @@ def test_without_ros_it_says_how_to_get_it(verb, ship_file, tmp_path, monkeypatc
 def test_a_bad_ship_file_is_told_before_ros_starts(tmp_path, capsys) -> None:
     assert main(['node', '--ship', 'no such.yaml', '--out', str(tmp_path)]) == 1
     assert 'no such.yaml: 1 problem' in capsys.readouterr().err
+    ship = tmp_path / 'ship.yaml'
+    effect = 'effects: [{name: foulng, parameters: {friction_factor: {value: 0.3, sd: 0.1}}}]\n'
+    ship.write_text(f'length_m: 150.0\ndisplaced_volume_m3: 20200.0\n{effect}')
+    assert main(['node', '--ship', str(ship), '--out', str(tmp_path)]) == 1
+    assert "effects: 'foulng' is not known" in capsys.readouterr().err
 
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -20,9 +20,10 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import NONE, Verdict
 from shipdrag_ros.inference.rows import LOG, POSITION
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Fact, Ship
+from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import LIBRARY
 from tests.runs import CARGO as SHIP
@@ -126,7 +127,7 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
     assert abs(last.value - sizes[1]) < 3.0 * last.sd
     if sizes[0] == sizes[1]:
         assert found.runs_differ == ()
-        assert words.differing(found) == ''
+        assert words.differing(found.runs_differ) == ''
         return
     assert [each.run for each in found.runs_differ] == ['0', '1']
     for each, size in zip(found.runs_differ, sizes, strict=True):
@@ -282,3 +283,16 @@ def test_probabilities_are_those_of_evidence_and_odds() -> None:
     assert sum(found.probability.values()) == pytest.approx(1.0)
     names = {each.names for each in found.fitted}
     assert {(name,) for name, effect in LIBRARY.items() if not effect.missing(SHIP)} <= names
+
+
+def test_water_and_air_of_one_day_in_a_ship_file_are_said_to_be_that() -> None:
+    run = coasted(name='today', coast_s=600.0, rate_hz=0.5)
+    stated = (
+        StatedEffect('current', {'along_track_m_s': Parameter(0.0, 0.1)}),
+        StatedEffect('fouling', {'friction_factor': Parameter(0.0, 0.1)}),
+    )
+    found = diagnose([run], replace(SHIP, effects=stated), Parameters(), advise=False)
+    (said,) = [note for note in found.notes if 'one day' in note]
+    assert said.startswith('the ship file states current, which')
+    assert 'along the heading of today' in said
+    assert said in found.summary()

@@ -82,3 +82,19 @@ def test_the_diagnosis_names_it_and_says_why() -> None:
     assert found.where is not None
     assert found.where.channel == 'log'
     assert math.isfinite(found.before.chi2_per_sample)
+
+
+def test_noise_of_the_way_over_ground_is_no_error_that_bends_with_the_speed() -> None:
+    rng, records = np.random.default_rng(1), []
+    time = np.arange(0.0, 3300.0)
+    speed = 8.0 / (1.0 + np.maximum(time - 1800.0, 0.0) / 500.0)
+    stamps = np.round(time * 1e9).astype(np.int64) + 10**18
+    for name in 'abcd':  # steady for the most part: many legs of one speed, apart by noise alone
+        place = np.zeros((len(time), 2))
+        place[:, 0] = np.cumsum(speed)
+        place += rng.normal(0.0, 10.0, place.shape)
+        log = speed + rng.normal(0.0, 0.05, len(time))
+        parts = [(Channel.SPEED_THROUGH_WATER, log), (Channel.POSITION, place)]
+        block = in_arrival_order([Block.of(channel, stamps, value) for channel, value in parts])
+        records.append(SailingRecord(name, block))
+    assert diagnose_sailing(records, Parameters()).verdict is Verdict.NONE

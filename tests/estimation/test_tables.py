@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from shipdrag_ros.estimation import tables
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.force import Force
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.ship import Ship, TableBaseline
 
@@ -71,6 +72,22 @@ def test_the_clean_hull_is_beside_it_where_it_is_stated(estimate: Estimate, ship
     first = float(known[0][1]) / float(known[0][-3]) - 1.0
     assert abs(100.0 * first - float(known[0][-2])) < 1.0
     assert {row[-2][0] for row in known} <= {'+', '-'}
+
+
+def test_one_speed_in_text_has_one_figure(estimate: Estimate, ship: Ship) -> None:
+    one = estimate.valid_curve
+    at = np.linspace(0.0, len(one) - 1.0, 5 * len(one))  # nearer to each other than the text tells
+    curve = ResistanceCurve(
+        *(np.interp(at, np.arange(len(one)), getattr(one, each.name)) for each in fields(one))
+    )
+    force = Force.of(curve, ship)
+    rows = {row[0]: row[1:] for row in tables.force_table(curve, ship).rows}
+    headlines = [force.cells(force.near(speed)) for speed in curve.speed_m_s.tolist()]
+    assert len(rows) == 10
+    beside = [each for each in headlines if each[0].removesuffix(' knots') in rows]
+    assert len(beside) > 20
+    for speed, resistance, *_ in beside:
+        assert resistance == '{} ± {} kN'.format(*rows[speed.removesuffix(' knots')][:2])
 
 
 def test_without_a_ship_a_curve_is_in_si(estimate: Estimate) -> None:

@@ -13,7 +13,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import words
-from shipdrag_ros.forecast.followed import Followed, interval_score
+from shipdrag_ros.forecast.followed import Followed, Passed, interval_score
 from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
 from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Band, PathAhead
@@ -255,6 +255,9 @@ def test_words(early: Estimate, ship: Ship) -> None:
     first = foretell(early, ship).milestones[0]
     text = words.sentence(first, ship.mass_kg, 451.0)
     assert text.endswith(' nm; was 7:31')
+    early_m = words.table([Passed(first, -2.5, -9.0)], ship.mass_kg).rows[0]
+    assert (early_m[3], early_m[6]) == ('before', 'before')
+    assert words.sentence(first, ship.mass_kg, -2.5).endswith('; passed before')
     assert words.clock(first.time_s.median) in text
     assert words.way(100.0, ship.mass_kg) == '100 m'
 

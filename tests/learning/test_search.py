@@ -114,6 +114,30 @@ def test_what_the_library_names_is_not_learnt() -> None:
     assert 'says which, or what would decide' in found.reason
 
 
+def test_a_hull_that_changed_between_runs_is_said_and_not_learnt() -> None:
+    runs = [
+        sd.simulate(
+            SHIP,
+            {'fouling': size} if size else {},
+            lead_in_s=1800.0,
+            seed=number,
+            start=f'2026-06-01T0{number}:00',
+        )
+        for number, size in enumerate((0.0, 0.3, 0.3))
+    ]
+    found = sd.learn(runs, ship=SHIP)
+    assert found.term is None
+    clean, *fouled = (each.size for each in found.runs_differ)
+    assert abs(clean.value) < 3.0 * clean.sd
+    assert all(abs(each.value - clean.value) > 3.0 * each.sd for each in fouled)
+    assert any(
+        'These runs differ: no one state of the hull' in line for line in words.lines(found)
+    )
+    assert len(words.document(found)['runs_differ']) == 3
+    # fouling is held though one size of it fits the runs less well than one of others does
+    assert found.probability['fouling'] > 0.05
+
+
 def test_a_ship_without_a_baseline_is_an_error() -> None:
     with pytest.raises(sd.ShipdragError, match='no baseline'):
         sd.learn(sailed(0), ship=replace(SHIP, baseline=None))

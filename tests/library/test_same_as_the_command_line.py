@@ -52,6 +52,17 @@ def test_estimates_of_a_window(bag: Path, tmp_path: Path) -> None:
     assert coastdown.ended_by == 'given'
 
 
+def test_estimates_of_another_ship_and_a_stop(bag: Path, tmp_path: Path) -> None:
+    out, file = tmp_path / 'replay.json', tmp_path / 'ship.yaml'
+    file.write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    line = ['replay', str(bag), '--ship', str(file), '--stop', '402']
+    assert main([*line, f'--json={out}']) == 0
+    found = sd.estimate(sd.read(bag), ship=sd.Ship.load(file), stop=402.0)
+    assert json_text(found.to_dict()) == out.read_text()
+    assert 'the stop that is given' in found.summary()
+    assert 'check its time and zone' in found.summary()
+
+
 def test_a_diagnosis(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / 'diagnose.json'
     then = tmp_path / 'then.json'

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.parameter import Parameter, Shape, log_normal
+from shipdrag_ros.parameter import Shape, log_normal
 from shipdrag_ros.posterior.effects import retardation_of as found_retardation
-from shipdrag_ros.posterior.effects import stated_way, ways_of
+from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.priors import UNNAMED_ODDS
-from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, action_of, parse
@@ -37,19 +36,6 @@ def test_the_force_of_an_effect_is_that_of_its_simulation(text: str) -> None:
     late[-2:] = False  # one-sided differences
     shown = (ship.resistance_n(u) / ship.mass_kg + r) / (1.0 + n_r + inertia)
     np.testing.assert_allclose(slower[late], shown[late], rtol=2e-3)
-
-
-@pytest.mark.parametrize(
-    ('name', 'key', 'says'),
-    [
-        ('foulng', 'friction_factor', "effects: 'foulng' is not known; known are added_mass"),
-        ('fouling', 'friction', "effects: fouling: parameter 'friction' is not known"),
-    ],
-)
-def test_a_misspelt_effect_of_a_ship_file_is_named(name: str, key: str, says: str) -> None:
-    stated = StatedEffect(name, {key: Parameter(0.3, 0.1)})
-    with pytest.raises(SimulationError, match=says):
-        stated_way(stated, Ship.example())
 
 
 def test_every_effect_of_the_library_has_ways_that_act() -> None:

@@ -17,14 +17,15 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, StopMark, open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Onset, Update
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.errors import BagError, SimulationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, coast_windows, replay
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, StatedEffect
 from tests.runs import write_run
 
 START_NS = 1_700_000_000_000_000_000
@@ -94,6 +95,20 @@ def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(recor
     assert found.estimate.curve.resistance_m_s2.tobytes() == (
         live.estimate.curve.resistance_m_s2.tobytes()
     )
+
+
+@pytest.mark.parametrize(
+    ('name', 'key', 'says'),
+    [
+        ('foulng', 'friction_factor', "effects: 'foulng' is not known; known are added_mass"),
+        ('fouling', 'friction', "effects: fouling: parameter 'friction' is not known"),
+    ],
+)
+def test_a_misspelt_effect_of_a_ship_file_is_named(recording, ship, name, key, says) -> None:
+    (run,) = open_runs([recording[0]])
+    stated = StatedEffect(name, {key: Parameter(0.3, 0.1)})
+    with pytest.raises(SimulationError, match=says):
+        replay(run, ship=replace(ship, effects=(stated,)))
 
 
 def test_another_ship_or_parameters_are_used_and_not_compared(recording, ship, parameters):

@@ -266,6 +266,20 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
     return total
 
 
+def checked(ship: Ship) -> Ship:
+    """
+    Return a ship of whose effects all are known.
+
+    Raises
+    ------
+    SimulationError
+        Naming an effect or a parameter that is not.
+    """
+    if wrong := [text for stated in ship.effects for text in not_known(stated, ship)]:
+        raise SimulationError(f'effects: {"; ".join(wrong)}')
+    return ship
+
+
 def not_known(stated: StatedEffect, ship: Ship) -> Iterator[str]:
     """
     Say which effect, or which of its parameters, no effect of a ship has.
