@@ -455,7 +455,6 @@ def _children(
     if regime == LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
         w[REGIME] = regime = DRIVEN
         w[KIND] = GOVERNED
-        f[GUST_A] = math.exp(hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A])
         f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to

@@ -246,6 +246,9 @@ def predict(
     keep_g, keep_b, keep_e, keep_f = decay
     slowing = mean_u = mean_lag = 0.0
     u = math.exp(x[LN_U])
+    if regime == DRIVEN:  # waves stay as they were learnt until that is forgotten
+        law = hull_law(setting.hull, x[LN_U])[0]
+        f[GUST_A] += (math.exp(law + x[LN_A]) - f[GUST_A]) * n.BIN_S / n.MEMORY_S
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])

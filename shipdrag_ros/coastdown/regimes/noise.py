@@ -31,10 +31,11 @@ from shipdrag_ros.coastdown.regimes.state import (
     NOISES,
     RANGES,
     RATE,
+    SAID,
     BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
@@ -64,12 +65,16 @@ class NoiseFilters(NamedTuple):
         range of the seconds of a bin.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
-    queue : (delay, NOISES)
-        What will be used.
+    queue : (delay, SAID + 1)
+        Bins that are not learnt from yet, with the probability that she was driven evenly.
+    heard : (2,)
+        Bins so far, and those of the queue.
     used : (NOISES,)
     work : (2 states, states)
     beside : (3, FILTERS / whites)
         Log evidence in the other instrument, in what both differ by, and in both.
+    gained : (FILTERS,)
+        Log density of the last reading by each.
     """
 
     mean: Float64
@@ -81,9 +86,11 @@ class NoiseFilters(NamedTuple):
     coarse: Float64
     rate: Float64
     queue: Float64
+    heard: Int64
     used: Float64
     work: Float64
     beside: Float64
+    gained: Float64
 
     @classmethod
     def fresh(cls) -> NoiseFilters:
@@ -100,10 +107,12 @@ class NoiseFilters(NamedTuple):
             np.zeros(4),
             np.zeros((2, 2)),
             np.zeros(2),
-            np.tile(first, (_DELAY, 1)),
+            np.zeros((_DELAY + 1, SAID + 1)),
+            np.zeros(2, np.int64),
             first,
             np.zeros((2 * _STATES, _STATES)),
             np.zeros((3, _GUSTS * _WANDERS * _TIMES)),
+            np.zeros(FILTERS),
         )
 
 
@@ -120,8 +129,30 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float]:
 @compiled(uncounted=True)
 def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
     """
-    Learn from a bin, by the probability that she was driven evenly, and age what is used.
+    Keep a bin, and learn from one of before: by then it is known whether she still drives evenly.
+
+    A bin in which she slows already looks like even power at first, with gusts. In a short record
+    the wait is half of it.
     """
+    heard, queue = noise.heard, noise.queue
+    last = heard[1]
+    for k in range(SAID):
+        queue[last, k] = said[k]
+    queue[last, SAID] = driven
+    heard[0] += 1
+    heard[1] += 1
+    if heard[1] > min(heard[0] // 2, _DELAY):
+        _learn(noise, setting, queue[0], min(queue[0, SAID], driven))
+        heard[1] -= 1
+        for row in range(heard[1]):
+            for k in range(SAID + 1):
+                queue[row, k] = queue[row + 1, k]
+        _average(noise, setting, noise.used)
+
+
+@compiled(uncounted=True)
+def _learn(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
+    """Learn from a bin, by the probability that she was driven evenly."""
     for which in range(4):
         value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
         if which == _APART:
@@ -139,15 +170,6 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
-    slot = noise.queue[0]
-    for row in range(_DELAY - 1):
-        for k in range(NOISES):
-            noise.queue[row, k] = noise.queue[row + 1, k]
-    newest = noise.queue[_DELAY - 1]
-    _average(noise, setting, newest)
-    young = max(noise.seen[0], noise.seen[1], noise.seen[2]) < _DELAY
-    for k in range(NOISES):
-        noise.used[k] = newest[k] if young else slot[k]
 
 
 @compiled(inline=True, uncounted=True)
@@ -201,9 +223,13 @@ def _one(
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
+    gained, best = noise.gained, -np.inf
     for k in range(0, FILTERS, stride):
-        gained = _filter(noise, setting, which, k, value, spread, a)
-        noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
+        gained[k] = _filter(noise, setting, which, k, value, spread, a)
+        best = max(best, gained[k])
+    for k in range(0, FILTERS, stride):  # what she does else explains the reading as the best does
+        evidence = math.log(driven * math.exp(gained[k] - best) + 1.0 - driven)
+        noise.evidence[which, k] = fade * noise.evidence[which, k] + evidence
 
 
 @compiled(uncounted=True)
@@ -332,11 +358,11 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
             g += share * math.log(gust)
             b += share * math.log(wander)
             t += share * math.log(wander_s)
-            w += share * math.log(white)
+            w += share * white * white
         spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
         step = setting.step_s if which == 2 else 1.0
         spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
-        white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
+        white = math.hypot(math.sqrt(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
         wander, wander_s = math.exp(b / total), math.exp(t / total)
