@@ -56,8 +56,8 @@ class NoiseFilters(NamedTuple):
         For log, speed over ground, fixes, and the first less the second.
     evidence : (4, FILTERS)
         Faded log likelihood.
-    last, jump : (4, 2), (4,)
-        Last readings; mean size of their differences.
+    last, bend : (4, 2), (4, 2)
+        Last two readings; mean size of second differences, and how many it is of.
     seen : (4,)
         Readings of a driven ship.
     coarse : (2, 2)
@@ -81,7 +81,7 @@ class NoiseFilters(NamedTuple):
     spread: Float64
     evidence: Float64
     last: Float64
-    jump: Float64
+    bend: Float64
     seen: Float64
     coarse: Float64
     rate: Float64
@@ -103,7 +103,7 @@ class NoiseFilters(NamedTuple):
             np.zeros((4, FILTERS, _STATES, _STATES)),
             np.zeros((4, FILTERS)),
             np.full((4, 2), np.nan),
-            np.zeros(4),
+            np.zeros((4, 2)),
             np.zeros(4),
             np.zeros((2, 2)),
             np.zeros(2),
@@ -136,6 +136,8 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
     """
     heard, queue = noise.heard, noise.queue
     last = heard[1]
+    for which in range(4):
+        _bends(noise, which, _value(setting, said, which))
     for k in range(SAID):
         queue[last, k] = said[k]
     queue[last, SAID] = driven
@@ -154,12 +156,7 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
 def _learn(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
     """Learn from a bin, by the probability that she was driven evenly."""
     for which in range(4):
-        value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
-        if which == _APART:
-            ground = said[GROUND]
-            if np.isnan(ground):
-                ground = said[ADVANCE] / setting.step_s
-            value = said[LOG] - ground
+        value = _value(setting, said, which)
         if not np.isnan(value):
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
@@ -170,6 +167,43 @@ def _learn(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
+
+
+@compiled(inline=True, uncounted=True)
+def _value(setting: BankSetting, said: Float64, which: int) -> float:
+    """Return what an instrument says, or what the log says more than the speed over ground."""
+    if which == LOG:
+        return float(said[LOG])
+    if which == GROUND:
+        return float(said[GROUND])
+    if which != _APART:
+        return float(said[ADVANCE])
+    ground = said[ADVANCE] / setting.step_s if np.isnan(said[GROUND]) else said[GROUND]
+    return float(said[LOG] - ground)
+
+
+@compiled(uncounted=True)
+def _bends(noise: NoiseFilters, which: int, value: float) -> None:
+    """Learn the size of second differences, in which no regime is seen."""
+    if np.isnan(value):
+        return
+    last, bend = noise.last[which], noise.bend[which]
+    size = abs(value - 2.0 * last[0] + last[1])
+    last[0], last[1] = value, last[0]
+    if np.isnan(size):
+        return
+    if bend[1] > 8.0:
+        size = min(size, max(4.0 * bend[0], n.WHITE_FLOOR * abs(value)))
+    bend[1] += 1.0
+    bend[0] += (size - bend[0]) / min(bend[1], n.MEMORY_S / n.BIN_S)
+
+
+@compiled(inline=True, uncounted=True)
+def _spread(noise: NoiseFilters, which: int, step_s: float) -> float:
+    """Return the sd that white noise has, were those its; of fixes from differences of theirs."""
+    variance, least = (20.0, step_s) if which == ADVANCE else (6.0, 1.0)
+    size = noise.mean[LOG if which == _APART else which, 0, 1]
+    return max(noise.bend[which, 0] * 1.2533 / math.sqrt(variance), n.WHITE_FLOOR * size * least)
 
 
 @compiled(inline=True, uncounted=True)
@@ -203,23 +237,14 @@ def _one(
     step = setting.step_s
     speed = value / step if which == 2 else value
     count = noise.seen[which]
-    last = noise.last[which]
-    if not np.isnan(last[0]):
-        size = abs(value - last[0])
-        if count > 8:
-            size = min(size, max(4.0 * noise.jump[which], n.WHITE_FLOOR * abs(value)))
-        gain = driven / min(max(count, 1.0), n.MEMORY_S / n.BIN_S)
-        noise.jump[which] += gain * (size - noise.jump[which])
-    last[0] = value
     noise.seen[which] = count + driven
-    spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
+    spread = _spread(noise, which, step)
     if count < 4 or not (speed > 0.0 or which == _APART):
         fix = spread if which == 2 else 0.0
         for k in range(FILTERS):
             _start(noise.mean[which, k], noise.spread[which, k], speed, fix, step)
         return
     size = noise.mean[0 if which == _APART else which, 0, 1]
-    spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
@@ -359,9 +384,7 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
             b += share * math.log(wander)
             t += share * math.log(wander_s)
             w += share * white * white
-        spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
-        step = setting.step_s if which == 2 else 1.0
-        spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
+        spread = _spread(noise, which, setting.step_s)
         white = math.hypot(math.sqrt(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
