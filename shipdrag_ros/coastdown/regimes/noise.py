@@ -28,21 +28,18 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_WALK,
     N_WANDER,
     N_WANDER_S,
-    NOISES,
     RANGES,
     RATE,
-    SAID,
     BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import Float64
 
 _GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
 FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
 _STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
 _APART = 3  # log less speed over ground, or that of the fixes
-_DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
 
 
@@ -65,10 +62,6 @@ class NoiseFilters(NamedTuple):
         range of the seconds of a bin.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
-    queue : (delay, SAID + 1)
-        Bins that are not learnt from yet, with the probability that she was driven evenly.
-    heard : (2,)
-        Bins so far, and those of the queue.
     used : (NOISES,)
     work : (2 states, states)
     beside : (3, FILTERS / whites)
@@ -85,8 +78,6 @@ class NoiseFilters(NamedTuple):
     seen: Float64
     coarse: Float64
     rate: Float64
-    queue: Float64
-    heard: Int64
     used: Float64
     work: Float64
     beside: Float64
@@ -107,8 +98,6 @@ class NoiseFilters(NamedTuple):
             np.zeros(4),
             np.zeros((2, 2)),
             np.zeros(2),
-            np.zeros((_DELAY + 1, SAID + 1)),
-            np.zeros(2, np.int64),
             first,
             np.zeros((2 * _STATES, _STATES)),
             np.zeros((3, _GUSTS * _WANDERS * _TIMES)),
@@ -129,35 +118,12 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float]:
 @compiled(uncounted=True)
 def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
     """
-    Keep a bin, and learn from one of before: by then it is known whether she still drives evenly.
-
-    A bin in which she slows already looks like even power at first, with gusts. In a short record
-    the wait is half of it.
+    Learn from a bin, by the probability that she was driven evenly.
     """
-    heard, queue = noise.heard, noise.queue
-    last = heard[1]
-    for which in range(4):
-        _bends(noise, which, _value(setting, said, which))
-    for k in range(SAID):
-        queue[last, k] = said[k]
-    queue[last, SAID] = driven
-    heard[0] += 1
-    heard[1] += 1
-    if heard[1] > min(heard[0] // 2, _DELAY):
-        _learn(noise, setting, queue[0], min(queue[0, SAID], driven))
-        heard[1] -= 1
-        for row in range(heard[1]):
-            for k in range(SAID + 1):
-                queue[row, k] = queue[row + 1, k]
-        _average(noise, setting, noise.used)
-
-
-@compiled(uncounted=True)
-def _learn(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
-    """Learn from a bin, by the probability that she was driven evenly."""
     for which in range(4):
         value = _value(setting, said, which)
         if not np.isnan(value):
+            _bends(noise, which, value)
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
             _one(noise, setting, which, value, driven)
@@ -167,6 +133,7 @@ def _learn(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
+    _average(noise, setting, noise.used)
 
 
 @compiled(inline=True, uncounted=True)
@@ -185,8 +152,6 @@ def _value(setting: BankSetting, said: Float64, which: int) -> float:
 @compiled(uncounted=True)
 def _bends(noise: NoiseFilters, which: int, value: float) -> None:
     """Learn the size of second differences, in which no regime is seen."""
-    if np.isnan(value):
-        return
     last, bend = noise.last[which], noise.bend[which]
     size = abs(value - 2.0 * last[0] + last[1])
     last[0], last[1] = value, last[0]
