@@ -19,6 +19,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     BRAKE,
     N_EDDY,
     N_FIX,
+    N_GUST,
+    N_LOG,
     N_WANDER,
     SAID,
     BankSetting,
@@ -176,6 +178,30 @@ def test_a_record_of_what_no_ship_does_is_explained_less_well(ship, record) -> N
         (*_, ended) = of(EndedCoastdown, events_of(ship, replace(block, value=value)))
         explained.append(ended.regimes.explained)
     assert explained[0] > 0.05 > explained[1]
+
+
+@pytest.mark.parametrize(('lead_s', 'seed'), [(60.0, 7), (120.0, 2), (120.0, 5), (120.0, 9)])
+def test_a_long_glide_soon_after_the_start_is_told_in_one_piece(
+    ship, record, lead_s, seed
+) -> None:
+    log = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03)
+    block = record(sensors=(log,), seed=seed, speed_m_s=6.5, lead_in_s=lead_s, duration_s=1500.0)
+    (ended,) = of(EndedCoastdown, events_of(ship, block))
+    assert ended.end_ns - ended.start_ns > 1100 * S
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_bin_in_which_she_is_hardly_driven_teaches_hardly_any_noise(ship, seed) -> None:
+    learnt = []
+    for likely in (0.0, 0.01):
+        filters, said = NoiseFilters.fresh(), np.full(SAID, np.nan)
+        setting, draw = BankSetting.of(HullPrior.of(ship), BIN_S), np.random.default_rng(seed)
+        for k in range(140):
+            slows = 0.05 * max(k - 40, 0)  # as no ship does that is driven
+            said[LOG_SAYS] = 6.0 - slows + 0.01 * draw.standard_normal()
+            listen(filters, setting, said, likely if slows else 1.0)
+        learnt.append(filters.used[[N_GUST, N_WANDER, N_LOG]])
+    assert np.all(np.abs(np.log(learnt[1] / learnt[0])) < 0.5)
 
 
 @pytest.mark.parametrize('seed', [1, 2, 4])
