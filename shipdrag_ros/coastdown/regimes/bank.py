@@ -178,7 +178,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             w[REGIME], w[LIAR] = regime, liar
             driven(all_, j, hull)
             if regime == AMID:
-                amid(all_, j, setting, 0)
+                amid(all_, j, setting, 0 if claimed else 1)
             if claimed:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:

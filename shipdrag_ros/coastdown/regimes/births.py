@@ -136,6 +136,8 @@ def _born(
     _copy(bank, i, j)
     bank.used[0] = j + 1
     f, w = bank.number[j], bank.whole[j]
+    if w[REGIME] == AMID:  # what an engine gave is over
+        free(bank, j, GUST, 0.0, 0.0)
     f[WEIGHT] += math.log(share)
     f[SINCE], f[RAMP_S] = now_s, ramp_s
     w[REGIME] = regime
@@ -175,7 +177,8 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
     before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
-    odds = len(n.ODD) if any_ and bank.whole[i, GLIDED] == 0 else 1  # later she is known
+    # later she is known
+    odds = len(n.ODD) if claimed and any_ and bank.whole[i, GLIDED] == 0 else 1
     for each in range(downs * odds):
         k, odd = each % downs, each // downs
         ramp_s = _NO_RAMP_S if already else n.RUN_DOWN_S[k] * setting.pace
@@ -268,13 +271,16 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     Let the engine go to another level, or engage.
     """
     f, regime = bank.number[i], bank.whole[i, REGIME]
-    engaged, claimed = regime in (DRIVEN, LEVEL), setting.engine > 0.0
+    engaged, claimed = regime in (DRIVEN, LEVEL, AMID), setting.engine > 0.0
     if claimed:
         # what the level was before, and is then, shafts alone show
-        even = engaged or (regime == AMID and bank.whole[i, KIND] == 0)
+        even = engaged and (regime != AMID or bank.whole[i, KIND] == 0)
         level = 0.5 * chance if even and setting.shafts > 0 else 0.0
         _any_power(bank, i, setting, now_s, chance - level)
         engaged, chance = True, level
+    else:  # or it varies, as often as a record begins so
+        _any_power(bank, i, setting, now_s, chance * n.AMID[0])
+        chance *= 1.0 - n.AMID[0]
     base = f[BEFORE]
     if regime == AMID:
         base = bank.mean[i, LN_U]
@@ -311,17 +317,16 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     Put a history amid a manoeuvre under power: an acceleration that drifts is what is left open.
     """
     x, f = bank.mean[j], bank.number[j]
-    if setting.engine > 0.0:
-        f[FIRST_A] = n.ENGINE_GUST[kind] * setting.engine
-        free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
+    engine = setting.engine
+    if engine > 0.0:
         free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
-        sd = n.ENGINE[kind] * setting.engine
-    else:
+    else:  # at full power it gives what the water takes
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
-        f[FIRST_A] = math.exp(law)
-        sd = n.AMID[1] * f[FIRST_A]
+        engine = math.exp(law)
+    f[FIRST_A] = n.ENGINE_GUST[kind] * engine
+    free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
     bank.whole[j, KIND], f[REVS] = kind, np.nan
-    free(bank, j, OPEN, 0.0, sd * sd)
+    free(bank, j, OPEN, 0.0, (n.ENGINE[kind] * engine) ** 2)
 
 
 @compiled(uncounted=True)
@@ -458,7 +463,7 @@ def _children(
         f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to
-    if regime in (DRIVEN, LEVEL) or (claimed and regime == AMID):
+    if regime in (DRIVEN, LEVEL) or (regime == AMID and (claimed or w[COUNT] > 0)):
         if regime == LEVEL and not fades and age_s < f[RAMP_S]:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
@@ -469,6 +474,8 @@ def _children(
             stop = n.MANOEUVRE * stops
             level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+        if regime == AMID and not claimed:  # it ends at some level, and any turn is part of it
+            level, turn = float(n.AMID[2]), 0.0
         if not np.isnan(setting.told_s):
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
             told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
@@ -494,8 +501,8 @@ def _children(
         levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
     elif regime == AMID:
-        _settles(bank, i, setting, now_s, n.AMID[3] * hours)
-        left = float(n.AMID[3])
+        _settles(bank, i, setting, now_s, n.AMID[2] * hours)
+        left = float(n.AMID[2])
     else:
         if regime == TURN:
             _back(bank, i, setting, now_s, n.TURN_OUT * hours)

@@ -110,9 +110,9 @@ LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
 AMID = _grid(
     'AMID',
-    (0.05, 0.3, 0.1, 12.0),
-    '1, of the resistance, the same in a minute, 1/h',
-    'a record begins while she gathers way: share, acceleration, its change, the end of it',
+    (0.05, 0.1, 12.0),
+    '1, of what moves it in a minute, 1/h',
+    'a record, or a switch, begins a manoeuvre: share, change of its acceleration, its end',
 )
 SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 
