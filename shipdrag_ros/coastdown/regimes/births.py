@@ -56,6 +56,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     SWITCHES,
     THE_LOG,
     THE_TRACK,
+    THRUST,
     TURN,
     WEIGHT,
     WINDMILLS,
@@ -154,7 +155,7 @@ def _wind(setting: BankSetting) -> float:
 def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
     law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
-    bank.number[j, FIRST_A] = math.exp(law)
+    bank.number[j, FIRST_A], bank.number[j, THRUST] = math.exp(law), 1.0
     bank.whole[j, GLIDED] = 1
     free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
     if setting.engine > 0.0:  # what an engine gave is over
@@ -167,9 +168,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     Let the thrust run down.
     """
     if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, AMID):
-        j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
-        if j >= 0:
-            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+        _is_let_go(bank, i, setting, now_s, chance)
         return
     learnt, claimed = bank.whole[i, REGIME] == LEVEL, setting.engine > 0.0
     last = bank.whole[i, COUNT] - 1
@@ -208,6 +207,25 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
+
+
+@compiled(uncounted=True)
+def _is_let_go(
+    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float
+) -> None:
+    """End what slowed her beside the water: an engine astern runs down as one ahead does."""
+    x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE
+    thrust = 0.0
+    if braked:
+        law = hull_law(setting.hull, x[LN_U])[0] + x[LN_A]
+        thrust = -bank.number[i, FIRST_A] * math.exp(min(x[OPEN] - law, 5.0))
+    for k in range(len(n.RUN_DOWN_S) if braked else 1):
+        ramp_s = n.RUN_DOWN_S[k] * setting.pace if braked else _NO_RAMP_S
+        share = chance * setting.hull.run_down[k] if braked else chance
+        j = _born(bank, i, now_s, share, GLIDE, ramp_s)
+        if j >= 0:
+            bank.number[j, THRUST] = thrust
+            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
 
 
 @compiled(inline=True, uncounted=True)

@@ -73,6 +73,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     STAYS_WAY,
     THE_LOG,
     THE_TRACK,
+    THRUST,
     TORQUE,
     TURN,
     WANDER,
@@ -142,9 +143,9 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 
 @compiled(inline=True, uncounted=True)
 def _thrust_left(f: Float64, now_s: float) -> float:
-    """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
+    """Return the thrust of a glide, over the resistance at its stop: the revs fall evenly."""
     left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
-    return float(left * left)
+    return float(f[THRUST] * left * left)
 
 
 @compiled(inline=True, uncounted=True)
@@ -539,7 +540,8 @@ def _shaft(
     several, scaled = setting.shafts > 1, setting.engine == 0.0
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
-        return math.log(1.0 if regime in (BRAKE, AMID) else n.SHAFT_LIES)
+        astern = regime in (BRAKE, AMID) or (regime == GLIDE and _thrust_left(f, now_s) < 0.0)
+        return math.log(1.0 if astern else n.SHAFT_LIES)
     # at any revs, mostly at those of before
     if regime == AMID or (regime == LEVEL and not scaled):
         before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
@@ -566,8 +568,8 @@ def _shaft(
             # as before the stop
             f[REVS] = f[FREE] * (math.exp(min(f[BEFORE] - log_first, 1.0)) if scaled else 1.0)
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
-        if regime == GLIDE and kind < HELD and age_s < setting.step_s:
-            # it stopped within the bin, of which the revs are a mean
+        if (regime == GLIDE and kind < HELD and age_s < setting.step_s) or left < 0.0:
+            # it stopped within the bin, of which the revs are a mean, or runs down from astern
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0 and kind < HELD:
             density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
