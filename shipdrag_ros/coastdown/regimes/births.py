@@ -214,7 +214,8 @@ def _is_let_go(
     bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float
 ) -> None:
     """End what slowed her beside the water: an engine astern runs down as one ahead does."""
-    x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE
+    # what holds a body in a window that a person claims lets go at once
+    x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE and setting.engine == 0.0
     thrust = 0.0
     if braked:
         law = hull_law(setting.hull, x[LN_U])[0] + x[LN_A]
