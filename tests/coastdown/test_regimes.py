@@ -202,7 +202,8 @@ def test_a_bin_in_which_she_is_hardly_driven_teaches_hardly_any_noise(ship, seed
         for k in range(140):
             slows = 0.05 * max(k - 40, 0)  # as no ship does that is driven
             said[LOG_SAYS] = 6.0 - slows + 0.01 * draw.standard_normal()
-            listen(filters, setting, said, likely if slows else 1.0)
+            known = likely if slows else 1.0
+            listen(filters, setting, said, known, known)
         learnt.append(filters.used[[N_GUST, N_WANDER, N_LOG]])
     assert np.all(np.abs(np.log(learnt[1] / learnt[0])) < 0.5)
 

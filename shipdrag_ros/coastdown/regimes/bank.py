@@ -327,8 +327,8 @@ def step(bank: Bank, setting: BankSetting) -> float:
         slowing = predict(all_, i, setting, used, decay, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
-    shown = thin(all_, setting)
+    shown, before = thin(all_, setting), bank.out[P_STEADY]
     _sum_up(bank, setting)
     if not claimed:
-        listen(bank.noise, setting, said, bank.out[P_STEADY])
+        listen(bank.noise, setting, said, before, bank.out[P_STEADY])
     return shown

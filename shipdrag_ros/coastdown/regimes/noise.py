@@ -116,9 +116,11 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float]:
 
 
 @compiled(uncounted=True)
-def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
+def listen(
+    noise: NoiseFilters, setting: BankSetting, said: Float64, before: float, driven: float
+) -> None:
     """
-    Learn from a bin, by the probability that she was driven evenly.
+    Learn from a bin, by the probability that she was driven evenly: of the bin before, and now.
     """
     for which in range(4):
         value = _value(setting, said, which)
@@ -126,7 +128,7 @@ def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: flo
             _bends(noise, which, value)
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
-            _one(noise, setting, which, value, driven)
+            _one(noise, setting, which, value, before, driven)
     if not np.isnan(said[RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
         clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
@@ -197,7 +199,12 @@ def _rounding(noise: NoiseFilters, which: int) -> float:
 
 @compiled(uncounted=True)
 def _one(
-    noise: NoiseFilters, setting: BankSetting, which: int, value: float, driven: float
+    noise: NoiseFilters,
+    setting: BankSetting,
+    which: int,
+    value: float,
+    before: float,
+    driven: float,
 ) -> None:
     step = setting.step_s
     speed = value / step if which == 2 else value
@@ -217,8 +224,11 @@ def _one(
     for k in range(0, FILTERS, stride):
         gained[k] = _filter(noise, setting, which, k, value, spread, a)
         best = max(best, gained[k])
-    for k in range(0, FILTERS, stride):  # what she does else explains the reading as the best does
-        evidence = math.log(driven * math.exp(gained[k] - best) + 1.0 - driven)
+    switches, chance = max(before - driven, 0.0), (n.STOP + n.LEVEL + n.TURN) * step / 3600.0
+    for k in range(0, FILTERS, stride):
+        # what she does else explains the reading as the best does, but had to begin
+        share = math.exp(gained[k] - best)
+        evidence = math.log(driven * share + 1.0 - driven) + switches * math.log(share + chance)
         noise.evidence[which, k] = fade * noise.evidence[which, k] + evidence
 
 
