@@ -193,6 +193,29 @@ def test_a_long_glide_soon_after_the_start_is_told_in_one_piece(
     assert ended.end_ns - ended.start_ns > 1100 * S
 
 
+@pytest.mark.parametrize(('rate_hz', 'seed'), [(0.2, 2), (0.2, 3), (0.2, 4), (5.0, 1)])
+def test_the_steps_of_a_display_are_no_manoeuvres(ship, record, rate_hz, seed) -> None:
+    tenths_of_a_knot = replace(LOG, sd=0.01, rate_hz=rate_hz, quantum=0.0514)
+    tenths_of_a_knot = replace(tenths_of_a_knot, coloured=GaussMarkov(0.02, 60.0))
+    block = record(sensors=(tenths_of_a_knot,), seed=seed, speed_m_s=7.0, lead_in_s=1800.0)
+    (ended,) = of(EndedCoastdown, events_of(ship, block))
+    assert abs(ended.start_ns - START_NS - 1805 * S) < 15 * S
+    assert ended.end_ns > START_NS + 2650 * S
+
+
+@pytest.mark.parametrize('seed', [0, 2, 3])
+def test_power_that_varies_is_seldom_a_coastdown(ship, record, seed) -> None:
+    draw, at_s, orders = np.random.default_rng(seed), 0.0, []
+    while at_s < 2400.0:
+        power = float(draw.uniform(0.3, 1.0))
+        orders.append(EngineOrder(at_s, shaft=power, thrust=power * power))
+        at_s += draw.uniform(20.0, 60.0)
+    scenario = {'duration_s': 2400.0, 'orders': tuple(orders)}
+    events = events_of(ship, record(sensors=(LOG, SHAFT), seed=seed, **scenario))
+    # without it as a regime there are ten and more
+    assert sum(not each.withdrawn for each in of(EndedCoastdown, events)) <= 5
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_a_bin_in_which_she_is_hardly_driven_teaches_hardly_any_noise(ship, seed) -> None:
     learnt = []
@@ -216,7 +239,7 @@ def test_the_error_of_fixes_is_learnt_whatever_the_first_ones_say(ship, seed) ->
     errors_m = fix_m * np.random.default_rng(seed).standard_normal(200)
     for advance in 17.0 + np.diff(errors_m):
         said[ADVANCE] = advance
-        listen(filters, setting, said, 1.0)
+        listen(filters, setting, said, 1.0, 1.0)
     assert 0.8 < filters.used[N_FIX] / fix_m < 1.25
 
 
@@ -230,7 +253,7 @@ def test_that_fixes_wander_is_learnt_beside_a_log(ship, seed) -> None:
         for off_m in np.diff(errors_m):
             said[LOG_SAYS] = 6.0 + 0.01 * draw.standard_normal()
             said[ADVANCE] = BIN_S * 6.0 + off_m
-            listen(filters, setting, said, 1.0)
+            listen(filters, setting, said, 1.0, 1.0)
         learnt.append(filters.used[[N_EDDY, N_WANDER]])
     (still, _), (moves, log_error) = learnt
     assert moves > 2.0 * max(still, log_error)
