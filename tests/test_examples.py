@@ -23,6 +23,7 @@ from shipdrag_ros.cli import main, parser, verbs
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 from tests.sources import log_samples
+from tests.studies.residual.conftest import RIVER_SHIP
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
@@ -277,19 +278,3 @@ def samples_of(bag: str) -> Block:
 def values(bag: str) -> list[list[float]]:
     found: list[list[float]] = samples_of(bag).value.tolist()
     return found
-
-
-RIVER_SHIP = """
-length_m: 130.0
-breadth_m: 16.5
-draught_m: 4.1
-displaced_volume_m3: 7370.0
-wetted_surface_m2: 2900.0
-added_mass: {model: constant, value: 0.05, sd: 0.02}
-baseline:
-  form_factor: 0.2
-  correlation_allowance: 3.0e-4
-  wave_froude: [0.0, 0.22]
-  wave_coefficient: [0.0, 8.0e-4]
-  relative_sd: {friction: 0.02, wave: 0.10}
-"""

@@ -4,15 +4,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, diagnose, with_effects
+from shipdrag_ros.diagnosis import CoastRun, diagnose, verdict, with_effects, words
+from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis.diagnose import compare, observed
+from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
-from shipdrag_ros.inference.decision import Verdict
+from shipdrag_ros.inference.decision import NONE, Verdict
+from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Channel
+from shipdrag_ros.ship import Fact, Ship
+from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effects import LIBRARY
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -77,16 +89,196 @@ def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
     assert found.held_out_after.chi2_per_sample < 1.5
 
 
-def test_what_is_hidden_is_named_and_then_no_longer_missing() -> None:
-    runs = [run('log_scale=0.1'), run('log_scale=0.1', heading_rad=0.3 + 3.14159, seed=2)]
+def test_what_two_runs_share_is_named_and_then_no_longer_missing() -> None:
+    runs = [run('current=0.3'), run('current=0.3', heading_rad=0.3 + np.pi, seed=2)]
     found = diagnose(runs, SHIP, PARAMETERS)
     assert found.verdict is Verdict.NAMED
-    assert [each.name for each in found.effects] == ['log_scale']
-    size = found.effects[0].parameters['factor']
-    assert abs(size.value - 0.1) < 3.0 * size.sd
+    assert [each.name for each in found.effects] == ['current']
+    size = found.effects[0].parameters['along_track_m_s']
+    assert abs(size.value - 0.3) < 3.0 * size.sd
     assert found.after is not None
     assert found.held_out_after is not None
     assert found.after.chi2_per_sample < 0.5 * found.before.chi2_per_sample
     assert found.held_out_after.chi2_per_sample < 1.2
+    alone = diagnose(runs[:1], SHIP, PARAMETERS, advise=False)
+    one = next(e for c in alone.candidates for e in c.effects if e.name == 'current')
+    assert size.sd < one.parameters['along_track_m_s'].sd
     again = diagnose(runs, with_effects(SHIP, found.effects), PARAMETERS)
     assert again.verdict is Verdict.NONE
+
+
+FACTS = (*map(Fact, ('no_towed_cable', 'deep_water', 'draughts_read')), Fact('shaft', 'free'))
+
+
+def short_run(name: str, fouling: float, seed: int) -> CoastRun:
+    effects = [f'fouling={fouling}'] if fouling else []
+    return coasted(*effects, name=name, coast_s=1000.0, rate_hz=0.5, seed=seed)
+
+
+@pytest.mark.parametrize('sizes', [(0.0, 0.35), (0.3, 0.3)])
+def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]) -> None:
+    runs = [short_run(str(j), fouling, seed=j) for j, fouling in enumerate(sizes)]
+    found = diagnose(runs, SHIP, Parameters(), facts=FACTS)
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert effect.name == 'fouling'
+    last = effect.parameters['friction_factor']
+    assert abs(last.value - sizes[1]) < 3.0 * last.sd
+    if sizes[0] == sizes[1]:
+        assert found.runs_differ == ()
+        assert words.differing(found) == ''
+        return
+    assert [each.run for each in found.runs_differ] == ['0', '1']
+    for each, size in zip(found.runs_differ, sizes, strict=True):
+        assert (each.effect, each.parameter) == ('fouling', 'friction_factor')
+        assert abs(each.size.value - size) < 3.0 * each.size.sd
+        assert each.size.sd < 0.08
+    assert found.held_out_after is None  # no run tells of another
+    assert found.where is not None
+    assert found.where.channel == 'force'
+    first, second, *_ = found.summary()
+    assert first.startswith('Missing in the model, and not alike in these runs: fouling')
+    assert second.startswith('These runs differ: no one state of the hull fits all')
+
+
+FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2
+
+
+@pytest.mark.parametrize('first_heard', [True, False])
+def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo, first_heard):
+    scenario = Scenario(speed_m_s=8.0, lead_in_s=900.0, duration_s=900.0)
+    inputs = ('speed_through_water', 'speed_through_water_2', 'position')
+    block = sense(simulate(cargo, scenario), standard_sensors(inputs=inputs), seed=5)
+    off = np.where(block.channel == SECOND, 1.04, 1.0)[:, None]
+    block = replace(block, value=off * block.value)
+    if not first_heard:
+        block = block[block.channel != FIRST]
+    stop_ns = START_NS + 900 * 10**9
+    window = Window.from_block(
+        block, stop_ns, int(block.stamp_ns.max()), before_ns=int(block.stamp_ns.min())
+    )
+    run = CoastRun('run', window)
+    (seen,), notes = observed([run], cargo, Parameters(), {}, lambda *_: None)
+    assert set(seen.along.rows.kind.tolist()) == {LOG, POSITION}
+    if first_heard:
+        (note,) = notes
+        beside = 'run: speed_through_water_2 is not used beside speed_through_water, against '
+        assert note.startswith(f'{beside}which it reads +')
+        assert float(note.split('reads ')[1].split(' ')[0]) == pytest.approx(4.0, abs=0.5)
+        assert seen.speed_m_s == pytest.approx(8.0, rel=0.01)
+    else:
+        assert notes == ()
+        assert seen.speed_m_s == pytest.approx(8.32, rel=0.01)
+
+
+COAST_S = 1200
+
+
+def run_of(*effects: str, heading_rad: float = 0.7, seed: int = 5) -> CoastRun:
+    return coasted(*effects, heading_rad=heading_rad, reference_rad=0.7, seed=seed)
+
+
+@cache
+def answer(*effects: str, ship: Ship = SHIP) -> DiagnosisResult:
+    """Diagnose one run, once."""
+    return diagnose([run_of(*effects)], ship, Parameters())
+
+
+@pytest.mark.parametrize(
+    ('text', 'parameter', 'size'),
+    [
+        ('log_lag=25', 'lag_s', 25.0),
+        # at the best of nothing, the filter of the log stands for it
+        ('time_offset=30', 'offset_s', 30.0),
+    ],
+)
+def test_what_is_hidden_is_named_with_its_size(text: str, parameter: str, size: float) -> None:
+    found = answer(text)
+    name = text.partition('=')[0]
+    assert [effect.name for effect in found.effects] == [name]
+    known = found.effects[0].parameters[parameter]
+    assert abs(known.value - size) < 4.0 * known.sd
+    assert found.after is not None
+    assert found.after.chi2_per_sample < found.before.chi2_per_sample
+
+
+def test_without_anything_hidden_nothing_is_most_probable() -> None:
+    found = answer()
+    assert found.effects == ()
+    assert found.candidates[0].names == NONE
+    assert found.nothing > 0.75
+    assert sum(each.probability for each in found.candidates) <= 1.0 + 1e-9
+    # sizes that this run would have shown are excluded, and it says which
+    for name in ('log_scale', 'current', 'wind', 'fouling'):
+        limit = found.limits[name]
+        assert 0.0 < limit.value < np.inf
+    assert found.limits['log_scale'].value < 0.08  # half of what is usual where it is there
+    # rough or with a propeller that stands: no size of the first is that of it alone
+    assert found.limits['fouling'].would_be_named is None
+    # of 8 records with it 8 name 0.38, and one with 0.3 does not
+    assert 0.3 < (found.limits['locked_propeller'].would_be_named or np.inf) < 0.75
+    assert found.limits['turning'].would_be_named == 0.0  # the heading shows that she turns
+    assert 'turning of any size' in words.sentence(replace(found, verdict=Verdict.NONE))
+    assert 'any size' in {row[3] for row in diagnosis_cells.limits(found).rows}
+
+
+@pytest.mark.parametrize(
+    ('text', 'name'), [('fouling=0.5', 'fouling'), ('fouling=2', 'locked_propeller')]
+)
+def test_a_size_that_is_not_named_by_its_limit_is_not_named_in_a_record(text, name):
+    found = answer(text)
+    assert found.candidates[0].names == (name,)
+    assert 'fouling' not in [effect.name for effect in found.effects]
+
+
+@pytest.mark.parametrize('text', ['log_lag=9', 'time_offset=10', 'wind=10'])
+def test_what_a_rival_may_stand_for_is_not_promised_a_name(text: str) -> None:
+    # the filter of the log, a lag for an offset in time, waves for wind
+    name, _, size = text.partition('=')
+    assert name not in [effect.name for effect in answer(text).effects]
+    assert (answer().limits[name].would_be_named or np.inf) > float(size)
+
+
+def test_of_many_effects_the_likeliest_have_a_size_that_is_named(monkeypatch) -> None:
+    monkeypatch.setattr(verdict, '_RIVALS', 2)
+    limits = diagnose([run_of()], SHIP, Parameters()).limits
+    assert sum(each.would_be_named is not None for each in limits.values()) <= 2
+    assert len(limits) > 10
+
+
+def test_a_limit_grows_where_the_run_shows_less() -> None:
+    whole = answer().limits['wind'].value
+    window = run_of().window
+    end = window.start_ns + (COAST_S // 4) * 10**9
+    short = replace(
+        window,
+        **{
+            name: replace(
+                series, **{k: getattr(series, k)[series.time_ns < end] for k in vars(series)}
+            )
+            for name in ('speed_through_water', 'position', 'speed_over_ground')
+            if len((series := getattr(window, name)).time_ns)
+        },
+    )
+    found = diagnose([CoastRun('short', short)], SHIP, Parameters())
+    assert found.limits['wind'].value > 1.1 * whole
+
+
+def test_two_look_alikes_are_a_set_that_holds_the_truth() -> None:
+    found = answer('wind=14')
+    assert found.candidates[0].names == ('wind',)
+    assert {each.names for each in found.held} <= {('wind',), ('waves',)}
+
+
+def test_the_answer_is_the_same_to_the_bit() -> None:
+    one, other = answer('wind=14'), answer.__wrapped__('wind=14')
+    assert one.candidates == other.candidates
+    assert one.limits == other.limits
+
+
+def test_probabilities_are_those_of_evidence_and_odds() -> None:
+    seen = Observation.of(run_of('wind=14').window, SHIP, Parameters(), name='run')
+    found = compare((seen,), SHIP, Facts(SHIP)).compare()
+    assert sum(found.probability.values()) == pytest.approx(1.0)
+    names = {each.names for each in found.fitted}
+    assert {(name,) for name, effect in LIBRARY.items() if not effect.missing(SHIP)} <= names

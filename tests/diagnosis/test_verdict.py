@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.verdict import judge, runs_differ
+from shipdrag_ros.diagnosis.verdict import asked, judge, runs_differ
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
@@ -71,3 +71,26 @@ def test_a_size_for_each_run_is_one_name() -> None:
     (named,) = judge(compared(fitted(weight=-9.0), each), ()).effects
     assert named.parameters['friction_factor'] == last.size
     assert runs_differ(alike, ['out', 'back']) == ()
+
+
+@pytest.mark.parametrize(
+    ('ratio', 'words'),
+    [
+        (1.94, 'knots over m/s'),
+        (0.52, 'm/s over knots'),
+        (3.55, 'km/h over m/s'),
+        (1.85, 'km/h over knots'),
+        (0.28, 'm/s over km/h'),
+        (2.24, 'mph over m/s'),
+        (1.15, 'mph over knots'),
+        (0.62, 'mph over km/h'),
+    ],
+)
+def test_a_ratio_of_two_units_is_asked_about(ratio: float, words: str) -> None:
+    assert words in asked(ratio)
+    assert '--map speed_through_water=COLUMN:kn' in asked(ratio)
+
+
+@pytest.mark.parametrize('ratio', [1.0, 0.8, 1.2, 1.4, 0.4, 2.5, 0.0, -1.94, float('nan')])
+def test_an_error_of_a_wheel_is_none(ratio: float) -> None:
+    assert asked(ratio) == ''

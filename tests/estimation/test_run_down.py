@@ -8,10 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipdrag_ros.estimation import estimate_final
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
 
 SHIP = Ship.from_yaml(
     'length_m: 150.0\ndisplaced_volume_m3: 20200.0\npropulsion: {run_down_s: 10.0, sd: 5.0}\n',
@@ -197,3 +201,95 @@ def test_a_shaft_dates_the_stop_better_than_a_person() -> None:
     found = RunDown.of(window, SHIP)
     assert found.by_shaft
     assert RunDown.of(replace(window, told_ns=round((STOP_S + 9.0) * 1e9)), SHIP) == found
+
+
+BARE = Ship.from_yaml(
+    'name: bare\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='bare ship'
+)
+DRAG_1_M, LEAD_S, COAST_S = 3e-4, 1800, 1200
+
+
+def final(shaft_rad_s: Float64 | None, seed: int = 0) -> Estimate:
+    """Estimate from a log of 0.05 m/s after half an hour at 8 m/s, with a shaft or without."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(LEAD_S + COAST_S) - LEAD_S
+    stamps = (np.arange(len(time_s)) * 10**9) + 10**15
+    log = speed(time_s) + rng.normal(0.0, 0.05, len(time_s))
+    blocks = [Block.of(Channel.SPEED_THROUGH_WATER, stamps, log)]
+    if shaft_rad_s is not None:
+        read = shaft_rad_s + rng.normal(0.0, 0.02, len(time_s))
+        blocks.append(Block.of(Channel.SHAFT, stamps, read))
+    start_ns = int(stamps[LEAD_S])
+    window = Window.from_block(
+        in_arrival_order(blocks), start_ns, int(stamps[-1]), before_ns=int(stamps[0])
+    )
+    return estimate_final(window, BARE, Parameters())
+
+
+def speed(time_s: Float64) -> Float64:
+    return np.asarray(1.0 / (1.0 / 8.0 + DRAG_1_M * np.maximum(time_s, 0.0)))
+
+
+@pytest.mark.parametrize('part', [0.35, 0.5, 0.8])
+def test_the_water_turns_it_on(part: float) -> None:
+    time_s = np.arange(LEAD_S + COAST_S) - LEAD_S
+    run_down = 10.0 * np.exp(-np.maximum(time_s, 0.0) / 8.0)
+    shaft = np.maximum(run_down, part * 10.0 * speed(time_s) / 8.0)
+    with_shaft = final(shaft)
+    assert any('as the water turns it' in note for note in with_shaft.notes)
+    for at in (4.0, 5.0, 6.0, 7.0):
+        expected = (1.0 + float(BARE.n_r(at))) * DRAG_1_M * at**2
+        curve = with_shaft.curve
+        r = float(np.interp(at, curve.speed_m_s, curve.resistance_m_s2))
+        sigma = float(np.interp(at, curve.speed_m_s, curve.sigma_m_s2))
+        assert abs(r - expected) < 3.0 * sigma < 0.2 * expected
+        alone = final(None).curve
+        without = float(np.interp(at, alone.speed_m_s, alone.resistance_m_s2))
+        assert abs(r - without) < 0.03 * expected
+
+
+def test_a_sensor_that_always_reads_zero_is_called_dead() -> None:
+    notes = ' '.join(final(np.zeros(LEAD_S + COAST_S)).notes)
+    assert 'stood before the stop too: it shows nothing, or its sensor is dead' in notes
+    assert 'stands whenever it is received' not in notes
+
+
+CRAFT = Ship.from_yaml(
+    """
+name: small craft
+length_m: 24.5
+displaced_volume_m3: 178.6
+breadth_m: 6.5
+draught_m: 2.5
+added_mass: {model: constant, value: 0.12, sd: 0.02}
+propulsion: {run_down_s: 2.0, sd: 0.5}
+baseline:
+  source: trials
+  speed_m_s: [0, 1, 2, 3, 4, 5]
+  resistance_n: [0, 650, 2300, 6300, 14600, 28000]
+  relative_sd: 0.02
+""",
+    subject='small craft',
+)
+SPEED_M_S = 4.3
+
+
+@pytest.mark.parametrize(
+    'sensor',
+    [
+        Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.02),
+        Sensor(channel=Channel.POSITION, sd=0.3),
+    ],
+    ids=['log', 'fixes'],
+)
+def test_what_is_lost_before_the_onset_is_read(sensor: Sensor) -> None:
+    scenario = Scenario(speed_m_s=SPEED_M_S, lead_in_s=900.0, duration_s=180.0)
+    block = sense(simulate(CRAFT, scenario), (sensor,), seed=3)
+    stop_ns = START_NS + 900 * SECOND_NS
+    window = Window.from_block(
+        block, stop_ns + 25 * SECOND_NS, stop_ns + 180 * SECOND_NS, before_ns=START_NS
+    )
+    curve = estimate_final(window, CRAFT, Parameters()).valid_curve
+    true = CRAFT.resistance_n(curve.speed_m_s) / CRAFT.mass_kg
+    assert curve.speed_m_s[-1] > 0.98 * SPEED_M_S  # a quarter of it is lost by the onset
+    assert np.abs(curve.resistance_m_s2 - true).max() < 0.03 * true.max()

@@ -14,12 +14,14 @@ from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Followed, interval_score
-from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
 from shipdrag_ros.forecast.law import KnownCurve, deceleration
-from shipdrag_ros.forecast.result import Band
+from shipdrag_ros.forecast.result import Band, PathAhead
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Channel
+from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.ship.sections import Propulsion
 from shipdrag_ros.simulation import START_NS, Scenario, Truth, sense, simulate, standard_sensors
 
 LEAD_IN_S, DURATION_S = 600.0, 2400.0
@@ -52,6 +54,11 @@ def after(window: Window, seconds: float, ship: Ship, estimator: str) -> Estimat
 @pytest.fixture(scope='module')
 def early(window: Window, ship: Ship) -> Estimate:
     return after(window, 600.0, ship, 'one')
+
+
+@pytest.fixture(scope='module')
+def whole(window: Window, ship: Ship) -> Estimate:
+    return estimate(window, ship, Parameters(estimator='one'))
 
 
 @pytest.mark.parametrize('estimator', ['one', 's1_joint'])
@@ -186,8 +193,8 @@ def test_a_current_may_set_her_back(early: Estimate, ship: Ship) -> None:
     assert np.abs(way).max() < still.milestones[-1].distance_m.high
 
 
-def test_what_followed_may_be_behind(window: Window, ship: Ship, early: Estimate) -> None:
-    whole = replace(estimate(window, ship, Parameters(estimator='one')), current_m_s=-2.0)
+def test_what_followed_may_be_behind(window, whole, ship, early):
+    whole = replace(whole, current_m_s=-2.0)
     position = window.position
     track = position.value[-1] - position.value[0]
     since_s = (position.time_ns - window.start_ns) / SECOND_NS
@@ -211,8 +218,7 @@ def test_it_takes_less_than_five_milliseconds(early: Estimate, ship: Ship) -> No
     assert np.median(spent) < 5e-3
 
 
-def test_what_followed_is_read_from_the_instruments(window, truth, early, ship):
-    whole = estimate(window, ship, Parameters(estimator='one'))
+def test_what_followed_is_read_from_the_instruments(window, whole, truth, early, ship):
     checked = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
     gliding = truth.time_s >= LEAD_IN_S
     speed = truth.speed_through_water_m_s[gliding]
@@ -226,8 +232,7 @@ def test_what_followed_is_read_from_the_instruments(window, truth, early, ship):
     assert checked.inside is not None
 
 
-def test_a_spike_is_not_what_followed(window: Window, ship: Ship, early: Estimate) -> None:
-    whole = estimate(window, ship, Parameters(estimator='one'))
+def test_a_spike_is_not_what_followed(window, whole, ship, early):
     sound = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
     log = window.speed_through_water
     value = log.value.copy()
@@ -271,3 +276,124 @@ def test_the_second_of_a_kind_alone_is_foretold_and_followed(window, ship, kind)
         within_s = 10.0 if kind == 'speed_through_water' else 0.01
         assert first.was_s == pytest.approx(other.was_s, abs=within_s)
     assert found[0].pairs
+
+
+SPEED_M_S = 7.0
+FOULED = StatedEffect('fouling', {'friction_factor': Parameter(0.4, 0.05)})
+
+
+@pytest.fixture(scope='module')
+def driven() -> Ship:
+    return replace(Ship.example(), propulsion=Propulsion(20.0, 5.0))
+
+
+def glide(driven: Ship) -> Truth:
+    return simulate(driven, Scenario(speed_m_s=SPEED_M_S, lead_in_s=1.0, duration_s=2400.0))
+
+
+@pytest.mark.parametrize('effects', [(), (FOULED,)])
+def test_she_glides_as_it_was_foretold(driven: Ship, effects: tuple[StatedEffect, ...]) -> None:
+    driven = replace(driven, effects=effects)
+    hull = HullNow.of_file(driven)
+    assert ('fouling' in hull.source) == bool(effects)
+    truth = glide(driven)
+    found = if_stopped(hull, driven, SPEED_M_S, START_NS)
+    compared = [each for each in found.milestones if each.speed_m_s > 2.5]
+    assert len(compared) >= 3
+    way = np.hypot(*(truth.position_m - truth.position_m[0]).T)
+    for each in compared:
+        at = float(np.interp(-each.speed_m_s, -truth.speed_through_water_m_s, truth.time_s)) - 1.0
+        far = float(np.interp(at + 1.0, truth.time_s, way)) - SPEED_M_S
+        assert each.time_s.low < at < each.time_s.high
+        assert each.time_s.median == pytest.approx(at, rel=0.05)
+        assert each.distance_m.median == pytest.approx(far, rel=0.05)
+
+
+def test_a_run_is_known_better_than_the_file_that_it_contradicts(driven: Ship) -> None:
+    fouled = glide(replace(driven, effects=(FOULED,)))
+    speed = np.linspace(2.0, SPEED_M_S, 30)
+    r = fouled.specific_resistance(speed)
+    hull = HullNow.of_run(speed, r, 0.02 * r, 'the last run')
+    later = if_stopped(HullNow.of_file(driven), driven, SPEED_M_S, START_NS).reaches(4.0).time_s
+    sooner = if_stopped(hull, driven, SPEED_M_S, START_NS).reaches(4.0).time_s
+    was = float(np.interp(-4.0, -fouled.speed_through_water_m_s, fouled.time_s)) - 1.0
+    assert sooner.median == pytest.approx(was, rel=0.03)
+    assert later.median > 1.1 * was
+
+
+def test_a_longer_run_down_delays(driven: Ship) -> None:
+    hull = HullNow.of_file(driven)
+    longer = replace(driven, propulsion=Propulsion(60.0, 5.0))
+    one, other = (
+        if_stopped(hull, each, SPEED_M_S, START_NS).reaches(4.0) for each in (driven, longer)
+    )
+    assert 40.0 < other.time_s.median - one.time_s.median < 80.0
+    assert other.distance_m.median - one.distance_m.median > 40.0 * 4.0
+
+
+def test_why_nothing_is_foretold(driven: Ship) -> None:
+    with pytest.raises(EstimationError, match='neither a coastdown nor a baseline'):
+        HullNow.of_file(replace(driven, baseline=None))
+    with pytest.raises(EstimationError, match='makes no way'):
+        if_stopped(HullNow.of_file(driven), driven, 0.0, START_NS)
+
+
+PATH_STOP_NS = START_NS + 300 * SECOND_NS
+MADE_S = 400.0
+
+
+def test_she_is_where_she_was_foretold_to_be() -> None:
+    ship = Ship.example()
+    scenario = Scenario(
+        speed_m_s=8.0, lead_in_s=300.0, duration_s=1500.0, heading_rad=0.7, current_m_s=(0.3, -0.2)
+    )
+    truth = simulate(ship, scenario)
+    block = sense(truth, standard_sensors(), seed=2)
+    end_ns = PATH_STOP_NS + round(MADE_S * SECOND_NS)
+    window = Window.from_block(block, PATH_STOP_NS, end_ns, before_ns=START_NS)
+    forecast = foretell(estimate(window, ship, Parameters()), ship)
+    path = PathAhead.of(window, forecast)
+    assert path is not None
+    assert path.time_ns[0] == forecast.made_ns
+    at_s = (path.time_ns - START_NS) * 1e-9
+    seen = at_s < truth.time_s[-1]
+    was = np.column_stack(
+        [np.interp(at_s[seen], truth.time_s, axis) for axis in truth.position_m.T]
+    )
+    off = np.hypot(*(path.position_m[seen] - was).T)
+    gone = np.hypot(*(was - was[0]).T)
+    assert off[0] < 15.0
+    assert off[-1] < 0.1 * gone[-1]
+
+
+def test_without_positions_there_is_none() -> None:
+    ship = Ship.example()
+    truth = simulate(ship, Scenario(speed_m_s=8.0, lead_in_s=300.0, duration_s=500.0))
+    block = sense(truth, standard_sensors(), seed=2)
+    log = block[np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)]
+    window = Window.from_block(
+        log, PATH_STOP_NS, PATH_STOP_NS + 400 * SECOND_NS, before_ns=START_NS
+    )
+    forecast = foretell(estimate(window, ship, Parameters()), ship)
+    assert not forecast.over_ground
+    assert PathAhead.of(window, forecast) is None
+
+
+def test_of_two_antennas_the_first_that_still_speaks_shows_the_course() -> None:
+    ship = Ship.example()
+    truth = simulate(ship, Scenario(speed_m_s=8.0, lead_in_s=300.0, duration_s=500.0))
+    block = sense(truth, standard_sensors(), seed=2)
+    end_ns = PATH_STOP_NS + 400 * SECOND_NS
+    window = Window.from_block(block, PATH_STOP_NS, end_ns, before_ns=START_NS)
+    other = replace(window.position, value=window.position.value + np.array([1e5, 0.0]))
+    silent = window.part(PATH_STOP_NS, PATH_STOP_NS + 100 * SECOND_NS).position
+    forecast = foretell(estimate(window, ship, Parameters()), ship)
+    both = replace(window, further={'position_2': other})
+    path, first, second = (
+        PathAhead.of(each, forecast) for each in (window, both, replace(both, position=silent))
+    )
+    assert path is not None
+    assert first is not None
+    assert second is not None
+    assert np.array_equal(first.position_m, path.position_m)
+    assert np.allclose(second.position_m - path.position_m, [1e5, 0.0], atol=1e-3)

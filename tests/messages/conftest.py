@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -151,3 +152,16 @@ class Reference:
 
 
 reference = Reference()
+
+
+def broken(draw: Any, good: bytes, last: int) -> list[bytes]:
+    """Draw messages that are cut or too long, with some of their first bytes changed."""
+    payloads = []
+    for _ in range(8):
+        changed = bytearray(good[: draw(st.integers(0, len(good) + 20))])
+        changed += draw(st.binary(max_size=24))
+        if changed:
+            for place in draw(st.lists(st.integers(0, last), max_size=4)):
+                changed[place % len(changed)] = draw(st.integers(0, 255))
+        payloads.append(bytes(changed))
+    return payloads

@@ -17,7 +17,7 @@ from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, 
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.gather import steps
 from shipdrag_ros.samples import FURTHER, Channel, concatenate
-from tests.messages.conftest import reference
+from tests.messages.conftest import broken, reference
 
 SOURCES = [
     Source(name, type_name)
@@ -180,15 +180,7 @@ def test_what_is_malformed_is_malformed_to_the_other_reader(source, data):
     good = reference.serialize(
         source.type, reference.message(source.type, 1, frame, [0.5] * 8), little_endian=little
     )
-    payloads = []
-    for _ in range(8):
-        changed = bytearray(good[: data.draw(st.integers(0, len(good) + 20))])
-        changed += data.draw(st.binary(max_size=24))
-        if changed:
-            for place in data.draw(st.lists(st.integers(0, 90), max_size=4)):
-                changed[place % len(changed)] = data.draw(st.integers(0, 255))
-        payloads.append(bytes(changed))
-    for payload in payloads:
+    for payload in broken(data.draw, good, 90):
         decoded = decode(source, [payload], [0])
         try:
             types.deserialize(source.type, payload)

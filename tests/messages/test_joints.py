@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.messages import MalformedMessage, Source, Unreadable, decode, decoding, types
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
-from tests.messages.conftest import reference
+from tests.messages.conftest import broken, reference
 
 SHAFT = Source('shaft', types.JOINT_STATE)
 RUDDER = Source('rudder', types.JOINT_STATE)
@@ -244,15 +244,7 @@ def test_broken_bytes_are_malformed_to_both_readers_and_spoil_no_neighbour(data)
         message(reference, [*names, 'shaft_2'], [1.0] * (len(names) + 1), data.draw(numbers)),
         little_endian=data.draw(st.booleans()),
     )
-    payloads = [good]
-    for _ in range(8):
-        changed = bytearray(good[: data.draw(st.integers(0, len(good) + 20))])
-        changed += data.draw(st.binary(max_size=24))
-        if changed:
-            for place in data.draw(st.lists(st.integers(0, 200), max_size=4)):
-                changed[place % len(changed)] = data.draw(st.integers(0, 255))
-        payloads.append(bytes(changed))
-    payloads.append(good)
+    payloads = [good, *broken(data.draw, good, 200), good]
     batch = decode(SHAFT, payloads, np.arange(len(payloads)))
     malformed = 0
     for i, payload in enumerate(payloads):

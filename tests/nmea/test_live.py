@@ -14,9 +14,20 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.nmea import live
-from shipdrag_ros.nmea.live import LiveNmea, SourceCounts, parse_addresses
+from shipdrag_ros.nmea.live import (
+    LINE_BYTES,
+    Address,
+    LineSplitter,
+    LiveNmea,
+    SourceCounts,
+    Way,
+    parse_addresses,
+)
 
 WITHIN_S = 120.0
 TEXT = '$HEHDT,90.0,T*18'
@@ -166,3 +177,96 @@ def test_what_is_no_serial_device_is_said(tmp_path: Path) -> None:
     os.mkfifo(path)
     with hearing(f'serial:{path}:4800') as heard:
         until(lambda: 'no serial device' in counts(heard).problem)
+
+
+def test_each_form() -> None:
+    found = parse_addresses(
+        'udp://0.0.0.0:10110 tcp://mux.local:2000 tcp://[::1]:2000 serial:/dev/ttyUSB0:4800 '
+        'udp://0.0.0.0:10110'
+    )
+    assert [(each.way, each.place, each.number) for each in found] == [
+        (Way.UDP, '0.0.0.0', 10110),
+        (Way.TCP, 'mux.local', 2000),
+        (Way.TCP, '::1', 2000),
+        (Way.SERIAL, '/dev/ttyUSB0', 4800),
+    ]
+    assert str(found[0]) == 'udp://0.0.0.0:10110'
+    assert parse_addresses('') == ()
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'udp://127.0.0.1:1@127.0.0.1',
+        'udp://239.192.0.1:1@999.0.0.1',
+        'udp://:1',
+        'udp://a',
+        'udp://a:0',
+        'tcp://a:65536',
+        'serial:ttyUSB0:4800',
+        'http://a:1',
+    ],
+)
+def test_what_is_no_address_says_what_is(text: str) -> None:
+    with pytest.raises(ShipdragError, match='expected'):
+        Address.parse(text)
+
+
+def test_a_group_may_name_its_interface() -> None:
+    group, one, other = parse_addresses(
+        'udp://239.192.0.1:60001@127.0.0.1 udp://224.0.0.1:1 udp://10.0.0.1:1'
+    )
+    assert group.is_multicast
+    assert (group.place, group.number, group.interface) == ('239.192.0.1', 60001, '127.0.0.1')
+    assert str(group) == 'udp://239.192.0.1:60001@127.0.0.1'
+    assert one.is_multicast
+    assert not other.is_multicast
+    with pytest.raises(ShipdragError, match='groups of IPv6 are not joined'):
+        Address.parse('udp://[ff02::1]:60001')
+
+
+def test_lines_by_any_end() -> None:
+    splitter = LineSplitter()
+    assert splitter.feed(b'$A\r\n$B\n$C\r\r\n  \n$D') == ['$A', '$B', '$C']
+    assert splitter.feed(b'1\n') == ['$D1']
+    assert splitter.feed(b'$E') == []
+    assert splitter.end() == ['$E']
+    assert splitter.end() == []
+    assert splitter.feed(b'$F\n') == ['$F']  # the next datagram, or connection
+
+
+def test_a_line_that_is_skipped_ends_with_its_datagram() -> None:
+    splitter = LineSplitter()
+    assert splitter.feed(b'x' * (LINE_BYTES + 1)) == []
+    assert splitter.end() == []
+    assert splitter.feed(b'$A\n') == ['$A']
+
+
+def test_what_is_no_text_is_counted() -> None:
+    splitter = LineSplitter()
+    assert splitter.feed(b'\x00\xff\n$A\n\xe9t\xe9\n') == ['$A']
+    assert splitter.binary == 2
+
+
+def test_an_endless_line_takes_no_memory() -> None:
+    splitter = LineSplitter()
+    for _ in range(1000):
+        assert splitter.feed(b'x' * 4096) == []
+        assert len(splitter._open) <= LINE_BYTES
+    assert splitter.too_long == 1
+    assert splitter.feed(b'tail\n$A\n') == ['$A']
+    assert splitter.feed(b'y' * (LINE_BYTES + 1) + b'\n$B\n') == ['$B']
+    assert splitter.too_long == 2
+
+
+@given(st.binary(max_size=3000), st.lists(st.integers(1, 700), max_size=20))
+def test_the_cut_does_not_matter(data: bytes, sizes: list[int]) -> None:
+    whole, pieces = LineSplitter(), LineSplitter()
+    expected = whole.feed(data) + whole.end()
+    found = []
+    for size in sizes:
+        found += pieces.feed(data[:size])
+        data = data[size:]
+    found += pieces.feed(data) + pieces.end()
+    assert found == expected
+    assert (pieces.too_long, pieces.binary) == (whole.too_long, whole.binary)

@@ -16,23 +16,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.messages import (
     EncodedMessage,
     EventKind,
-    OutputMessage,
-    Source,
     encode,
-    read_event,
 )
-from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import ReplayResult, replay
 from shipdrag_ros.samples import Block, concatenate
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from tests.node.desk import Desk
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SECOND_NS = 10**9
@@ -61,48 +56,22 @@ def messages() -> tuple[EncodedMessage, ...]:
     return tuple(encode(record()))
 
 
-class Desk:
-    """A session, what it published while recording, and the replay of that."""
-
-    def __init__(self, directory: Path) -> None:
-        ship = Ship.load(SHIP_FILE)
-        monitor = Monitor(ship, PARAMETERS)
-        self.directory = directory
-        self.recorder = Recorder(
-            directory,
-            namespace='',
-            ship=ship,
-            parameters=PARAMETERS,
-            history_ns=monitor.history_ns,
-        )
-        self.published: list[OutputMessage] = []
-        self.session = Session(
-            monitor, self.recorder, publish=self.published.append, node='/coastdown_node'
-        )
+class ReplayedDesk(Desk):
+    """A desk that is fed parts of the record, and the replay of what it published."""
 
     def feed(self, from_s: float, to_s: float) -> None:
-        """Receive this part of the record."""
         start_ns = record().receive_ns[0]
         time_s = (record().receive_ns - start_ns) / SECOND_NS
         first, last = np.searchsorted(time_s, [from_s, to_s])
-        for message in messages()[first:last]:
-            source = Source(message.topic.strip('/'), message.type)
-            self.session.receive(source, message.payload, message.log_ns)
-
-    def kinds(self) -> list[EventKind]:
-        """What was said on `~/events`."""
-        events = [it for it in self.published if it.topic.endswith('/events')]
-        return [read_event(it.payload).kind for it in events]
+        self.receive(messages()[first:last])
 
     def replay(self) -> list[ReplayResult]:
-        self.session.finish()
-        paths = sorted(self.directory.glob('*.mcap'))
-        return [replay(run) for run in open_runs(paths)]
+        return [replay(run) for run in open_runs(self.recorded())]
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    return Desk(tmp_path)
+def desk(tmp_path: Path) -> ReplayedDesk:
+    return ReplayedDesk(tmp_path, Ship.load(SHIP_FILE), PARAMETERS)
 
 
 def assert_identical(result: ReplayResult, *, at_least: int) -> None:
@@ -111,7 +80,7 @@ def assert_identical(result: ReplayResult, *, at_least: int) -> None:
     assert result.recorded.compared >= at_least
 
 
-def test_from_the_beginning(desk: Desk) -> None:
+def test_from_the_beginning(desk: ReplayedDesk) -> None:
     desk.recorder.start()
     desk.feed(0, 1e9)
     (result,) = desk.replay()
@@ -122,7 +91,7 @@ def test_from_the_beginning(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, 3500.0])
-def test_a_recording_that_starts_mid_run(desk: Desk, start_s: float) -> None:
+def test_a_recording_that_starts_mid_run(desk: ReplayedDesk, start_s: float) -> None:
     desk.feed(0, start_s)
     desk.recorder.start()
     desk.feed(start_s, 1e9)
@@ -130,7 +99,7 @@ def test_a_recording_that_starts_mid_run(desk: Desk, start_s: float) -> None:
     assert_identical(result, at_least=20)
 
 
-def test_a_recording_that_stops_and_starts_mid_run(desk: Desk) -> None:
+def test_a_recording_that_stops_and_starts_mid_run(desk: ReplayedDesk) -> None:
     desk.recorder.start()
     desk.feed(0, LEAD_IN_S + 200.0)
     desk.recorder.stop()
@@ -142,7 +111,7 @@ def test_a_recording_that_stops_and_starts_mid_run(desk: Desk) -> None:
     assert_identical(second, at_least=20)
 
 
-def test_after_a_reset(desk: Desk) -> None:
+def test_after_a_reset(desk: ReplayedDesk) -> None:
     desk.recorder.start()
     start_ns = int(record().receive_ns[0])
     desk.feed(0, LEAD_IN_S + 250.0)
@@ -153,7 +122,7 @@ def test_after_a_reset(desk: Desk) -> None:
     assert_identical(result, at_least=30)
 
 
-def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
+def test_both_sides_of_a_clock_that_was_set_back(desk: ReplayedDesk) -> None:
     desk.recorder.start()
     desk.feed(0, LEAD_IN_S + 250.0)
     desk.feed(0, 1e9)
@@ -164,7 +133,7 @@ def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize('recorded_from', ['the beginning', 'mid run', 'after the silence'])
-def test_a_coastdown_whose_sources_all_fall_silent(desk: Desk, recorded_from: str) -> None:
+def test_a_coastdown_whose_sources_all_fall_silent(desk: ReplayedDesk, recorded_from: str) -> None:
     silent_s = LEAD_IN_S + 250.0
     ended_ns = int(record().receive_ns[0]) + round((silent_s + 61.0) * SECOND_NS)
     if recorded_from == 'the beginning':
@@ -187,7 +156,7 @@ def test_a_coastdown_whose_sources_all_fall_silent(desk: Desk, recorded_from: st
     assert_identical(result, at_least=20)
 
 
-def test_a_clock_that_is_set_forward_ends_the_run(desk: Desk) -> None:
+def test_a_clock_that_is_set_forward_ends_the_run(desk: ReplayedDesk) -> None:
     desk.recorder.start()
     desk.feed(0, LEAD_IN_S + 250.0)
     now_ns = int(record().receive_ns[0]) + round((LEAD_IN_S + 270.0) * SECOND_NS)
@@ -209,7 +178,7 @@ def test_a_clock_that_is_set_forward_ends_the_run(desk: Desk) -> None:
     silence_s=st.floats(0.0, 4200.0),
 )
 def test_any_start_any_reset_and_any_silence(tmp_path_factory, start_s, reset_s, silence_s):
-    desk = Desk(tmp_path_factory.mktemp('bags'))
+    desk = ReplayedDesk(tmp_path_factory.mktemp('bags'), Ship.load(SHIP_FILE), PARAMETERS)
     start_ns = int(record().receive_ns[0])
     steps = sorted([(start_s, 'record'), (reset_s, 'reset'), (silence_s, 'silence')])
     done_s = 0.0

@@ -9,63 +9,33 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import StopMark, open_runs
-from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.messages import EventKind, OutputMessage, Source, encode, read_event
+from shipdrag_ros.messages import EventKind, Source, encode, read_event
 from shipdrag_ros.node import session
-from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
+from tests.node.desk import NODE, Desk
 from tests.recorded import Row, rows
 
 SECOND_NS = 10**9
 START_NS = 1_700_000_000 * SECOND_NS
 SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
 PARAMETERS = Parameters()
-NODE = '/coastdown_node'
 
 
-class Desk:
-    """A session with what it published."""
-
-    def __init__(self, directory: Path) -> None:
-        self.ready = True
-        monitor = Monitor(SHIP, PARAMETERS)
-        self.published: list[OutputMessage] = []
-        self.directory = directory
-        self.recorder = Recorder(
-            directory,
-            namespace='',
-            ship=SHIP,
-            parameters=PARAMETERS,
-            history_ns=monitor.history_ns,
-        )
-        self.session = Session(
-            monitor,
-            self.recorder,
-            publish=self.published.append,
-            node=NODE,
-            ready=lambda: self.ready,
-        )
+class BagDesk(Desk):
+    """A desk that is fed blocks."""
 
     def feed(self, block: Block) -> None:
-        for message in encode(block):
-            source = Source(message.topic.strip('/'), message.type)
-            self.session.receive(source, message.payload, message.log_ns)
-
-    def kinds(self) -> list[EventKind]:
-        events = [it for it in self.published if it.topic == f'{NODE}/events']
-        return [read_event(it.payload).kind for it in events]
+        self.receive(encode(block))
 
     def bags(self) -> list[list[Row]]:
-        self.session.finish()
-        return [rows(path) for path in sorted(self.directory.glob('*.mcap'))]
+        return [rows(path) for path in self.recorded()]
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
-    desk = Desk(tmp_path)
+def desk(tmp_path: Path) -> BagDesk:
+    desk = BagDesk(tmp_path, SHIP, PARAMETERS)
     desk.recorder.start()
     return desk
 
@@ -77,7 +47,9 @@ def speeds(arrival_s: list[float]) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, arrival_ns - 10**7, values, receive_ns=arrival_ns)
 
 
-def test_a_message_that_feeds_nothing_is_recorded_and_makes_no_estimate(desk: Desk) -> None:
+def test_a_message_that_feeds_nothing_is_recorded_and_makes_no_estimate(
+    desk: BagDesk,
+) -> None:
     desk.session.keep(Source('nmea', 'std_msgs/msg/String'), b'as heard', START_NS)
     (bag,) = desk.bags()
     assert [row[::3] for row in bag] == [('/nmea', b'as heard')]
@@ -85,7 +57,7 @@ def test_a_message_that_feeds_nothing_is_recorded_and_makes_no_estimate(desk: De
     assert desk.published == []
 
 
-def test_records_bytes_as_received_with_both_times(desk: Desk) -> None:
+def test_records_bytes_as_received_with_both_times(desk: BagDesk) -> None:
     block = speeds([0, 1, 2])
     desk.feed(block)
     (bag,) = desk.bags()
@@ -93,20 +65,22 @@ def test_records_bytes_as_received_with_both_times(desk: Desk) -> None:
     assert [row.log_ns for row in bag] == block.receive_ns.tolist()
 
 
-def test_a_small_step_back_of_the_clock_is_held(desk: Desk) -> None:
+def test_a_small_step_back_of_the_clock_is_held(desk: BagDesk) -> None:
     desk.feed(speeds([0, 5, 1, 6]))
     (bag,) = desk.bags()
     assert [(row.log_ns - START_NS) // SECOND_NS for row in bag] == [0, 5, 5, 6]
     assert desk.published == []
 
 
-def test_the_clock_is_watched_also_while_nothing_arrives(desk: Desk) -> None:
+def test_the_clock_is_watched_also_while_nothing_arrives(desk: BagDesk) -> None:
     desk.feed(speeds([100]))
     desk.session.watch_clock(START_NS)
     assert EventKind.CLOCK_JUMP in desk.kinds()
 
 
-def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk: Desk) -> None:
+def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(
+    desk: BagDesk,
+) -> None:
     done, said = desk.session.engine_stopped(START_NS)
     assert not done
     assert said.startswith('of no use: no speed was read yet')  # where nothing is recorded too
@@ -119,7 +93,7 @@ def test_a_stop_that_is_told_is_recorded_and_weighed_once_there_is_a_speed(desk:
     assert kinds == [EventKind.ENGINE_STOPPED] * 2
 
 
-def test_a_stop_that_is_told_before_any_input_makes_a_file(desk: Desk) -> None:
+def test_a_stop_that_is_told_before_any_input_makes_a_file(desk: BagDesk) -> None:
     desk.session.engine_stopped(START_NS)
     (bag,) = desk.bags()
     assert [(row.topic, row.log_ns) for row in bag] == [(f'{NODE}/events', START_NS)]
@@ -128,7 +102,7 @@ def test_a_stop_that_is_told_before_any_input_makes_a_file(desk: Desk) -> None:
 
 
 def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
+    desk = BagDesk(tmp_path, SHIP, PARAMETERS)
     desk.feed(speeds([0, 1]))
     desk.session.reset('asked for', START_NS + 2 * SECOND_NS)
     desk.feed(speeds([3]))
@@ -138,7 +112,7 @@ def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
     assert [(row.log_ns - START_NS) // SECOND_NS for row in bag] == [3, 4]
 
 
-def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
+def test_nothing_is_recorded_at_time_0(desk: BagDesk) -> None:
     desk.session.note(EventKind.LIFECYCLE, 'active', 0)
     assert desk.kinds() == [EventKind.LIFECYCLE]
     desk.feed(speeds([0]))
@@ -148,7 +122,9 @@ def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
 
 def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_order(tmp_path):
     arrivals = [float(k) for k in range(20)]
-    prompt, patient = Desk(tmp_path / 'prompt'), Desk(tmp_path / 'patient')
+    prompt, patient = (
+        BagDesk(tmp_path / name, SHIP, PARAMETERS) for name in ('prompt', 'patient')
+    )
     patient.ready = False
     for desk in (prompt, patient):
         desk.recorder.start()
@@ -168,7 +144,7 @@ def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_ord
     assert sorted(one) == sorted(other)
 
 
-def test_what_waits_is_bounded_by_its_size_too(desk: Desk, monkeypatch) -> None:
+def test_what_waits_is_bounded_by_its_size_too(desk: BagDesk, monkeypatch) -> None:
     monkeypatch.setattr(session, 'WAITING_BYTES', 1000)
     desk.ready = False
     desk.feed(speeds([0]))

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import estimate, estimate_final
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.simulation.hydrodynamics import friction_n
 from tests.posterior.conftest import window_of
 
 ONE = Parameters(estimator='one')
@@ -72,14 +73,9 @@ def test_the_band_holds_the_truth_of_a_log_alone_that_is_off(ship, log_factor):
 
 @pytest.mark.parametrize('factor', [0.0, 0.3], ids=['as stated', 'fouled'])
 def test_a_hull_that_differs_from_its_file_is_held(ship: Ship, factor: float) -> None:
-    from shipdrag_ros.parameter import Parameter
-    from shipdrag_ros.ship import StatedEffect
-
     fouled = replace(
         ship, effects=(StatedEffect('fouling', {'friction_factor': Parameter(factor, 0.0)}),)
     )
-    from shipdrag_ros.simulation.hydrodynamics import friction_n
-
     truth = (ship.resistance_n(SPEEDS) + factor * friction_n(ship, SPEEDS)) / ship.mass_kg
     r, sigma = at(estimate_final(window_of(fouled, seed=3), ship, ONE), SPEEDS)
     assert np.max(np.abs(r - truth) / sigma) < 3.0
@@ -92,10 +88,3 @@ def test_without_a_baseline_the_band_is_wider_and_holds(ship: Ship, found: Estim
     r, sigma = at(estimate_final(window_of(ship, seed=1), bare, ONE), SPEEDS)
     assert np.mean(sigma) > np.mean(at(found, SPEEDS)[1])
     assert np.max(np.abs(r - truth) / sigma) < 3.0
-
-
-def test_a_record_without_a_coastdown_is_refused_with_words(ship: Ship) -> None:
-    window = window_of(ship, seed=1)
-    steady = replace(window.before, before=None)  # type: ignore[type-var]
-    with pytest.raises(EstimationError, match='give'):
-        estimate_final(steady, ship, ONE)

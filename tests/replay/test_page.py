@@ -7,12 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
-from shipdrag_ros.replay.page import write_report
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.regimes.bank import OUT
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.replay.page import comparison_picture, cut_picture, write_report
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import rank
+from shipdrag_ros.replay.together import RankedHull, rank
 from tests.page import Page
 
 
@@ -102,3 +105,40 @@ def test_coastdowns_of_one_ship_are_shown_together(run: RunResult, tmp_path: Pat
 def test_a_warning_about_the_bag_is_shown(run: RunResult, tmp_path: Path) -> None:
     write_report(tmp_path / 'report.html', [replace(run, warnings=('part 2 is missing',))])
     assert 'Warning: part 2 is missing' in Page(tmp_path / 'report.html').text
+
+
+def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
+    hulls = [
+        RankedHull(f'hull {n}', 0.1, FroudeMax.INFLECTION, (), estimate.valid_curve)
+        for n in range(8)
+    ]
+    axis = comparison_picture(hulls).axes[0]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        hull.label for hull in hulls
+    ]
+    (dot,) = [line for line in axis.get_lines() if line.get_marker() == 'o'][:1]
+    assert dot.get_xdata() == [0.1]
+
+
+def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdown) -> None:
+    start_ns, end_ns = coastdown.start_ns, coastdown.end_ns
+    length_ns = end_ns - start_ns
+    cuts = tuple(
+        NotCoastdown(start_ns + round(a * length_ns), start_ns + round(b * length_ns), reason, '')
+        for a, b, reason in ((0.5, 0.8, Dismissal.THRUST), (0.9, 0.91, Dismissal.TURN))
+    )
+    share = np.array([1.0, 0.0])
+    regimes = Regimes(
+        np.array([start_ns, end_ns]),
+        np.array([8.0, 1.0]),
+        {name: 1.0 - share if name == 'gliding' else 0.0 * share for name in OUT}
+        | {'driven': share},
+        0.0,
+        0.5,
+    )
+    shown = replace(coastdown, cuts=cuts, regimes=regimes)
+    axis, strip = cut_picture(shown, None, 2e7).axes
+    assert [text.get_text() for text in axis.texts] == [cuts[0].reason.value]
+    assert len(axis.patches) == len(cuts)
+    assert axis.get_xlim() == pytest.approx((0.0, length_ns * 1e-9))
+    assert [text.get_text() for text in strip.get_legend().get_texts()] == ['driven', 'gliding']

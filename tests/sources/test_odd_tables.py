@@ -153,13 +153,6 @@ def test_a_title_with_empty_cells_behind_it(tmp_path: Path) -> None:
     assert len(block) == 20
 
 
-def test_utf_16_is_named(tmp_path: Path) -> None:
-    path = tmp_path / 'log.csv'
-    path.write_text('time,STW [kn]\n0,10\n1,10\n', encoding='utf-16')
-    with pytest.raises(ImportDataError, match='is in UTF-16; save it as UTF-8'):
-        read_any([path])
-
-
 @pytest.mark.parametrize('cell', ['2018-03-02 12:00:00' + ' ' * 60_000 + 'x', '1' * 100_000 + 'x'])
 def test_a_long_cell_takes_no_long_time(tmp_path: Path, cell: str) -> None:
     path = tmp_path / 'log.csv'

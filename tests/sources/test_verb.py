@@ -86,13 +86,6 @@ def test_the_words_tell_what_was_left_out(table: Path, tmp_path, capsys) -> None
     assert "speed_through_water: 1 rejected, not a number: line 2402: 'fast'" in captured
 
 
-def test_times_that_go_back_are_told(table: Path, tmp_path, capsys) -> None:
-    line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
-    assert main([*line, '--map', 'speed_through_water=v:kn']) == 0
-    # the last of run b is as late as the last of run a
-    assert '1199 rows are stamped before an earlier one' in capsys.readouterr().out
-
-
 def test_what_follows_a_clock_that_was_set_back_has_times_of_its_own(tmp_path: Path) -> None:
     stamps = [*range(8000, 8400), 8399.5, *range(1200, 2400), *range(1000, 1100)]
     rows = [f'{t},{6.0 + 0.01 * (i % 7)}' for i, t in enumerate(stamps)]
@@ -111,11 +104,7 @@ def test_what_follows_a_clock_that_was_set_back_has_times_of_its_own(tmp_path: P
 @pytest.mark.parametrize(
     ('arguments', 'status', 'said'),
     [
-        (('--map', 'speed=v', '--time', 't'), 1, "ERROR: --map 'speed=v': no input 'speed'"),
-        (('--map', 'depth=v:furlong', '--time', 't'), 1, "no unit 'furlong'"),
-        (('--map', 'depth=z', '--time', 't'), 1, "'z'"),
         (('--map', 'depth=v', '--time', 't:year'), 2, "no unit 'year'"),
-        (('--map', 'depth=v', '--time', 't', '--where', 'run=c'), 1, 'chooses none of them'),
         (('--map', 'depth=v', '--time', 't', '--ship', 'no.yaml'), 1, 'no.yaml: 1 problem'),
         (('--map', 'depth=v', '--time', 't', '--rate', '1'), 2, 'not allowed with'),
         (('--map', 'depth=v', '--rate', '0'), 2, 'expected a number above 0'),

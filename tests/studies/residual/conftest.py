@@ -11,6 +11,22 @@ import pytest
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import Hulls
 
+RIVER_SHIP = """
+name: River ship
+length_m: 130.0
+breadth_m: 16.5
+draught_m: 4.1
+displaced_volume_m3: 7370.0
+wetted_surface_m2: 2900.0
+added_mass: {model: constant, value: 0.05, sd: 0.02}
+baseline:
+  source: estimate
+  form_factor: 0.20
+  correlation_allowance: 3.0e-4
+  wave_froude: [0.0, 0.12, 0.22]
+  wave_coefficient: [0.0, 5.0e-5, 8.0e-4]
+  relative_sd: {friction: 0.02, wave: 0.10}
+"""
 NAMES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 
 

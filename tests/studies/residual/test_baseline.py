@@ -14,28 +14,12 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.residual.fit import Hulls, ResidualFit, fit_residual
-
-SHIP = """
-name: River ship
-length_m: 130.0
-breadth_m: 16.5
-draught_m: 4.1
-displaced_volume_m3: 7370.0
-wetted_surface_m2: 2900.0
-added_mass: {model: constant, value: 0.05, sd: 0.02}
-baseline:
-  source: estimate
-  form_factor: 0.20
-  correlation_allowance: 3.0e-4
-  wave_froude: [0.0, 0.12, 0.22]
-  wave_coefficient: [0.0, 5.0e-5, 8.0e-4]
-  relative_sd: {friction: 0.02, wave: 0.10}
-"""
+from tests.studies.residual.conftest import RIVER_SHIP
 
 
 @pytest.fixture
 def ship() -> Ship:
-    return Ship.from_yaml(SHIP, subject='ship')
+    return Ship.from_yaml(RIVER_SHIP, subject='ship')
 
 
 @pytest.fixture

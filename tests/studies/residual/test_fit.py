@@ -3,16 +3,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import stats
 
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import FORMS, Hulls, fit_residual, leave_hulls_out
+from shipdrag_ros.studies.residual.fit import (
+    FORMS,
+    Hulls,
+    RegressionForm,
+    fit_form,
+    fit_residual,
+    leave_hulls_out,
+)
 
 Fleet = Callable[[int, int], Hulls]
 Resistance = Callable[[Hulls], Float64]
@@ -190,3 +201,123 @@ def test_notes_say_what_is_doubtful(fleet: Fleet, resistance: Resistance) -> Non
         '240 row(s) state C_B and slenderness'
         in fit_residual(odd, resistance(hulls), form='sirotina').notes[-1]
     )
+
+
+def hull() -> Hulls:
+    names = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
+    return Hulls.of('one', names, np.array([[8.0, 4.5, 0.85, 0.01, 0.13]]))
+
+
+def test_sakhnovsky() -> None:
+    x1, x2, x3, x4, x5 = 8.0, 4.5, 0.85, 0.13, 0.01
+    x6 = (8.0**2 * 4.5 / 0.85) ** (1 / 3)
+    expected = [
+        1.0, x1, x2 * x3, x3, x4, x5, x1 * x1, x2**2 * x3**2 * x5**2, x3**2 * x6**2,
+        x4**2, x5**2, x6, x6**2, x3 * x4, x2**2 * x6**2,
+    ]  # fmt: skip
+    form = FORMS['sakhnovsky']
+    np.testing.assert_allclose(form.columns(hull())[0], expected, rtol=1e-13)
+    assert form.needs_lcb
+    assert form.froude_max == 0.14
+
+
+def test_sirotina() -> None:
+    # Fr_V = v / sqrt(g V^(1/3)), here of a ship of 100 m
+    slenderness = (8.0**2 * 4.5 / 0.85) ** (1 / 3)
+    speed = 0.13 * np.sqrt(9.81 * 100.0)
+    x1 = speed / np.sqrt(9.81 * 100.0 / slenderness)
+    x2, x3, x4 = 8.0 - 7.88, 2.0 * (4.5 - 4.21), 10.0 * (0.85 - 0.819)
+    expected = [
+        1.0, x1, x2, x3, x4, x1 * x1, x1 * x2, x1 * x3, x1 * x4, x2 * x2, x2 * x3, x2 * x4,
+        x3 * x3, x3 * x4, x4 * x4,
+    ]  # fmt: skip
+    form = FORMS['sirotina']
+    np.testing.assert_allclose(form.columns(hull())[0], expected, rtol=1e-12)
+    assert not form.needs_lcb
+    np.testing.assert_array_equal(form.place(hull()), [[8.0, 4.5, 0.85, 0.13]])
+
+
+@pytest.mark.parametrize('form', FORMS.values(), ids=lambda form: form.name)
+def test_terms_in_words_are_the_columns(form: RegressionForm) -> None:
+    values = {'L_B': 6.5, 'B_T': 3.1, 'C_B': 0.7, 'Fr': 0.13, 'lcb': 0.02, 'psi': 5.6}
+    one = {name: np.array([value]) for name, value in values.items()}
+    hulls = Hulls(one['L_B'], one['B_T'], one['C_B'], one['psi'], one['Fr'], one['lcb'])
+    known = {**values, 'Fr_V': values['Fr'] * values['psi'] ** 0.5}
+
+    def worth(term: str) -> float:
+        text = term.replace('L/B', 'L_B').replace('B/T', 'B_T').replace(' - ', '-')
+        return float(eval(text.replace(' ', '*').replace('²', '**2'), {}, known))
+
+    np.testing.assert_allclose([worth(term) for term in form.terms], form.columns(hulls)[0])
+
+
+ROW = np.array([[8.18, 4.0, 0.851, 0.15]])
+NAMES = ('L_B', 'B_T', 'C_B', 'Fr')
+
+
+def test_the_missing_ratio_follows() -> None:
+    hulls = Hulls.of('one', NAMES, ROW)
+    np.testing.assert_allclose(hulls.slenderness, [(8.18**2 * 4.0 / 0.851) ** (1 / 3)], rtol=1e-14)
+    assert hulls.lcb is None
+    slender = np.column_stack([ROW[:, :2], hulls.slenderness, ROW[:, 3:]])
+    back = Hulls.of('one', ('L_B', 'B_T', 'slenderness', 'Fr'), slender)
+    np.testing.assert_allclose(back.C_B, [0.851], rtol=1e-14)
+
+
+def test_contradictions_are_counted() -> None:
+    names = (*NAMES, 'slenderness')
+    rows = np.array([[8.18, 4.0, 0.851, 0.15, 6.80], [8.18, 4.0, 0.851, 0.15, 6.0]])
+    assert Hulls.of('two', names, rows).contradictions == 1
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(5.0, 10.0), st.floats(2.0, 8.0), st.floats(0.5, 0.9), st.floats(0.8, 1.25))
+def test_moves_keep_the_ratios_consistent(l_b: float, b_t: float, c_b: float, by: float) -> None:
+    hulls = Hulls.of('one', NAMES, np.array([[l_b, b_t, c_b, 0.15]]))
+    for moved in (hulls.longer(by), hulls.flatter(by), hulls.faster(by)):
+        volume_ratio = moved.L_B**2 * moved.B_T / moved.C_B
+        np.testing.assert_allclose(moved.slenderness**3, volume_ratio, rtol=1e-12)
+        np.testing.assert_array_equal(moved.C_B, hulls.C_B)
+    assert hulls.longer(by).B_T == hulls.B_T
+    assert hulls.flatter(by).slenderness == hulls.slenderness
+    np.testing.assert_allclose(hulls.flatter(by).B_T, b_t * by)
+    np.testing.assert_allclose(hulls.faster(by).Fr, 0.15 * by)
+    np.testing.assert_array_equal(hulls.at(np.array([0.1, 0.2])).L_B, [l_b, l_b])
+
+
+def test_rows_of_one_hull_belong_together(fleet: Callable[[int, int], Hulls]) -> None:
+    hulls = fleet(5, 1)
+    groups = hulls.groups()
+    assert sorted(np.bincount(groups)) == [8] * 5
+    assert len(hulls.take(groups == 2)) == 8
+    assert np.ptp(hulls.take(groups == 2).L_B) == 0.0
+
+
+FOLDER = os.environ.get('SHIPDRAG_DATA')
+
+
+@pytest.mark.skipif(FOLDER is None, reason='SHIPDRAG_DATA is not set')
+@pytest.mark.parametrize('form', list(FORMS))
+def test_what_passes_is_better_than_what_is_refused(form: str) -> None:
+    """
+    22 hulls up to Fr 0.3, each predicted from the others: the worst errors are refused, and what
+    passes lies within 3 sd.
+    """
+    data = np.loadtxt(Path(str(FOLDER)) / 'yacht_hydrodynamics.data', delimiter='\t', skiprows=1)
+    lcb, _, slenderness, b_t, l_b, froude, measured = data[data[:, 5] < 0.301].T
+    columns = np.column_stack([l_b, b_t, slenderness, froude, lcb / 100.0])
+    hulls = Hulls.of('yachts', ('L_B', 'B_T', 'slenderness', 'Fr', 'lcb'), columns)
+    groups = hulls.groups()
+    assert groups.max() == 21
+    error, sd = np.zeros(len(measured)), np.zeros(len(measured))
+    passed = np.zeros(len(measured), bool)
+    for group in range(22):
+        out = groups == group
+        said = fit_form(FORMS[form], hulls.take(~out), measured[~out]).predict(hulls.take(out))
+        error[out] = [each.value for each in said] - measured[out]
+        sd[out] = [each.sd for each in said]
+        passed[out] = [each.inside for each in said]
+    assert 10 < passed.sum() < 100
+    assert np.sqrt(np.mean(error[passed] ** 2)) < np.sqrt(np.mean(error[~passed] ** 2))
+    assert np.abs(error[passed]).max() < 0.5 * np.abs(error[~passed]).max()
+    assert np.all(np.abs(error[passed]) < 3.0 * sd[passed])

@@ -11,21 +11,7 @@ import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.ship import Ship
-
-SHIP = """
-length_m: 130.0
-breadth_m: 16.5
-draught_m: 4.1
-displaced_volume_m3: 7370.0
-wetted_surface_m2: 2900.0
-added_mass: {model: constant, value: 0.05, sd: 0.02}
-baseline:
-  form_factor: 0.2
-  correlation_allowance: 3.0e-4
-  wave_froude: [0.0, 0.22]
-  wave_coefficient: [0.0, 8.0e-4]
-  relative_sd: {friction: 0.02, wave: 0.10}
-"""
+from tests.studies.residual.conftest import RIVER_SHIP
 
 
 @pytest.fixture
@@ -85,7 +71,7 @@ def test_each_form(form: str, table: Path, capsys: pytest.CaptureFixture[str]) -
 
 def test_writes_a_ship_file_or_refuses(table: Path, tmp_path, capsys) -> None:
     ship, out = tmp_path / 'ship.yaml', tmp_path / 'out.yaml'
-    ship.write_text(SHIP)
+    ship.write_text(RIVER_SHIP)
     assert fit(table, '--ship', str(ship), '--write', str(out)) == 0
     assert Ship.load(out).baseline != Ship.load(ship).baseline
     # her table begins above rest, and she can be simulated all the same
@@ -93,7 +79,7 @@ def test_writes_a_ship_file_or_refuses(table: Path, tmp_path, capsys) -> None:
     line = ['simulate', '--ship', str(out), '-o', bag, '--speed', speed, '--duration', '60']
     assert main(line) == 0
     wide = tmp_path / 'wide.yaml'
-    wide.write_text(SHIP.replace('16.5', '30.0').replace('4.1', '2.5'))
+    wide.write_text(RIVER_SHIP.replace('16.5', '30.0').replace('4.1', '2.5'))
     capsys.readouterr()
     refused = tmp_path / 'refused.yaml'
     assert fit(table, '--ship', str(wide), '--write', str(refused)) == 1

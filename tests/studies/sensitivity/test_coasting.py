@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
+from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting as words
 from tests.runs import CARGO
+from tests.runs import CARGO as SHIP
 
 CONFIG = Path(__file__).resolve().parents[3] / 'config'
 
@@ -111,3 +113,72 @@ def test_a_table_of_resistance_and_a_ship_without_sd():
     coasted = study_coast(ship, coast_from(ship))
     assert {'baseline.resistance_n', 'displaced_volume_m3'} <= set(coasted.selection.kept)
     assert all(np.isnan(one.tolerable) for one in coasted.importance)
+
+
+def mimics_of(ship: Ship):
+    return {mimic.effect.name: mimic for mimic in study_coast(ship, coast_from(ship)).mimics}
+
+
+def test_more_friction_is_fouling_where_nothing_else_is_viscous():
+    bare = replace(CARGO.baseline, correlation_allowance=0.0)
+    fouling = mimics_of(replace(CARGO, baseline=bare))['fouling']
+    # as friction is nearly all there is, more of it is also less mass
+    signs = {'baseline.C_V': 1.0, 'wetted_surface_m2': 1.0, 'displaced_volume_m3': -1.0}
+    assert fouling.size == 0.25
+    # linear about 0, where 25 per cent is large
+    assert signs[fouling.particular.key] * fouling.error == pytest.approx(0.21, abs=0.05)
+    assert fouling.left < 0.02
+
+
+def test_a_speed_that_is_not_known_explains_nothing_twice_and_errors_stay_in_what_may_be(coasted):
+    # a log that is off and a place that is off leave what the rest of the record shows
+    found = {mimic.effect.name: mimic for mimic in coasted.mimics}
+    assert found['log_offset'].distance > 1.0
+    assert found['log_offset'].left > 0.9
+    assert max(abs(mimic.error) for mimic in found.values()) == WORST
+    assert abs(found['locked_propeller'].error) == WORST
+
+
+def test_effects_that_cannot_act_or_move_nothing_are_left_out():
+    found = mimics_of(replace(CARGO, propeller=None, propulsion=Propulsion(8.0)))
+    assert {'locked_propeller', 'windmilling_propeller'}.isdisjoint(found)
+    # she never goes as slowly as a log's dead band begins
+    assert 'log_dead_band' in LIBRARY
+    assert 'log_dead_band' not in found
+    for mimic in found.values():
+        assert np.isfinite([mimic.distance, mimic.error, mimic.left]).all()
+
+
+@pytest.fixture(scope='module')
+def found():
+    return study_coast(SHIP, coast_from(SHIP, 8.2))
+
+
+def test_words_hold_the_figures(found):
+    assert 'matter most are displaced_volume_m3, wetted_surface_m2, baseline.C_V' in (
+        words.sentence(found)
+    )
+    seen = ' '.join(words.notes(found))
+    assert 'from 8.20 m/s' in seen
+    assert f'off by {found.check.speed_m_s:.3f} m/s' in seen
+    assert 'fouling like' in seen
+    assert 'log_scale like' not in seen
+    assert 'leaves the table of the baseline' in seen
+
+
+def test_a_row_a_value_with_dashes_where_nothing_is_known(found):
+    table = words.loss_table(found)
+    rows = {row[0]: row for row in table.rows}
+    assert list(rows) == [*found.selection.kept, *found.selection.dropped]
+    assert all(len(row) == len(table.columns) for row in table.rows)
+    assert rows['length_m'][2] == rows['length_m'][6] == '-'
+    assert rows['baseline.C_V'][1:3] == ('-', '2.0%')
+    assert rows['air.drag_coefficient'][-2] == 'over 50%'
+
+
+def test_a_row_an_effect(found):
+    table = words.mimic_table(found)
+    assert [row[0] for row in table.rows] == [mimic.effect.name for mimic in found.mimics]
+    row = next(row for row in table.rows if row[0] == 'locked_propeller')
+    assert row[4] == 'at least -50%'
+    assert next(row for row in table.rows if row[0] == 'current')[1] == '0.4 m/s'

@@ -9,6 +9,8 @@ import pytest
 from shipdrag_ros.errors import SensitivityError
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import Manoeuvre, steer, turn, zigzag
+from shipdrag_ros.studies.sensitivity.face import coasting, steering
+from shipdrag_ros.studies.sensitivity.face import steering as words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     DESIGN,
@@ -121,3 +123,86 @@ def test_which_manoeuvre_shows_which_derivative():
     # a steady circle is a handful of numbers, from which forty cannot be told
     assert np.median(single[:, 2]) < 1e-3 < np.median(single[:, 1])
     assert np.median(shown.partial_contribution_together) > np.median(single[:, 1])
+
+
+def names(labels) -> list[str]:
+    return [label.get_text() for label in labels]
+
+
+def test_bars_of_kept_and_dropped_derivatives(steered):
+    axis = steering.ranking_picture(steered).axes[0]
+    shown = [label.split()[-1] for label in names(axis.get_yticklabels())]
+    assert shown == list(steered.losses.ranking)
+    assert names(axis.get_yticklabels())[0] == 'yaw moment by rudder  Nd'
+    kept, dropped = axis.containers
+    assert (len(kept), len(dropped)) == (24, 16)
+    assert kept[0].get_width() == pytest.approx(float(np.max(steered.losses.mean)))
+
+
+def test_three_models_in_four_panels(steered):
+    figure = steering.check_picture(steered)
+    assert [len(axis.lines) for axis in figure.axes] == [3, 3, 3, 3]
+    legend = names(figure.legends[0].get_texts())
+    assert legend == ['full', '24 derivatives kept', '18 measurements kept']
+    full = figure.axes[0].lines[0].get_ydata()
+    np.testing.assert_array_equal(full, np.degrees(steered.check.full.heading_rad))
+
+
+def test_a_map_with_a_dot_at_the_best_manoeuvre():
+    shown = experiment(mariner(), (zigzag(10.0), turn(35.0)))
+    axis = steering.design_picture(shown).axes[0]
+    assert names(axis.get_yticklabels()) == ['zigzag:10', 'turn:35']
+    dots = axis.lines[0].get_ydata()
+    assert [shown.manoeuvres[int(i)] for i in dots] == list(shown.best)
+
+
+def test_bars_of_values_and_of_effects(coasted):
+    axis = coasting.particulars_picture(coasted).axes[0]
+    order = [*coasted.selection.kept, *coasted.selection.dropped]
+    assert names(axis.get_yticklabels()) == order
+    wide = {bar.get_y(): bar.get_width() for bar in axis.containers[0]}
+    assert wide[max(wide)] == max(wide.values())
+    axis = coasting.mimic_picture(coasted).axes[0]
+    assert names(axis.get_yticklabels()) == [mimic.effect.name for mimic in coasted.mimics]
+    assert axis.texts[0].get_text().startswith(coasted.mimics[0].particular.key)
+
+
+def test_words_hold_the_figures(steered):
+    assert 'of 40 derivatives 24' in words.sentence(steered)
+    seen = ' '.join(words.notes(steered))
+    assert '50 % costs 5.00 times 10 %' in seen
+    assert 'it keeps the same 24' in seen
+    assert '26 measurements: the 24 kept hold 18' in seen
+    assert '5 of the dropped ones follow from a kept one' in seen
+    assert 'the same 18 are 29 derivatives' in seen
+    assert 'not quite the same' in ' '.join(words.notes(study(SHIP, zigzag(15.0), keep=12)))
+
+
+def test_losses_are_in_the_order_of_what_is_kept(steered):
+    table = words.loss_table(steered)
+    assert [row[0] for row in table.rows] == list(steered.losses.ranking)
+    assert [row[-2] for row in table.rows] == ['yes'] * 24 + ['no'] * 16
+    row = next(row for row in table.rows if row[0] == 'Nud')
+    assert row[-1] == 'Nd'
+    i = steered.losses.names.index('Nud')
+    assert float(row[1]) == pytest.approx(1e3 * steered.losses.table[i, 0], abs=1e-3)
+
+
+def test_the_check_has_a_row_a_model_even_where_one_does_not_turn(steered):
+    full, kept, by_group = words.check_table(steered).rows
+    assert full[:5] == ('full', '40', '26', '8.85', '7.01')
+    assert kept[:3] == ('kept', '24', '18')
+    assert by_group[:3] == ('kept by measurement', '29', '18')
+    assert float(by_group[-1]) < float(kept[-1])
+    lone = words.check_table(study(SHIP, zigzag(15.0), keep=1)).rows[1]
+    assert len(lone) == len(full)
+
+
+def test_the_design_names_the_best_manoeuvre_of_each():
+    shown = experiment(SHIP, (zigzag(10.0), turn(35.0)))
+    table = words.design_table(shown)
+    assert table.columns[1:3] == ('zigzag:10', 'turn:35')
+    for row in table.rows:
+        larger = 'zigzag:10' if float(row[1]) > float(row[2]) else 'turn:35'
+        if row[1] != row[2]:
+            assert row[3] == larger

@@ -3,13 +3,24 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import stats
+from scipy.spatial import Delaunay
 
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.surface.fit import fit_surface
+from shipdrag_ros.studies.surface.fit import (
+    Domain,
+    Polynomial,
+    fit_surface,
+    monomials,
+    terms_up_to,
+)
 
 ANGLES = ('alpha', 'beta')
 
@@ -114,3 +125,98 @@ def test_the_search_ends_where_the_data_do() -> None:
     round_about = np.column_stack([np.cos(circle), 0.5 + np.sin(circle)])
     with pytest.raises(DataError, match=r'follow from each other.* 5 of the 6 terms'):
         fit_surface(round_about, circle, inputs=ANGLES)
+
+
+@pytest.mark.parametrize('variables', [2, 3, 4])
+def test_agrees_with_a_triangulation(variables: int) -> None:
+    rng = np.random.default_rng(variables)
+    data, asked = rng.normal(size=(30, variables)), 1.5 * rng.normal(size=(300, variables))
+    names = [f'x{i}' for i in range(variables)]
+    inside = Delaunay(data).find_simplex(asked) >= 0
+    domain = Domain.of(names, data)
+    assert 10 < inside.sum() < 290
+    np.testing.assert_array_equal(domain.distance(asked) == 0.0, inside)
+    assert [not told for told in domain.reasons(asked)] == inside.tolist()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 5), st.integers(2, 12), st.integers(0, 10**6))
+def test_means_of_data_are_inside_however_flat_they_lie(variables, count, seed):
+    rng = np.random.default_rng(seed)
+    # all on a line, at sizes apart by orders
+    data = np.outer(rng.normal(size=count), rng.normal(size=variables)) * 10.0 ** np.arange(
+        variables
+    )
+    domain = Domain.of([f'x{i}' for i in range(variables)], data)
+    weights = rng.dirichlet(np.ones(count), size=5)
+    assert domain.reasons(np.vstack([weights @ data, data])) == [[]] * (5 + count)
+
+
+def test_says_what_is_outside() -> None:
+    domain = Domain.of(('a', 'b'), np.array([[0.0, 0.0], [1.0, 10.0], [0.5, 5.0]]))
+    assert domain.ranges == {'a': [0.0, 1.0], 'b': [0.0, 10.0]}
+    ((far,), (between,)) = domain.reasons(np.array([[2.0, 5.0], [0.2, 8.0]]))
+    assert far == 'a 2 is outside 0..1 of the data'
+    assert 'outside their convex hull by 0.42 of their range' in between
+    np.testing.assert_allclose(
+        domain.distance(np.array([[0.2, 8.0]])), [0.6 / np.sqrt(2.0)], rtol=1e-5
+    )
+    line = Domain.of(('x',), np.array([[0.0], [1.0]]))
+    np.testing.assert_allclose(line.distance(np.array([[3.0], [-0.5]])), [2.0, 0.5], rtol=1e-5)
+
+
+def some(variables: int, degree: int, seed: int) -> tuple[Polynomial, np.ndarray]:
+    """A polynomial with random coefficients, and points around its centre."""
+    rng = np.random.default_rng(seed)
+    powers = terms_up_to(degree, [degree] * variables)
+    centre, half = rng.uniform(-3.0, 3.0, variables), rng.uniform(0.5, 4.0, variables)
+    points = centre + half * rng.uniform(-1.0, 1.0, (7, variables))
+    return Polynomial(powers, rng.normal(size=len(powers)), centre, half), points
+
+
+def test_terms() -> None:
+    expected = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]]
+    assert terms_up_to(2, [2, 2]).tolist() == expected
+    assert len(terms_up_to(4, [9, 9, 9])) == comb(4 + 3, 3)
+    assert terms_up_to(4, [4, 1])[:, 1].max() == 1
+    # the terms of a lower degree come first: degrees are nested
+    assert terms_up_to(5, [5, 5])[:15].tolist() == terms_up_to(4, [4, 4]).tolist()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 4), st.integers(0, 5), st.integers(0, 10**6))
+def test_derivatives_raw_powers_and_source(variables: int, degree: int, seed: int) -> None:
+    polynomial, points = some(variables, degree, seed)
+    value = polynomial(points)
+    size = np.abs(polynomial.coefficients).sum()
+    step = 1e-5 * polynomial.half
+    for j in range(variables):
+        along = np.zeros(variables)
+        along[j] = step[j]
+        slope = (polynomial(points + along) - polynomial(points - along)) / (2.0 * step[j])
+        np.testing.assert_allclose(
+            polynomial.gradient(points)[:, j], slope, atol=1e-8 * size / polynomial.half[j]
+        )
+        np.testing.assert_allclose(
+            polynomial.derivative(j)(points),
+            polynomial.gradient(points)[:, j],
+            atol=1e-12 * size / polynomial.half[j],
+        )
+    raw = polynomial.raw() @ polynomial.coefficients
+    terms = monomials(points, polynomial.powers) * raw
+    # raw powers cancel: hence the scaling inside
+    np.testing.assert_allclose(terms.sum(axis=1), value, atol=1e-12 * np.abs(terms).sum())
+    names = [f'x{i}' for i in range(variables)]
+    space: dict[str, object] = {}
+    exec(polynomial.source('c', names, 'Note.'), space)
+    call = space['c']
+    assert callable(call)
+    assert call.__doc__ == 'Note.'
+    np.testing.assert_allclose(call(*points.T), value, atol=1e-13 * size)
+    np.testing.assert_allclose(call(*points[0].tolist()), value[0], atol=1e-13 * size)
+
+
+def test_keeps_its_digits_far_from_zero() -> None:
+    powers = terms_up_to(6, [6])
+    polynomial = Polynomial(powers, np.ones(7), np.array([1e6]), np.array([1.0]))
+    assert polynomial(np.array([[1e6 + 1.0]]))[0] == pytest.approx(7.0, abs=1e-12)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""After a coastdown the node says what is missing in the model, and goes on meanwhile."""
+"""Compiling in a thread, while the node hears and answers."""
 
 from __future__ import annotations
 
 import json
 import sys
+import threading
 import time
 from dataclasses import replace
 from functools import cache
@@ -21,7 +22,15 @@ from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import types
-from shipdrag_ros.node.background import Diagnosing, DiagnosisState, DiagnosisStatus
+from shipdrag_ros.node import background as compiling_module
+from shipdrag_ros.node.background import (
+    COMPILER,
+    Compiling,
+    Diagnosing,
+    DiagnosisState,
+    DiagnosisStatus,
+    leave_if_compiling,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import Block, Channel
@@ -30,6 +39,26 @@ from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, 
 from shipdrag_ros.simulation.effects import parse
 from tests.node.conftest import values
 from tests.recorded import rows
+
+
+def test_compiling_is_never_waited_for_and_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    go_on = threading.Event()  # or it may be over before it is looked at
+    monkeypatch.setattr(compiling_module, 'warm', lambda parameters: go_on.wait(240.0))
+    compiling = Compiling(Parameters())
+    assert not compiling.done()
+    assert compiling.seconds == 0.0
+    compiling.begin()
+    compiling.begin()  # once only
+    running = [thread for thread in threading.enumerate() if thread.name == COMPILER]
+    assert [thread.daemon for thread in running] == [True]  # or the process could not end
+    assert not compiling.done()
+    go_on.set()
+    running[0].join(240.0)
+    assert compiling.done()
+    assert compiling.failure == ''
+    assert compiling.seconds > 0.0
+    leave_if_compiling(1)  # and goes on, as nothing compiles
+
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 LEAD_IN_S, COAST_S = 660.0, 660.0

@@ -13,10 +13,13 @@ import pytest
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.steady import weighted_white_sd
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.priors import CURRENT
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.scenario import GaussMarkov
+from tests.runs import CARGO as SHIP
 
 START_NS = 1_700_000_000_123_456_789
 END_NS = START_NS + 1500 * 10**9
@@ -28,6 +31,10 @@ both = pytest.mark.parametrize('estimator', [estimate, estimate_final])
 
 def window(block: Block, end_ns: int = END_NS) -> Window:
     return Window.from_block(block, START_NS, end_ns)
+
+
+def cut(block: Block) -> Window:
+    return Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
 
 
 def only(block: Block, *channels: Channel) -> Block:
@@ -64,6 +71,11 @@ def error(found: Estimate, coast: Any, ship: Ship) -> Float64:
     truth = coast.resistance(speed, ship)
     result: Float64 = (r - truth) / coast.resistance(8.2, ship)
     return result
+
+
+def away_from(found: Estimate, coast, ship: Ship) -> Float64:
+    curve = found.valid_curve
+    return curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
 
 
 def rmse(found: Estimate, coast: Any, ship: Ship) -> float:
@@ -234,3 +246,193 @@ def test_what_holds_no_coastdown_is_refused(coast: Any, ship: Ship, estimator: E
     bad = changed(block, Channel.POSITION, lambda t, x: np.where(t[:, None] > 1490.0, np.nan, x))
     with pytest.raises(EstimationError, match=r'value\(s\) are not finite'):
         estimator(window(bad), ship, Parameters())
+
+
+DRAG_1_M = 3e-4  # v' = -DRAG v^2
+
+
+@pytest.mark.parametrize('track', ['circle', 'still', 'none'])
+def test_a_track_of_something_else_costs_no_figure(track: str) -> None:
+    rng = np.random.default_rng(0)
+    time_s = np.arange(900.0)
+    stamps = (time_s * 1e9).astype(np.int64) + 10**15
+    speed = 1.0 / (1.0 / 8.2 + DRAG_1_M * time_s) + rng.normal(0.0, 0.05, 900)
+    blocks = [Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed)]
+    if track != 'none':
+        place = rng.normal(0.0, 1e-3, (900, 2))
+        if track == 'circle':
+            place += 5e3 * np.c_[np.cos(time_s / 50.0), np.sin(time_s / 50.0)]
+        blocks.append(Block.of(Channel.POSITION, stamps, place))
+    window = cut(in_arrival_order(blocks))
+    found = estimate_final(window, SHIP, Parameters())
+    curve = found.valid_curve
+    r = np.interp(5.0, curve.speed_m_s, curve.resistance_m_s2)
+    sigma = np.interp(5.0, curve.speed_m_s, curve.sigma_m_s2)
+    expected = (1.0 + float(SHIP.n_r(5.0))) * DRAG_1_M * 25.0
+    assert abs(r - expected) < 3.0 * sigma < 0.3 * expected
+
+
+@pytest.mark.parametrize('size', [1e303, 1e150, 1e12])
+@pytest.mark.parametrize('estimator', ['one', 's1_position'])
+def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> None:
+    time_s = np.arange(900.0)
+    stamps = (time_s * 1e9).astype(np.int64) + 10**15
+    speed = 1.0 / (1.0 / 8.2 + DRAG_1_M * time_s)
+    speed += np.random.default_rng(0).normal(0.0, 0.05, 900)
+    place = size + np.c_[size * time_s / 900.0, 0.0 * time_s]
+    log = Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed)
+    track = Block.of(Channel.POSITION, stamps, place)
+    alone = cut(track)
+    with pytest.raises(EstimationError, match='no ship has'):
+        estimate_final(alone, SHIP, Parameters(estimator=estimator))
+    if estimator == 'one':
+        both = in_arrival_order([log, track])
+        window = cut(both)
+        found = estimate_final(window, SHIP, Parameters())
+        assert found.samples == {'speed_through_water': 900}
+
+
+def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None:
+    # N = 20, seeds 0..19: the share of the range inside +-2 sigma is 0.84 (0.5 if not widened)
+    covered, said = [], 0
+    for seed in range(20):
+        block = coast.block(500, seed=seed)
+        rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
+        time_s = (block.stamp_ns[rows] - block.stamp_ns[0]) * 1e-9
+        block.value[rows, 0] += GaussMarkov(0.05, 60.0).sample(time_s, np.random.default_rng(seed))
+        found = estimate_final(cut(block), ship, Parameters())
+        away = away_from(found, coast, ship)
+        covered.append(np.mean(np.abs(away) <= 2.0 * found.valid_curve.sigma_repeatable_m_s2))
+        said += any('slow disturbances learnt' in note for note in found.notes)
+    assert said >= 18
+    assert np.mean(covered) > 0.7
+
+
+def test_quadratic_drag_is_found_without_noise(coast, ship) -> None:
+    found = estimate_final(
+        cut(coast.block(500, speed_sigma=0.0, position_sigma=0.0)), ship, Parameters()
+    )
+    largest = float(found.curve.resistance_m_s2.max())
+    # filter, scale and offset of the log stay open: 1 % at the top
+    assert np.abs(away_from(found, coast, ship)).max() < 0.015 * largest
+    assert found.estimator == 'one'
+    assert found.order is None
+
+
+def test_a_first_reading_that_is_wrong_is_not_followed(coast, ship) -> None:
+    # N = 20, seeds 0..19; five of a hundred are wrong, the first among them, which powers of the
+    # speed could run up to: 2.2 % measured, 1.5 % without, over 100 % if the first is followed
+    largest = float(coast.resistance(np.array(coast.speed_m_s), ship))
+    squares = []
+    for seed in range(20):
+        block = coast.block(100, seed=seed)
+        rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
+        block.value[rows[::20], 0] += 2.4
+        found = estimate_final(cut(block), ship, Parameters())
+        squares.append(np.mean(away_from(found, coast, ship) ** 2))
+    assert np.sqrt(np.mean(squares)) < 0.03 * largest
+
+
+def test_a_late_onset_is_found_with_all_families(coast, ship) -> None:
+    # the window_with starts 8 s before the stop: the averaging must settle on the onset
+    for seed in range(4):
+        block = coast.block(500, seed=seed)
+        rng = np.random.default_rng(100 + seed)
+        steady_s = np.arange(-900.0, 0.0, 3.0)
+        both = in_arrival_order(
+            [
+                Block.of(
+                    Channel.SPEED_THROUGH_WATER,
+                    block.stamp_ns[0] + np.round(steady_s * 1e9).astype(np.int64),
+                    coast.speed_m_s + 0.05 * rng.normal(size=len(steady_s)),
+                ),
+                block[block.channel == Channel.SPEED_THROUGH_WATER],
+            ]
+        )
+        start_ns = int(block.stamp_ns[0]) - 8_000_000_000
+        late = Window.from_block(
+            both, start_ns, int(block.stamp_ns[-1]), before_ns=int(both.stamp_ns[0])
+        )
+        found = estimate_final(late, ship, Parameters())
+        away = away_from(found, coast, ship)
+        largest = float(found.curve.resistance_m_s2.max())
+        assert np.sqrt(np.mean(away**2)) < 0.03 * largest
+
+
+LAG_S, LEAD_S, PACE_S = 6.0, 1000.0, 1.0
+
+
+def filtered_and_wandering(coast, seed: int) -> Block:
+    """Steady, then a coastdown: a log with a filter, whose noise it colours; positions wander."""
+    time_s = np.arange(-LEAD_S, 700.0, PACE_S)
+    rng = np.random.default_rng(seed)
+    coasting = np.maximum(time_s, 0.0)
+    noise = 0.02 * np.sqrt(2.0 * LAG_S / PACE_S) * rng.standard_normal(len(time_s))
+    log = np.full(len(time_s), coast.speed_m_s)
+    given = coast.speed(coasting) + noise
+    for i in range(1, len(time_s)):
+        log[i] = log[i - 1] + PACE_S / LAG_S * (given[i] - log[i - 1])
+    along = np.where(time_s < 0.0, coast.speed_m_s * time_s, coast.distance(coasting))
+    along = along + GaussMarkov(1.2, 120.0).sample(time_s, rng)
+    along += 0.4 * rng.standard_normal(len(time_s))
+    stamps = np.round((time_s + LEAD_S) * 1e9).astype(np.int64)
+    return in_arrival_order(
+        [
+            Block.of(Channel.SPEED_THROUGH_WATER, stamps, log),
+            Block.of(Channel.POSITION, stamps, np.column_stack([along, 0.0 * along])),
+        ]
+    )
+
+
+def test_log_and_positions_are_no_worse_than_either(coast, ship) -> None:
+    # N = 12, seeds 0..11: of log, of positions, of both
+    start_ns = round(LEAD_S * 1e9)
+    rms = []
+    for seed in range(12):
+        block = filtered_and_wandering(coast, seed)
+        parts = [
+            block[block.channel == Channel.SPEED_THROUGH_WATER],
+            block[block.channel == Channel.POSITION],
+            block,
+        ]
+        one = []
+        for part in parts:
+            late = Window.from_block(part, start_ns, int(part.stamp_ns[-1]), before_ns=0)
+            found = estimate_final(late, ship, Parameters())
+            largest = float(found.curve.resistance_m_s2.max())
+            one.append(np.sqrt(np.mean(away_from(found, coast, ship) ** 2)) / largest)
+        rms.append(one)
+    log, positions, both = np.sqrt(np.mean(np.square(rms), axis=0))
+    assert both < 1.1 * min(log, positions)
+
+
+def test_white_noise_is_told_from_a_smooth_signal() -> None:
+    rng = np.random.default_rng(1)
+    signal = 8.0 / (1.0 + 0.003 * np.arange(500.0)) + 0.05 * rng.standard_normal(500)
+    signal[::40] += 3.0
+    assert weighted_white_sd(signal, np.ones(len(signal))) == pytest.approx(0.05, rel=0.15)
+
+
+def test_a_short_coast_over_few_speeds_is_fitted() -> None:
+    # N = 12, seeds 0..11: 9 s in which a ferry slows by a fifth, read behind a filter of 0.3 s.
+    # None fails, RMSE below 20 % of the largest r (18 % found: a log's offset is that of
+    # ships), and +-2 sigma holds 70 % or more.
+    ferry = Ship(length_m=5.0, displaced_volume_m3=1.76)
+    time_s, decay = 0.05 * np.arange(181), np.exp(-0.05 / 0.3)
+    stamps = np.round(time_s * 1e9).astype(np.int64)
+    squares, covered = [], []
+    for seed in range(12):
+        slow = np.random.default_rng(seed).standard_normal(len(time_s))
+        slow[1:] *= np.sqrt(1.0 - decay**2)
+        for i in range(1, len(slow)):
+            slow[i] += decay * slow[i - 1]
+        speed = 0.13 / (1.0 + 0.13 * 0.24 * time_s)
+        read = Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed + 0.003 * slow)
+        curve = estimate_final(cut(read), ferry, Parameters(froude_min=0.001)).curve
+        v = curve.speed_m_s
+        away = curve.resistance_m_s2 - 0.24 * v**2 * (1.0 + ferry.n_r(v))
+        squares.append(np.mean(away**2))
+        covered.append(np.mean(np.abs(away) <= 2.0 * curve.sigma_repeatable_m_s2))
+    largest = 0.24 * 0.13**2 * (1.0 + float(ferry.n_r(0.13)))
+    assert np.sqrt(np.mean(squares)) < 0.2 * largest
+    assert np.mean(covered) > 0.7
