@@ -178,7 +178,7 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             w[REGIME], w[LIAR] = regime, liar
             driven(all_, j, hull)
             if regime == AMID:
-                amid(all_, j, setting, 0)
+                amid(all_, j, setting, 0 if claimed else 1)
             if claimed:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:
@@ -327,8 +327,8 @@ def step(bank: Bank, setting: BankSetting) -> float:
         slowing = predict(all_, i, setting, used, decay, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
-    shown = thin(all_, setting)
+    shown, before = thin(all_, setting), bank.out[P_STEADY]
     _sum_up(bank, setting)
     if not claimed:
-        listen(bank.noise, setting, said, bank.out[P_STEADY])
+        listen(bank.noise, setting, said, before, bank.out[P_STEADY])
     return shown

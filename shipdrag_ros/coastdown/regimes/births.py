@@ -56,6 +56,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     SWITCHES,
     THE_LOG,
     THE_TRACK,
+    THRUST,
     TURN,
     WEIGHT,
     WINDMILLS,
@@ -136,6 +137,8 @@ def _born(
     _copy(bank, i, j)
     bank.used[0] = j + 1
     f, w = bank.number[j], bank.whole[j]
+    if w[REGIME] == AMID:  # what an engine gave is over
+        free(bank, j, GUST, 0.0, 0.0)
     f[WEIGHT] += math.log(share)
     f[SINCE], f[RAMP_S] = now_s, ramp_s
     w[REGIME] = regime
@@ -152,7 +155,7 @@ def _wind(setting: BankSetting) -> float:
 def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
     law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
-    bank.number[j, FIRST_A] = math.exp(law)
+    bank.number[j, FIRST_A], bank.number[j, THRUST] = math.exp(law), 1.0
     bank.whole[j, GLIDED] = 1
     free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
     if setting.engine > 0.0:  # what an engine gave is over
@@ -165,9 +168,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     Let the thrust run down.
     """
     if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, AMID):
-        j = _born(bank, i, now_s, chance, GLIDE, _NO_RAMP_S)
-        if j >= 0:
-            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+        _is_let_go(bank, i, setting, now_s, chance)
         return
     learnt, claimed = bank.whole[i, REGIME] == LEVEL, setting.engine > 0.0
     last = bank.whole[i, COUNT] - 1
@@ -175,7 +176,8 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
     before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
-    odds = len(n.ODD) if any_ and bank.whole[i, GLIDED] == 0 else 1  # later she is known
+    # later she is known
+    odds = len(n.ODD) if claimed and any_ and bank.whole[i, GLIDED] == 0 else 1
     for each in range(downs * odds):
         k, odd = each % downs, each // downs
         ramp_s = _NO_RAMP_S if already else n.RUN_DOWN_S[k] * setting.pace
@@ -205,6 +207,26 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
             p[LN_A, POWER] += tied * var
             p[POWER, LN_A] = p[LN_A, POWER]
             p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
+
+
+@compiled(uncounted=True)
+def _is_let_go(
+    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float
+) -> None:
+    """End what slowed her beside the water: an engine astern runs down as one ahead does."""
+    # what holds a body in a window that a person claims lets go at once
+    x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE and setting.engine == 0.0
+    thrust = 0.0
+    if braked:
+        law = hull_law(setting.hull, x[LN_U])[0] + x[LN_A]
+        thrust = -bank.number[i, FIRST_A] * math.exp(min(x[OPEN] - law, 5.0))
+    for k in range(len(n.RUN_DOWN_S) if braked else 1):
+        ramp_s = n.RUN_DOWN_S[k] * setting.pace if braked else _NO_RAMP_S
+        share = chance * setting.hull.run_down[k] if braked else chance
+        j = _born(bank, i, now_s, share, GLIDE, ramp_s)
+        if j >= 0:
+            bank.number[j, THRUST] = thrust
+            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
 
 
 @compiled(inline=True, uncounted=True)
@@ -268,13 +290,16 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     Let the engine go to another level, or engage.
     """
     f, regime = bank.number[i], bank.whole[i, REGIME]
-    engaged, claimed = regime in (DRIVEN, LEVEL), setting.engine > 0.0
+    engaged, claimed = regime in (DRIVEN, LEVEL, AMID), setting.engine > 0.0
     if claimed:
         # what the level was before, and is then, shafts alone show
-        even = engaged or (regime == AMID and bank.whole[i, KIND] == 0)
+        even = engaged and (regime != AMID or bank.whole[i, KIND] == 0)
         level = 0.5 * chance if even and setting.shafts > 0 else 0.0
         _any_power(bank, i, setting, now_s, chance - level)
         engaged, chance = True, level
+    else:  # or it varies, as often as a record begins so
+        _any_power(bank, i, setting, now_s, chance * n.AMID[0])
+        chance *= 1.0 - n.AMID[0]
     base = f[BEFORE]
     if regime == AMID:
         base = bank.mean[i, LN_U]
@@ -311,17 +336,16 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     Put a history amid a manoeuvre under power: an acceleration that drifts is what is left open.
     """
     x, f = bank.mean[j], bank.number[j]
-    if setting.engine > 0.0:
-        f[FIRST_A] = n.ENGINE_GUST[kind] * setting.engine
-        free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
+    engine = setting.engine
+    if engine > 0.0:
         free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
-        sd = n.ENGINE[kind] * setting.engine
-    else:
+    else:  # at full power it gives what the water takes
         law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
-        f[FIRST_A] = math.exp(law)
-        sd = n.AMID[1] * f[FIRST_A]
+        engine = math.exp(law)
+    f[FIRST_A] = n.ENGINE_GUST[kind] * engine
+    free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
     bank.whole[j, KIND], f[REVS] = kind, np.nan
-    free(bank, j, OPEN, 0.0, sd * sd)
+    free(bank, j, OPEN, 0.0, (n.ENGINE[kind] * engine) ** 2)
 
 
 @compiled(uncounted=True)
@@ -455,11 +479,10 @@ def _children(
     if regime == LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
         w[REGIME] = regime = DRIVEN
         w[KIND] = GOVERNED
-        f[GUST_A] = math.exp(hull_law(setting.hull, bank.mean[i, LN_U])[0] + bank.mean[i, LN_A])
         f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
         f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
     left = 0.0  # hazard of all that it may switch to
-    if regime in (DRIVEN, LEVEL) or (claimed and regime == AMID):
+    if regime in (DRIVEN, LEVEL) or (regime == AMID and (claimed or w[COUNT] > 0)):
         if regime == LEVEL and not fades and age_s < f[RAMP_S]:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
@@ -470,6 +493,8 @@ def _children(
             stop = n.MANOEUVRE * stops
             level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+        if regime == AMID and not claimed:  # it ends at some level, and any turn is part of it
+            level, turn = float(n.AMID[2]), 0.0
         if not np.isnan(setting.told_s):
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
             told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
@@ -495,8 +520,8 @@ def _children(
         levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
     elif regime == AMID:
-        _settles(bank, i, setting, now_s, n.AMID[3] * hours)
-        left = float(n.AMID[3])
+        _settles(bank, i, setting, now_s, n.AMID[2] * hours)
+        left = float(n.AMID[2])
     else:
         if regime == TURN:
             _back(bank, i, setting, now_s, n.TURN_OUT * hours)

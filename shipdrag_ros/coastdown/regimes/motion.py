@@ -73,6 +73,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     STAYS_WAY,
     THE_LOG,
     THE_TRACK,
+    THRUST,
     TORQUE,
     TURN,
     WANDER,
@@ -142,9 +143,9 @@ def _advance(part: float, free: float) -> tuple[float, float]:
 
 @compiled(inline=True, uncounted=True)
 def _thrust_left(f: Float64, now_s: float) -> float:
-    """Return the thrust of a glide, over that at its stop: the revs fall evenly."""
+    """Return the thrust of a glide, over the resistance at its stop: the revs fall evenly."""
     left = max(0.0, 1.0 - (now_s - f[SINCE]) / f[RAMP_S])
-    return float(left * left)
+    return float(f[THRUST] * left * left)
 
 
 @compiled(inline=True, uncounted=True)
@@ -246,6 +247,9 @@ def predict(
     keep_g, keep_b, keep_e, keep_f = decay
     slowing = mean_u = mean_lag = 0.0
     u = math.exp(x[LN_U])
+    if regime == DRIVEN:  # waves stay as they were learnt until that is forgotten
+        law = hull_law(setting.hull, x[LN_U])[0]
+        f[GUST_A] += (math.exp(law + x[LN_A]) - f[GUST_A]) * n.BIN_S / n.MEMORY_S
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
@@ -285,14 +289,16 @@ def predict(
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         elif regime == AMID:
-            p[OPEN, OPEN] += (n.AMID[2] * f[FIRST_A]) ** 2 * dt / (60.0 * pace)
+            p[OPEN, OPEN] += (n.AMID[1] * f[FIRST_A]) ** 2 * dt / (60.0 * pace)
         # half of it is wind, whose gusts fall with her way, and half wave groups, which do not
         full, now = f[GUST_A], a
         if regime in (GLIDE, GLIDE_TURN, BRAKE):  # the drag of a screw takes no part in it
             now = min(a, full)
         gusts = noise[N_GUST] ** 2 * max(0.5 * full * (now + full), now * now)
-        if regime == AMID and setting.engine > 0.0:  # an engine that is not held even
-            gusts = (noise[N_GUST] * setting.engine) ** 2 + f[FIRST_A] ** 2
+        if regime == AMID:  # an engine that is not held even
+            if setting.engine > 0.0:
+                gusts = (noise[N_GUST] * setting.engine) ** 2
+            gusts += f[FIRST_A] ** 2
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * gusts
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += n.CURRENT[1] ** 2 * dt / (n.CURRENT_S * pace)
@@ -534,9 +540,10 @@ def _shaft(
     several, scaled = setting.shafts > 1, setting.engine == 0.0
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < _REVERSED:
-        astern = regime == BRAKE or (regime == AMID and not scaled)
+        astern = regime in (BRAKE, AMID) or (regime == GLIDE and _thrust_left(f, now_s) < 0.0)
         return math.log(1.0 if astern else n.SHAFT_LIES)
-    if regime in (AMID, LEVEL) and not scaled:  # at any revs, mostly at those of before
+    # at any revs, mostly at those of before
+    if regime == AMID or (regime == LEVEL and not scaled):
         before, stands = f[REVS], nu < n.CREEPS  # then another pushes, unheard
         f[REVS] = nu
         if np.isnan(before):
@@ -551,9 +558,7 @@ def _shaft(
         if regime == LEVEL:
             shown += _shown_level(bank, i, setting, nu, log_first, now_s, work)
         return shown
-    if regime == AMID:
-        density = 0.8 if 0.0 < nu < 1.25 else 0.0
-    elif regime in (DRIVEN, LEVEL, TURN):
+    if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
         if several and regime != LEVEL:  # they turn alike
             density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
@@ -563,8 +568,8 @@ def _shaft(
             # as before the stop
             f[REVS] = f[FREE] * (math.exp(min(f[BEFORE] - log_first, 1.0)) if scaled else 1.0)
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
-        if regime == GLIDE and kind < HELD and age_s < setting.step_s:
-            # it stopped within the bin, of which the revs are a mean
+        if (regime == GLIDE and kind < HELD and age_s < setting.step_s) or left < 0.0:
+            # it stopped within the bin, of which the revs are a mean, or runs down from astern
             density = 1.2 if nu < 1.05 else 0.0
         elif left > 0.0 and kind < HELD:
             density = _running_down(f, nu, u_part, left, 0.5 if several else 0.8, scaled)
@@ -681,7 +686,8 @@ def weigh(
             h[j] = 0.0
         h[LN_U] = u
         expected = u + f[MEAN_U]
-        sd, value = noise[N_LOG], said[which]
+        # learnt at less speed, it may be less than that of now
+        sd, value = max(noise[N_LOG], n.WHITE_FLOOR * u), said[which]
         # an engine may drive her astern, and a ship at rest is never quite so
         if claimed and (regime == AMID or abs(value) < rest_speed(setting.hull)):
             value = abs(value)
@@ -727,5 +733,5 @@ def weigh(
         # at balance neither is seen, only the filter's own errors
         _forget(x, p, LN_A, f[A0], f[A_VAR])
         _forget(x, p, POWER, f[P0], f[P_VAR])
-    if regime == DRIVEN:  # nor what a log lags behind
+    if regime == DRIVEN or (regime == AMID and not claimed):  # nor what a log lags behind
         _forget(x, p, LONGER, 0.0, n.LOG_LAG_SD**2)

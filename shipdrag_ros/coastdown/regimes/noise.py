@@ -28,7 +28,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_WALK,
     N_WANDER,
     N_WANDER_S,
-    NOISES,
     RANGES,
     RATE,
     BankSetting,
@@ -41,7 +40,6 @@ FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
 _STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
 _STEADY_RAD_S = 1e-3  # a rate of turn that any helm has
 _APART = 3  # log less speed over ground, or that of the fixes
-_DELAY = round(n.FROZEN_S / n.BIN_S)  # bins
 _STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
 
 
@@ -55,8 +53,8 @@ class NoiseFilters(NamedTuple):
         For log, speed over ground, fixes, and the first less the second.
     evidence : (4, FILTERS)
         Faded log likelihood.
-    last, jump : (4, 2), (4,)
-        Last readings; mean size of their differences.
+    last, bend : (4, 2), (4, 2)
+        Last two readings; mean size of second differences, and how many it is of.
     seen : (4,)
         Readings of a driven ship.
     coarse : (2, 2)
@@ -64,26 +62,26 @@ class NoiseFilters(NamedTuple):
         range of the seconds of a bin.
     rate : (2,)
         Mean square of the rate of turn, and its weight.
-    queue : (delay, NOISES)
-        What will be used.
     used : (NOISES,)
     work : (2 states, states)
     beside : (3, FILTERS / whites)
         Log evidence in the other instrument, in what both differ by, and in both.
+    gained : (FILTERS,)
+        Log density of the last reading by each.
     """
 
     mean: Float64
     spread: Float64
     evidence: Float64
     last: Float64
-    jump: Float64
+    bend: Float64
     seen: Float64
     coarse: Float64
     rate: Float64
-    queue: Float64
     used: Float64
     work: Float64
     beside: Float64
+    gained: Float64
 
     @classmethod
     def fresh(cls) -> NoiseFilters:
@@ -96,14 +94,14 @@ class NoiseFilters(NamedTuple):
             np.zeros((4, FILTERS, _STATES, _STATES)),
             np.zeros((4, FILTERS)),
             np.full((4, 2), np.nan),
-            np.zeros(4),
+            np.zeros((4, 2)),
             np.zeros(4),
             np.zeros((2, 2)),
             np.zeros(2),
-            np.tile(first, (_DELAY, 1)),
             first,
             np.zeros((2 * _STATES, _STATES)),
             np.zeros((3, _GUSTS * _WANDERS * _TIMES)),
+            np.zeros(FILTERS),
         )
 
 
@@ -118,36 +116,61 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float]:
 
 
 @compiled(uncounted=True)
-def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
+def listen(
+    noise: NoiseFilters, setting: BankSetting, said: Float64, before: float, driven: float
+) -> None:
     """
-    Learn from a bin, by the probability that she was driven evenly, and age what is used.
+    Learn from a bin, by the probability that she was driven evenly: of the bin before, and now.
     """
     for which in range(4):
-        value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
-        if which == _APART:
-            ground = said[GROUND]
-            if np.isnan(ground):
-                ground = said[ADVANCE] / setting.step_s
-            value = said[LOG] - ground
+        value = _value(setting, said, which)
         if not np.isnan(value):
+            _bends(noise, which, value)
             if which <= GROUND:
                 _coarse(noise, which, said[RANGES + which], driven)
-            _one(noise, setting, which, value, driven)
+            _one(noise, setting, which, value, before, driven)
     if not np.isnan(said[RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
         clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
-    slot = noise.queue[0]
-    for row in range(_DELAY - 1):
-        for k in range(NOISES):
-            noise.queue[row, k] = noise.queue[row + 1, k]
-    newest = noise.queue[_DELAY - 1]
-    _average(noise, setting, newest)
-    young = max(noise.seen[0], noise.seen[1], noise.seen[2]) < _DELAY
-    for k in range(NOISES):
-        noise.used[k] = newest[k] if young else slot[k]
+    _average(noise, setting, noise.used)
+
+
+@compiled(inline=True, uncounted=True)
+def _value(setting: BankSetting, said: Float64, which: int) -> float:
+    """Return what an instrument says, or what the log says more than the speed over ground."""
+    if which == LOG:
+        return float(said[LOG])
+    if which == GROUND:
+        return float(said[GROUND])
+    if which != _APART:
+        return float(said[ADVANCE])
+    ground = said[ADVANCE] / setting.step_s if np.isnan(said[GROUND]) else said[GROUND]
+    return float(said[LOG] - ground)
+
+
+@compiled(uncounted=True)
+def _bends(noise: NoiseFilters, which: int, value: float) -> None:
+    """Learn the size of second differences, in which no regime is seen."""
+    last, bend = noise.last[which], noise.bend[which]
+    size = abs(value - 2.0 * last[0] + last[1])
+    last[0], last[1] = value, last[0]
+    if np.isnan(size):
+        return
+    if bend[1] > 8.0:
+        size = min(size, max(4.0 * bend[0], n.WHITE_FLOOR * abs(value)))
+    bend[1] += 1.0
+    bend[0] += (size - bend[0]) / min(bend[1], n.MEMORY_S / n.BIN_S)
+
+
+@compiled(inline=True, uncounted=True)
+def _spread(noise: NoiseFilters, which: int, step_s: float) -> float:
+    """Return the sd that white noise has, were those its; of fixes from differences of theirs."""
+    variance, least = (20.0, step_s) if which == ADVANCE else (6.0, 1.0)
+    size = noise.mean[LOG if which == _APART else which, 0, 1]
+    return max(noise.bend[which, 0] * 1.2533 / math.sqrt(variance), n.WHITE_FLOOR * size * least)
 
 
 @compiled(inline=True, uncounted=True)
@@ -176,34 +199,37 @@ def _rounding(noise: NoiseFilters, which: int) -> float:
 
 @compiled(uncounted=True)
 def _one(
-    noise: NoiseFilters, setting: BankSetting, which: int, value: float, driven: float
+    noise: NoiseFilters,
+    setting: BankSetting,
+    which: int,
+    value: float,
+    before: float,
+    driven: float,
 ) -> None:
     step = setting.step_s
     speed = value / step if which == 2 else value
     count = noise.seen[which]
-    last = noise.last[which]
-    if not np.isnan(last[0]):
-        size = abs(value - last[0])
-        if count > 8:
-            size = min(size, max(4.0 * noise.jump[which], n.WHITE_FLOOR * abs(value)))
-        gain = driven / min(max(count, 1.0), n.MEMORY_S / n.BIN_S)
-        noise.jump[which] += gain * (size - noise.jump[which])
-    last[0] = value
     noise.seen[which] = count + driven
-    spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
+    spread = _spread(noise, which, step)
     if count < 4 or not (speed > 0.0 or which == _APART):
         fix = spread if which == 2 else 0.0
         for k in range(FILTERS):
             _start(noise.mean[which, k], noise.spread[which, k], speed, fix, step)
         return
     size = noise.mean[0 if which == _APART else which, 0, 1]
-    spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
     fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
+    gained, best = noise.gained, -np.inf
     for k in range(0, FILTERS, stride):
-        gained = _filter(noise, setting, which, k, value, spread, a)
-        noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
+        gained[k] = _filter(noise, setting, which, k, value, spread, a)
+        best = max(best, gained[k])
+    switches, chance = max(before - driven, 0.0), (n.STOP + n.LEVEL + n.TURN) * step / 3600.0
+    for k in range(0, FILTERS, stride):
+        # what she does else explains the reading as the best does, but had to begin
+        share = math.exp(gained[k] - best)
+        evidence = math.log(driven * share + 1.0 - driven) + switches * math.log(share + chance)
+        noise.evidence[which, k] = fade * noise.evidence[which, k] + evidence
 
 
 @compiled(uncounted=True)
@@ -332,11 +358,9 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
             g += share * math.log(gust)
             b += share * math.log(wander)
             t += share * math.log(wander_s)
-            w += share * math.log(white)
-        spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
-        step = setting.step_s if which == 2 else 1.0
-        spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
-        white = math.hypot(math.exp(w / total) * spread, _rounding(noise, which))
+            w += share * white * white
+        spread = _spread(noise, which, setting.step_s)
+        white = math.hypot(math.sqrt(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
         wander, wander_s = math.exp(b / total), math.exp(t / total)

@@ -102,7 +102,6 @@ CURRENT = _grid('CURRENT', (0.3, 0.03), 'm/s', 'sd at first, and of its change')
 CURRENT_S = _number('CURRENT_S', 600.0, 's', 'time of its change: eddies of 5 to 60 min')
 POWER_DRIFT = _number('POWER_DRIFT', 0.01, 'ln in 10 min', 'sd of the speed under even power')
 MEMORY_S = _number('MEMORY_S', 1200.0, 's', 'over which noise is learnt')
-FROZEN_S = _number('FROZEN_S', 120.0, 's', 'age of the noise that is used')
 BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
 WIDE = _grid('WIDE', (0.05, 3.0), '1', 'share of readings that scatter more, and by what factor')
@@ -111,9 +110,9 @@ LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
 AMID = _grid(
     'AMID',
-    (0.05, 0.3, 0.1, 12.0),
-    '1, of the resistance, the same in a minute, 1/h',
-    'a record begins while she gathers way: share, acceleration, its change, the end of it',
+    (0.05, 0.1, 12.0),
+    '1, of what moves it in a minute, 1/h',
+    'a record, or a switch, begins a manoeuvre: share, change of its acceleration, its end',
 )
 SAILS = _grid('SAILS', (0.17, 0.7), 'Froude, ln', 'speed at first: median, sd')
 

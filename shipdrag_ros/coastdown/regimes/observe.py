@@ -44,15 +44,19 @@ def _mean_speed(bins: Bins, source: int, last: int, width: int) -> float:
 
 @compiled(inline=True, uncounted=True)
 def _range(bins: Bins, source: int, last: int, width: int) -> float:
-    """Return the range of the speeds of the seconds of a bin and of the one before it."""
+    """Return the range of the speeds of the seconds of a bin and of the last one before it."""
     totals = bins.speeds[source]
     mask = len(totals) - 1
     newest = bins.closed[source]
     low, high = np.inf, -np.inf
-    for second in range(max(last - width, newest - mask + 1), min(last, newest) + 1):
+    second, least = min(last, newest), max(last - 3 * width, newest - mask)
+    while second > least:
         if totals[second & mask, COUNT] != totals[(second - 1) & mask, COUNT]:
             speed = (totals[second & mask, SPEED] - totals[(second - 1) & mask, SPEED]) / PER_UNIT
             low, high = min(low, speed), max(high, speed)
+            if second <= last - width:
+                break
+        second -= 1
     return high - low if high >= low else np.nan
 
 

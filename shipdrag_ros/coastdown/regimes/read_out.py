@@ -20,6 +20,7 @@ from shipdrag_ros.coastdown.regimes.bank import (
     Bank,
 )
 from shipdrag_ros.coastdown.regimes.state import (
+    AMID,
     BRAKE,
     COUNT,
     DRIVEN,
@@ -170,7 +171,7 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     """
     engaged = (found.what == LEVEL) & found.again
     chosen = {
-        P_DRIVEN: (found.what == DRIVEN) | ((found.what == LEVEL) & ~engaged),
+        P_DRIVEN: np.isin(found.what, (DRIVEN, LEVEL, AMID)) & ~engaged,
         P_BRAKED: found.what == BRAKE,
         P_TURNING: (found.what == TURN) | (found.what == GLIDE_TURN),
         P_ENGAGED: engaged,
@@ -233,7 +234,7 @@ def _one(found: Spans) -> SmoothedGlide:
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
-    codes = np.arange(-1, GLIDE_TURN + 1)
+    codes = np.arange(-1, AMID + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
     return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
 
@@ -284,7 +285,7 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSp
     last = first + int(np.argmin(speed[first:])) + 1
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
-    codes = (LEVEL, BRAKE, TURN, GLIDE_TURN)
+    codes = (LEVEL, AMID, BRAKE, TURN, GLIDE_TURN)
     parts = [(found.what == code) & (shared > 0.0) for code in codes]
     losses = [
         probability_of(found.part(part), len(speed), step_s)[first:last] * lost for part in parts

@@ -34,6 +34,7 @@ from shipdrag_ros.coastdown.regimes.read_out import (
 )
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
+    AMID,
     BRAKE,
     COUNT,
     GLIDE,
@@ -64,12 +65,14 @@ _ASTERN_S = 30.0  # about the end of a glide
 
 _ENDED = {
     LEVEL: EndedBy.ENGINE,
+    AMID: EndedBy.ENGINE,
     BRAKE: EndedBy.BRAKE,
     TURN: EndedBy.TURN,
     GLIDE_TURN: EndedBy.TURN,
 }
 _WHY = {
     LEVEL: (Dismissal.SETTLED, 'power was reduced, not cut'),
+    AMID: (Dismissal.THRUST, 'she was driven by a power that varied'),
     BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
     TURN: (Dismissal.TURN, 'she turned under power'),
     GLIDE_TURN: (Dismissal.TURN, 'she turned'),
