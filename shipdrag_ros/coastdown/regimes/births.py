@@ -210,9 +210,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
 
 
 @compiled(uncounted=True)
-def _is_let_go(
-    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float
-) -> None:
+def _is_let_go(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """End what slowed her beside the water: an engine astern runs down as one ahead does."""
     # what holds a body in a window that a person claims lets go at once
     x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE and setting.engine == 0.0

@@ -169,8 +169,9 @@ def _bends(noise: NoiseFilters, which: int, value: float) -> None:
 def _spread(noise: NoiseFilters, which: int, step_s: float) -> float:
     """Return the sd that white noise has, were those its; of fixes from differences of theirs."""
     variance, least = (20.0, step_s) if which == ADVANCE else (6.0, 1.0)
-    size = noise.mean[LOG if which == _APART else which, 0, 1]
-    return max(noise.bend[which, 0] * 1.2533 / math.sqrt(variance), n.WHITE_FLOOR * size * least)
+    speed = noise.mean[LOG if which == _APART else which, 0, 1]
+    size = noise.bend[which, 0] * 1.2533 / math.sqrt(variance)
+    return float(max(size, n.WHITE_FLOOR * speed * least))
 
 
 @compiled(inline=True, uncounted=True)
