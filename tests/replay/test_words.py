@@ -185,7 +185,8 @@ def test_nothing_is_made_of_a_gap(tmp_path: Path, voyage, ship: Ship) -> None:
 def test_thrust_after_a_glide_is_no_reduced_power_and_its_probability_is_said(tmp_path, ship):
     speed = np.full(2700, 6.0)
     for k in range(901, len(speed)):
-        speed[k] = speed[k - 1] - 2.4e-4 * speed[k - 1] ** 2
+        thrust = 0.0 if k < 1500 else 1.2e-3
+        speed[k] = speed[k - 1] - 2.4e-4 * speed[k - 1] ** 2 + thrust
     result = replayed(tmp_path, log(np.round(speed / 0.0514444) * 0.0514444), ship)
     assert result.coastdowns
     for coastdown in result.coastdowns:
