@@ -37,9 +37,7 @@ MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
 GUST_A = 16  # resistance under even power, of which gusts are parts [m/s^2]
 EXCESS = 17  # log density of the bin's readings of motion, over its expectation
 BEHIND = 18  # log weight less that of the best, before births
-THRUST = (
-    19  # of a glide, at its stop, over the resistance: that of balance, or of an engine astern
-)
+THRUST = 19  # at the stop of a glide, over the resistance: of balance, or of an engine astern
 COLUMNS = 20
 # and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
 # number of switches, whether she has glided, how the screw was dragged then
