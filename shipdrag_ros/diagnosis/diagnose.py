@@ -210,7 +210,7 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
     if not stated:
         yield (
             'the ship file has no baseline: the runs are compared with the range of all hulls of '
-            'her length and volume; what looks like fouling, a propeller or a cable may be her hull'
+            'her length and volume; what looks like fouling, a propeller or a cable may be the hull'
         )
 
 

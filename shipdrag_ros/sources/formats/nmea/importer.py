@@ -269,7 +269,8 @@ class NmeaResult(ImportResult):
         Say how much was read, and what is to be known of it.
         """
         first, *others = super().summary(bag)
-        kept = 'attached' if self.log_attached else 'NOT attached (too long, damaged or no UTF-8): keep it'
+        lost = 'NOT attached (too long, damaged or no UTF-8): keep it'
+        kept = 'attached' if self.log_attached else lost
         return [f'{first}; the log is {kept}', *self._notes(), *others]
 
     def _notes(self) -> Iterator[str]:
