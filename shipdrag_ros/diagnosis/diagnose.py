@@ -209,8 +209,8 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
             )
     if not stated:
         yield (
-            'the ship file has no baseline: the runs are compared with the range of all hulls of '
-            'her length and volume, in which fouling, a propeller or a cable cannot be seen'
+            'the ship file has no baseline: the runs are compared with all hulls of her length '
+            'and volume; what looks like fouling, a propeller or a cable may be the hull'
         )
 
 

@@ -467,7 +467,8 @@ class Bridge:
         silent = silent_s > SILENT_S  # what the node said last is no health of now
         since_s = silent_s if silent else 0.0
         statuses = [status for status in self._health.statuses if status.input]
-        statuses += [status for status in self._health.statuses if status.part == 'recording']
+        others = ('nmea ', 'recording')  # a sentence that is not used shows in no input
+        statuses += [each for each in self._health.statuses if each.part.startswith(others)]
         rows = []
         for status in statuses:
             age_s = status.number('age')
@@ -494,7 +495,8 @@ class Bridge:
         speed = self.speed(now_s)
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
-        lead_s = self._lead_at_stop if _is_of_run(now) else None if now.trouble else now.lead_s
+        began = now.monitor == 'candidate' or _is_of_run(now)
+        lead_s = self._lead_at_stop if began else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
         if before is None and self._courses:

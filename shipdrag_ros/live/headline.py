@@ -160,7 +160,7 @@ def rudder_check(angle_rad: float | None) -> Check:
 
 def shaft_check(rate_rad_s: float | None) -> Check:
     """
-    Say how fast a shaft turns; ask where none is received: an engine astern makes r too large.
+    Say how fast a shaft turned in the last minute; one astern makes r too large.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def shaft_check(rate_rad_s: float | None) -> Check:
     name = 'Shaft'
     if rate_rad_s is None:
         return Check(name, Held.UNKNOWN, 'not received: is the engine stopped, and not astern?')
-    text = f'{rate_rad_s * 30.0 / math.pi:z.0f} rpm'  # z: no -0
+    text = f'{rate_rad_s * 30.0 / math.pi:z.0f} rpm mean of the last minute'  # z: no -0
     astern = rate_rad_s < -STANDS_RAD_S
     return Check(name, Held.NO if astern else Held.YES, f'{text}: astern' if astern else text)
 

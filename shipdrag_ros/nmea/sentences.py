@@ -35,7 +35,7 @@ MAGNETIC = 'magnetic'
 _GLL_OF_OLD = 4  # fields
 OWN_OFFSET = 'with its own offset'
 STATED_DEPTH = 'with the stated depth of the transducer'
-NOT_STATED = 'depth of the transducer not stated'
+NOT_STATED = 'state the depth of the transducer'
 
 
 class NoValue(Exception):

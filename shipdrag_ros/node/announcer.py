@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from shipdrag_ros.coastdown import events
-from shipdrag_ros.display import duration, plus_minus, utc
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.display import duration, utc
+from shipdrag_ros.estimation.words import specific
 from shipdrag_ros.messages.topics import ERROR, OK, WARN, Status
 from shipdrag_ros.node.background import Compiling
 from shipdrag_ros.node.health import InputState
@@ -68,24 +68,9 @@ def _ended(event: events.EndedCoastdown) -> LogLine:
     text = f'a coastdown has ended after {duration(seconds)} ({why})'
     if event.estimate is None:
         return LogLine(f'{text}; no estimate: {event.failure}', True)
-    return LogLine(f'{text}: {figure(event.estimate)}')
-
-
-def figure(estimate: Estimate) -> str:
-    """
-    Return the resistance in the middle of the range where it may be used.
-    """
-    curve = estimate.valid_curve
-    if not len(curve):
-        return 'no speed at which the resistance may be used'
-    middle = len(curve) // 2
-    value = plus_minus(
-        float(curve.resistance_m_s2[middle]) * 1e3, float(curve.sigma_m_s2[middle]) * 1e3
-    )
-    return (
-        f'r = ({value}) mm/s^2 at {curve.speed_m_s[middle]:.2f} m/s, valid from '
-        f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f} m/s'
-    )
+    if not len(event.estimate.valid_curve):
+        return LogLine(f'{text}; no speed at which the resistance may be used')
+    return LogLine(f'{text}. {specific(event.estimate)}')
 
 
 class Announcer:

@@ -44,6 +44,7 @@ KEPT = 200  # readings of that time, more are as good
 TOPIC_FEEDS, NMEA_FEEDS = 'a topic', 'NMEA'
 AT_ONCE = 200  # lines between two turns of everything else
 BAD_SHARE = 0.05  # of the lines of a healthy line fewer are damaged
+_LOOK = 'look at what sends them, and on a serial line at baud rate and wiring'
 
 
 class Rivals:
@@ -204,7 +205,7 @@ class NmeaFeed:
         if not counts.lines:
             return 'open, nothing heard yet'
         if not self._interpreter.sentences[address]:
-            return f'{counts.lines} lines heard, none a sentence: look at baud rate and wiring'
+            return f'{counts.lines} lines heard, none a sentence{self._why(address)}: {_LOOK}'
         if counts.age_s is not None and counts.age_s > SILENT_S:
             return f'no line for {counts.age_s:.0f} s'
         if before := self._interpreter.gives_way_to(address):
@@ -213,6 +214,10 @@ class NmeaFeed:
                 f'said nothing for {SILENT_NS / SECOND_NS:.0f} s'
             )
         return f'{counts.lines} lines heard, none of use yet for speed or position ({_MOTION})'
+
+    def _why(self, address: str) -> str:
+        reasons = ', '.join(self._interpreter.rejected[address])
+        return f' ({reasons})' if reasons else ''
 
     def statuses(self) -> list[Status]:
         """
@@ -312,9 +317,7 @@ class NmeaFeed:
         if counts.dropped or counts.flooded or self._live.lost:
             return WARN, 'more lines than any ship sends: not all of them can be used'
         if bad > BAD_SHARE * max(sound + bad, 20):
-            return WARN, (
-                f'{bad} of {sound + bad} lines are damaged; look at baud rate and wiring'
-            )
+            return WARN, (f'{bad} of {sound + bad} lines are damaged{self._why(address)}: {_LOOK}')
         if self._topic_refused:
             names = ', '.join(self._topic_refused)
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'

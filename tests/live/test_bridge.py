@@ -209,6 +209,26 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
     assert later['inputs'][0]['text'] == 'not known, the node is silent; its last word: frozen'
 
 
+def test_what_nmea_does_not_use_stands_beside_the_inputs() -> None:
+    bridge = Bridge()
+    state = Status('n', 'state', OK, '', {'lifecycle': 'active', 'monitor': 'steady'})
+    nmea = Status('n', 'nmea udp://127.0.0.1:10110', OK, 'depth is not used: set x', {})
+    bridge.hear(Health((state, nmea)), 10.0)
+    (row,) = bridge.parts(11.0)['inputs']
+    assert row['name'] == nmea.part
+    assert row['text'] == nmea.message
+
+
+def test_the_steady_lead_is_kept_while_she_may_have_stopped() -> None:
+    bridge = Bridge()
+    for monitor, lead_s in (('steady', '688'), ('candidate', '0')):
+        values = {'lifecycle': 'active', 'monitor': monitor, 'steady lead [s]': lead_s}
+        values |= {'steady lead used at most [s]': '1800'}
+        bridge.hear(Health((Status('n', 'state', OK, '', values),)), 10.0)
+    lead, *_ = bridge.parts(11.0)['checks']
+    assert lead['text'] == '11:28, at least 10:00'
+
+
 def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -> None:
     timeline = timeline_of(bags[0])
     bridge = Bridge(Ship.load(SHIP))
@@ -358,7 +378,7 @@ def test_the_checklist_says_what_holds_and_what_it_compares(
 
 
 def test_a_shaft_that_stands_has_no_sign() -> None:
-    assert shaft_check(-0.001).text == shaft_check(0.001).text == '0 rpm'
+    assert shaft_check(-0.001).text == shaft_check(0.001).text == '0 rpm mean of the last minute'
 
 
 def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(bags, tmp_path):

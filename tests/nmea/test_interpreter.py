@@ -71,7 +71,7 @@ def test_a_depth_says_what_makes_it_one_from_the_surface() -> None:
     assert own.feeding() == {'depth': 'SDDPT with its own offset'}
     none, found = settled('SDDPT,20.0,')
     assert none.feeding() == found == {}
-    assert none.no_value == {'depth DPT: depth of the transducer not stated': 2}
+    assert none.no_value == {'depth DPT: state the depth of the transducer': 2}
     stated = Interpreter(Mounting(3.0))
     for stamp_ns in (START_NS, START_NS + SETTLE_NS):
         (*_, message) = [None, *stated.messages(sentence('SDDPT,20.0,-1.0'), LINE, stamp_ns)]

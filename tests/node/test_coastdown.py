@@ -128,7 +128,8 @@ def test_live_figures_are_recorded_and_replayed(start_node, peer, diagnostics, t
     ]
 
     assert 'a coastdown began at' in node.log
-    assert 'record_end: the node stops): r = (' in node.log
+    assert 'record_end: the node stops). In SI: r(v) is known from' in node.log
+    assert '(two standard deviations)' in node.log
     result = assert_replayed(bag, at_least=60)
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.RECORD_END]
 
@@ -159,7 +160,7 @@ def test_silence_ends_a_coastdown_by_the_clock(start_node, peer, diagnostics, tm
     diagnostics.wait_for('input heading', '0', value='rate [Hz]')
     peer.spin_for(3.0)
     diagnostics.set_clock(int(block.receive_ns[end - 1]) + 60 * 10**9)
-    node.wait_for_log('(silence: all sources of speed fell silent): r = (')
+    node.wait_for_log('(silence: all sources of speed fell silent). In SI: r(v) is known')
     assert node.stop() == 0
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     result = assert_replayed(bag, at_least=10)

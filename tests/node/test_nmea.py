@@ -142,7 +142,8 @@ def test_a_line_is_not_blamed_for_the_noise_of_another(start_node, diagnostics, 
             status = diagnostics.wait_for(part, 'nothing used yet')
             assert status.level == b'\x00'
             assert 'rejected without checksum' not in values(status)
-            diagnostics.wait_for('state', '40 lines heard, none a sentence: look at baud rate')
+            said = '40 lines heard, none a sentence (without checksum): look at what sends them'
+            diagnostics.wait_for('state', said)
 
 
 def test_of_two_lines_the_second_takes_over_when_the_first_is_cut(

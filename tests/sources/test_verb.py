@@ -177,9 +177,9 @@ def test_the_words_tell_what_of_a_log_was_not_used(log: Path, tmp_path, capsys) 
     assert '6 messages of 6 sentences in 7 lines, 1 s' in said
     assert 'from 2023-12-31 23:59:59 UTC' in said
     assert 'The heading is MAGNETIC' in said
-    assert 'The log is attached to the bag.' in said
+    assert '; the log is attached' in said
     assert re.search(r'speed_over_ground +GPRMC +2\n', said)
-    assert 'depth: 1 rejected, SDDBT: depth of the transducer not stated: line 4' in said
+    assert 'depth: 1 rejected, SDDBT: state the depth of the transducer: line 4' in said
     assert 'line: 1 rejected, wrong checksum: line 7' in said
     assert 'Sentences not used: XXMTW 1' in said
     assert 'Talkers that NMEA 0183 does not know: XX 1' in said

@@ -42,6 +42,6 @@ export function drawTrack(box, { was, ahead, mark }, { label, far, unit }) {
   const bar = round(WIDE / 4 / scale / unit);
   const end = EDGE + bar * unit * scale;
   svg.append(shape('path', { d: `M${EDGE} ${HIGH - 12}v5H${end}v-5`, class: 'track-bar' }), shape('text', { x: end + 6, y: HIGH - 6 }, far(bar * unit)));
-  svg.append(shape('text', { x: WIDE - EDGE, y: HIGH - 6, 'text-anchor': 'end' }, 'up: +y'));
+  svg.append(shape('text', { x: WIDE - EDGE, y: HIGH - 6, 'text-anchor': 'end' }, 'up: north (+y in a local frame)'));
   box.replaceChildren(svg);
 }

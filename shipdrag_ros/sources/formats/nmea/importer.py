@@ -269,7 +269,9 @@ class NmeaResult(ImportResult):
         Say how much was read, and what is to be known of it.
         """
         first, *others = super().summary(bag)
-        return [first, *self._notes(), *others]
+        lost = 'NOT attached (too long, damaged or no UTF-8): keep it'
+        kept = 'attached' if self.log_attached else lost
+        return [f'{first}; the log is {kept}', *self._notes(), *others]
 
     def _notes(self) -> Iterator[str]:
         if not self.checksums:
@@ -292,10 +294,6 @@ class NmeaResult(ImportResult):
                 'The heading is MAGNETIC, as the log states no variation: good for finding turns, '
                 'not for directions over ground.'
             )
-        if self.log_attached:
-            yield 'The log is attached to the bag.'
-        else:
-            yield 'The log is NOT attached to the bag (too long, damaged or no UTF-8): keep it.'
 
     def details(self) -> list[str]:
         """
