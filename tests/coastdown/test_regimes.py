@@ -269,6 +269,19 @@ def test_the_error_of_fixes_is_learnt_whatever_the_first_ones_say(ship, seed) ->
     assert 0.8 < filters.used[N_FIX] / fix_m < 1.25
 
 
+def test_fixes_that_come_in_bursts_of_one_and_the_same_are_borne(ship, record) -> None:
+    block = record(sensors=(LOG, TRACK))
+    fix = block.channel == Channel.POSITION
+    since_s = (block.stamp_ns - START_NS) // S
+    value = block.value.copy()
+    for burst in np.unique(since_s[fix] // 30):
+        these = fix & (since_s // 30 == burst)
+        value[these] = value[these][0]
+    bursts = replace(block, value=value)[~fix | (since_s % 30 < 12)]
+    (ended,) = of(EndedCoastdown, events_of(ship, bursts))
+    assert abs(ended.start_ns - START_NS - 900 * S) < 60 * S
+
+
 @pytest.mark.parametrize('seed', range(8))
 def test_that_fixes_wander_is_learnt_beside_a_log(ship, seed) -> None:
     learnt, time_s = [], BIN_S * np.arange(240.0)
