@@ -202,7 +202,7 @@ def settings_of(
     """
     if not any(topic.input for topic in run.topics):
         raise BagError(_no_input(run))
-    return _ship(run, ship), _parameters(run, parameters)
+    return checked(_ship(run, ship)), _parameters(run, parameters)
 
 
 def _no_input(run: Run) -> str:
@@ -339,10 +339,10 @@ def _counts(
 
 def _ship(run: Run, given: Ship | None) -> Ship:
     if given is not None:
-        return checked(given)
+        return given
     if SHIP_FILE not in run.attachments:
         raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
-    return checked(Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}'))
+    return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
 
 
 def _parameters(run: Run, given: Parameters | None) -> Parameters:
@@ -383,8 +383,10 @@ def told_ns(run: Run, stop: StopTime) -> int:
     Raises
     ------
     BagError
-        If it lies outside of the bag.
+        If it lies outside of the bag, or is a date without a zone.
     """
+    if isinstance(stop, datetime) and stop.tzinfo is None:  # would be of this computer
+        raise BagError(f'stop at {stop.isoformat()}: expected a date with its zone')
     span = run.span_ns
     start_ns, end_ns = (0, -1) if span is None else span
     said, at_s = (

@@ -10,20 +10,32 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
+from shipdrag_ros.coastdown.regimes.births import brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS
 from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
+    AMID,
+    BEFORE,
     BRAKE,
+    GLIDE,
+    HELD,
+    KIND,
+    LN_A,
+    LN_U,
     N_EDDY,
     N_FIX,
     N_GUST,
     N_LOG,
     N_WANDER,
+    OPEN,
+    REGIME,
+    REVS,
     SAID,
     BankSetting,
+    Histories,
 )
 from shipdrag_ros.coastdown.regimes.state import LOG as LOG_SAYS
 from shipdrag_ros.parameters import Parameters
@@ -216,6 +228,20 @@ def test_power_that_varies_is_seldom_a_coastdown(ship, record, seed) -> None:
     assert sum(not each.withdrawn for each in of(EndedCoastdown, events)) <= 5
 
 
+def test_what_follows_a_manoeuvre_knows_her_speed_and_revs_in_it(ship) -> None:
+    bank, setting = Histories.fresh(), BankSetting.of(HullPrior.of(ship), BIN_S, shafts=1)
+    bank.used[0] = 1
+    bank.mean[0, [LN_U, LN_A, OPEN]] = np.log(6.0), setting.hull.level, 0.01
+    bank.whole[0, REGIME], bank.number[0, REVS] = AMID, 0.6
+    brakes(bank, 0, setting, 100.0, 0.1)
+    glides(bank, 0, setting, 100.0, 0.1)
+    after = slice(1, int(bank.used[0]))
+    assert np.allclose(bank.number[after, BEFORE], np.log(6.0))
+    held = (bank.whole[after, REGIME] == GLIDE) & (bank.whole[after, KIND] >= HELD)
+    assert held.any()
+    assert np.all(bank.number[after, REVS][held] == 0.6)
+
+
 @pytest.mark.parametrize('seed', range(4))
 def test_a_bin_in_which_she_is_hardly_driven_teaches_hardly_any_noise(ship, seed) -> None:
     learnt = []
@@ -241,6 +267,19 @@ def test_the_error_of_fixes_is_learnt_whatever_the_first_ones_say(ship, seed) ->
         said[ADVANCE] = advance
         listen(filters, setting, said, 1.0, 1.0)
     assert 0.8 < filters.used[N_FIX] / fix_m < 1.25
+
+
+def test_fixes_that_come_in_bursts_of_one_and_the_same_are_borne(ship, record) -> None:
+    block = record(sensors=(LOG, TRACK))
+    fix = block.channel == Channel.POSITION
+    since_s = (block.stamp_ns - START_NS) // S
+    value = block.value.copy()
+    for burst in np.unique(since_s[fix] // 30):
+        these = fix & (since_s // 30 == burst)
+        value[these] = value[these][0]
+    bursts = replace(block, value=value)[~fix | (since_s % 30 < 12)]
+    (ended,) = of(EndedCoastdown, events_of(ship, bursts))
+    assert abs(ended.start_ns - START_NS - 900 * S) < 60 * S
 
 
 @pytest.mark.parametrize('seed', range(8))

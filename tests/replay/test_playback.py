@@ -111,6 +111,17 @@ def test_a_misspelt_effect_of_a_ship_file_is_named(recording, ship, name, key, s
         replay(run, ship=replace(ship, effects=(stated,)))
 
 
+def test_a_bag_with_a_misspelt_effect_is_replayed_with_another_ship_file(
+    recording: tuple[Path, list[Event]], ship: Ship
+) -> None:
+    (run,) = open_runs([recording[0]])
+    stated = StatedEffect('foulng', {'friction_factor': Parameter(0.3, 0.1)})
+    run.attachments['ship.yaml'] = replace(ship, effects=(stated,)).to_yaml()
+    assert len(replay(run, ship=ship).coastdowns) == 1
+    with pytest.raises(SimulationError, match='foulng'):
+        replay(run)
+
+
 def test_another_ship_or_parameters_are_used_and_not_compared(recording, ship, parameters):
     path, _ = recording
     (run,) = open_runs([path])
@@ -204,6 +215,12 @@ def test_a_stop_before_any_speed_is_an_error(recording: tuple[Path, list[Event]]
     (run,) = open_runs([recording[0]])
     with pytest.raises(BagError, match='no speed was read before the stop'):
         replay(run, stop=0.0)
+
+
+def test_a_date_without_a_zone_is_no_stop(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    with pytest.raises(BagError, match='expected a date with its zone'):
+        replay(run, stop=datetime(2023, 11, 14, 22, 20))
 
 
 @pytest.mark.parametrize('text', ['noon', '2026-06-01T08:05:00', '-3', 'nan'])

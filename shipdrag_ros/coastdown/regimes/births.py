@@ -191,15 +191,15 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
                 bank.whole[j, COUNT] -= 1
             x, p = bank.mean[j], bank.spread[j]
             bank.number[j, BEFORE] = before
-            if any_:
-                bank.number[j, BEFORE] = x[LN_U]
-                x[LN_A] += n.ODD[odd]
+            x[LN_A] += n.ODD[odd]
             _glide(bank, j, setting)
             bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
             # the revs of an engine that is cut off may change as they like
             held = kind == STUCK or (kind == HELD and not claimed)
-            bank.number[j, FREE] = bank.number[i, REVS] if held else np.nan
-            bank.number[j, REVS] = np.nan
+            revs = bank.number[i, REVS] if held else np.nan
+            # of even power they are over those expected
+            bank.number[j, FREE] = np.nan if any_ or claimed else revs
+            bank.number[j, REVS] = revs if any_ or claimed else np.nan
             x[LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
             x[POWER] += tied * n.DRAGGED[kind]
@@ -299,11 +299,9 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         _any_power(bank, i, setting, now_s, chance * n.AMID[0])
         chance *= 1.0 - n.AMID[0]
     base = f[BEFORE]
-    if regime == AMID:
-        base = bank.mean[i, LN_U]
-    elif engaged:
+    if engaged:
         base = balance(bank.mean[i], f, bank.whole[i], now_s)[0]
-        if not claimed and not _is_fade(bank, i):
+        if not claimed and regime != AMID and not _is_fade(bank, i):
             if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
                 _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE

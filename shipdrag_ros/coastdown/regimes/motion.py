@@ -158,6 +158,8 @@ def balance(x: Float64, f: Float64, w: Int64, now_s: float) -> tuple[float, floa
     regime = w[REGIME]
     if regime == TURN:
         return f[BEFORE], 0.0
+    if regime == AMID:  # nobody knows: as if at the speed that she has
+        return x[LN_U], 0.0
     if regime == LEVEL and w[KIND] == FADING:  # the speed falls evenly, at a rate left open
         gone = math.exp(min(x[OPEN], 3.0)) * (now_s - f[SINCE]) / f[RAMP_S]
         if gone > _MOST_GONE:
@@ -566,7 +568,7 @@ def _shaft(
         kind, age_s = bank.whole[i, KIND], now_s - f[SINCE]
         if regime == GLIDE and kind >= HELD and np.isnan(f[REVS]) and not np.isnan(f[FREE]):
             # as before the stop
-            f[REVS] = f[FREE] * (math.exp(min(f[BEFORE] - log_first, 1.0)) if scaled else 1.0)
+            f[REVS] = f[FREE] * math.exp(min(f[BEFORE] - log_first, 1.0))
         left = _thrust_left(f, now_s) if regime == GLIDE else 0.0
         if (regime == GLIDE and kind < HELD and age_s < setting.step_s) or left < 0.0:
             # it stopped within the bin, of which the revs are a mean, or runs down from astern

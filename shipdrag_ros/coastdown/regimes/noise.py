@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, hull_law
+from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, hull_law, rest_speed
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     GROUND,
@@ -166,10 +166,11 @@ def _bends(noise: NoiseFilters, which: int, value: float) -> None:
 
 
 @compiled(inline=True, uncounted=True)
-def _spread(noise: NoiseFilters, which: int, step_s: float) -> float:
+def _spread(noise: NoiseFilters, which: int, setting: BankSetting) -> float:
     """Return the sd that white noise has, were those its; of fixes from differences of theirs."""
-    variance, least = (20.0, step_s) if which == ADVANCE else (6.0, 1.0)
-    speed = noise.mean[LOG if which == _APART else which, 0, 1]
+    variance, least = (20.0, setting.step_s) if which == ADVANCE else (6.0, 1.0)
+    # readings that stand still are not without noise
+    speed = max(noise.mean[LOG if which == _APART else which, 0, 1], rest_speed(setting.hull))
     size = noise.bend[which, 0] * 1.2533 / math.sqrt(variance)
     return float(max(size, n.WHITE_FLOOR * speed * least))
 
@@ -211,7 +212,7 @@ def _one(
     speed = value / step if which == 2 else value
     count = noise.seen[which]
     noise.seen[which] = count + driven
-    spread = _spread(noise, which, step)
+    spread = _spread(noise, which, setting)
     if count < 4 or not (speed > 0.0 or which == _APART):
         fix = spread if which == 2 else 0.0
         for k in range(FILTERS):
@@ -360,7 +361,7 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
             b += share * math.log(wander)
             t += share * math.log(wander_s)
             w += share * white * white
-        spread = _spread(noise, which, setting.step_s)
+        spread = _spread(noise, which, setting)
         white = math.hypot(math.sqrt(w / total) * spread, _rounding(noise, which))
         if not gusted:
             out[N_GUST], gusted = math.exp(g / total), True
