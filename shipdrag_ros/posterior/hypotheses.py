@@ -305,7 +305,7 @@ class ShipRuns:
         found, _ = self._base(priors.NOTHING, 0)
         k = self.coefficients
         for place in self.places:
-            kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING)]]
+            kept = place[[k + i for i in (motion.SPEED, motion.STOP, motion.PLACE, _PORT, _HEADING)]]
             found[kept] = at[kept]
         return found
 
