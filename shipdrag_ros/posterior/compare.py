@@ -54,7 +54,8 @@ from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import checked
 
 _ITERATIONS = 30  # of Gauss and Newton
-_CLOSE = 0.1  # of -2 ln posterior
+_CLOSE = 0.05  # nats that a step may still promise
+_REFUSED = 5  # shorter and shorter steps that lead nowhere
 _LONGEST = 1.5  # of a step in z
 _HOPELESS, _TRIED = 15.0, 3  # nats behind the best, from where none is fitted on, and not before
 _STUCK = 4.0  # nats behind nothing, from where the fit of an effect begins anew
@@ -397,7 +398,7 @@ class Comparing:
         trials = [fit.at for fit in fits]
         steps = [np.zeros(0)] * len(fits)
         most = [-math.inf] * len(fits)  # log weight by the linear model, reached or not
-        active = list(range(len(fits)))
+        refused, active = [0] * len(fits), list(range(len(fits)))
         for number in range(_ITERATIONS):
             if not active:
                 break
@@ -414,15 +415,14 @@ class Comparing:
                 else:
                     found = self._step(fit, table, trials[i])
                 if found.cost < fit.cost:
-                    gained = fit.cost - found.cost
                     fit.tables, fit.cost, fit.at, steps[i] = table, found.cost, trials[i], found.step
                     fit.promised = found.promised
-                    most[i] = found.log_evidence + fit.hypothesis.log_odds
-                    if gained < _CLOSE:
+                    most[i], refused[i] = found.log_evidence + fit.hypothesis.log_odds, 0
+                    if found.promised < _CLOSE:
                         continue
                 else:
-                    steps[i] = 0.3 * steps[i]
-                    if np.max(np.abs(steps[i]), initial=0.0) == 0.0:
+                    steps[i], refused[i] = 0.3 * steps[i], refused[i] + 1
+                    if refused[i] > _REFUSED:
                         continue
                 trials[i] = fit.at + steps[i]
                 going.append(i)
@@ -441,20 +441,18 @@ class Comparing:
             log_det += float(of_noise[0])
         families = self.runs.priors(fit.hypothesis, at)
         cost = _cost(total, families, np.zeros(len(at)))
-        logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
-        if not np.isfinite(logs).any():
-            return _Step(math.inf, np.zeros(len(at)))
-        logs = logs[0] + families.log_chance
-        whole = float(np.logaddexp.reduce(logs))
-        step = np.exp(logs - whole) @ steps[0]
+        log_evidence, step = _mean_step(total, families)
+        below = [i for i in half(fit.hypothesis, self.runs.size) if step[i] < -at[i]]
+        if below:  # the others go where that one stays at its bound
+            mean, precision = families.mean.copy(), families.precision.copy()
+            mean[:, below], precision[:, below] = -at[below], EXACT**-2.0
+            _, step = _mean_step(total, Families(mean, precision, families.log_chance))
+            step[below] = -at[below]
         promised = 0.5 * max(cost - _cost(total, families, step), 0.0)
         first, q = self.runs.size, len(fit.hypothesis.unknowns)
-        own = step[first : first + q]
-        longest = float(np.max(np.abs(own), initial=0.0))
+        longest = float(np.max(np.abs(step[first : first + q]), initial=0.0))
         step *= min(1.0, _LONGEST / max(longest, 1e-12))
-        for i in half(fit.hypothesis, first):
-            step[i] = max(step[i], -at[i])
-        return _Step(cost, step, whole - 0.5 * log_det, promised)
+        return _Step(cost, step, log_evidence - 0.5 * log_det, promised)
 
     def _of_run(self, j: int, table: RunTable, settings: Settings) -> tuple[Float64, Float64]:
         model = self.runs.runs[j].model
@@ -824,6 +822,14 @@ def _cost(total: Float64, families: Families, step: Float64) -> float:
     density -= 0.5 * (precision * (mean - step) ** 2).sum(axis=1)
     data = total[0, 0] - 2.0 * total[0, 1:] @ step + step @ total[1:, 1:] @ step
     return float(data - 2.0 * np.logaddexp.reduce(density))
+
+
+def _mean_step(total: Float64, families: Families) -> tuple[float, Float64]:
+    """Return log evidence by the linear model, and the step to its mean."""
+    logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
+    weighted = logs[0] + families.log_chance
+    whole = float(np.logaddexp.reduce(weighted))
+    return whole, np.exp(weighted - whole) @ steps[0] if math.isfinite(whole) else 0.0 * steps[0, 0]
 
 
 def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> RunTable:
