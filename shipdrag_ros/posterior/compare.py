@@ -104,7 +104,7 @@ class Fitted(WeighedFit):
     cost
         -2 ln of the posterior under usual noise.
     promised
-        What the linear model promises beyond that, and no fit has reached [nats].
+        What the linear model promises beyond that, which was not reached: no evidence [nats].
     usual
         Noise of each run that is usual if this is the truth, once it is known.
     log_evidence
@@ -150,7 +150,7 @@ class _RunNoise(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """Cost at some unknowns, step to the mean of the linear model, its log evidence and promise."""
+    """Cost at some unknowns; step, log evidence and promise of the model that is linear there."""
 
     cost: float
     step: Float64
@@ -408,21 +408,16 @@ class Comparing:
             going = []
             for i, table in zip(active, tables, strict=True):
                 fit = fits[i]
-                if table is None:
-                    if fit.tables is None:
-                        continue
-                    found = _Step(math.inf, steps[i])
-                else:
-                    found = self._step(fit, table, trials[i])
+                found = self._step(fit, table, trials[i])
                 if found.cost < fit.cost:
-                    fit.tables, fit.cost, fit.at, steps[i] = table, found.cost, trials[i], found.step
-                    fit.promised = found.promised
+                    fit.tables, fit.at, steps[i] = table, trials[i], found.step
+                    fit.cost, fit.promised = found.cost, found.promised
                     most[i], refused[i] = found.log_evidence + fit.hypothesis.log_odds, 0
                     if found.promised < _CLOSE:
                         continue
                 else:
                     steps[i], refused[i] = 0.3 * steps[i], refused[i] + 1
-                    if refused[i] > _REFUSED:
+                    if refused[i] > _REFUSED or fit.tables is None:
                         continue
                 trials[i] = fit.at + steps[i]
                 going.append(i)
@@ -432,8 +427,10 @@ class Comparing:
     def _usual_of(self, fit: Fitted, j: int) -> Settings:
         return fit.usual[j] if fit.usual else self.noise[j].typical
 
-    def _step(self, fit: Fitted, tables: list[RunTable], at: Float64) -> _Step:
+    def _step(self, fit: Fitted, tables: list[RunTable] | None, at: Float64) -> _Step:
         """Return the cost here, -2 ln of the posterior, and what the linear model makes of it."""
+        if tables is None:
+            return _Step(math.inf, np.zeros(len(at)))
         total, log_det = np.zeros((len(at) + 1, len(at) + 1)), 0.0
         for j, table in enumerate(tables):
             products, of_noise = self._of_run(j, table, self._usual_of(fit, j))
@@ -442,6 +439,8 @@ class Comparing:
         families = self.runs.priors(fit.hypothesis, at)
         cost = _cost(total, families, np.zeros(len(at)))
         log_evidence, step = _mean_step(total, families)
+        if not np.isfinite(step).all():
+            return _Step(math.inf, np.zeros(len(at)))
         below = [i for i in half(fit.hypothesis, self.runs.size) if step[i] < -at[i]]
         if below:  # the others go where that one stays at its bound
             mean, precision = families.mean.copy(), families.precision.copy()
@@ -598,7 +597,7 @@ class Comparing:
         amounts: Float64,
         responses: Sequence[Float64],
     ) -> tuple[list[Fitted], list[Fitted]]:
-        """Return the most promising starts of each way: as stated, and where nothing is missing."""
+        """Return the most promising starts of each way: as stated, and at the best of nothing."""
         kept: dict[tuple[object, ...], int] = {}
         found, beside = [], []
         shown = sum((np.abs(each).max(axis=1) for each in responses), np.zeros(len(ways)))
@@ -760,7 +759,7 @@ class Comparing:
         }
 
     def _stuck(self, fits: Sequence[Fitted], beside: Sequence[Fitted]) -> list[Fitted]:
-        """Return starts of effects whose fit is far worse than that of nothing, of no effect."""
+        """Return other starts of effects whose fit is far worse than that of nothing missing."""
         alone, least = self._alone(fits), fits[0].log_evidence - _STUCK
         found = ((alone.get(each.hypothesis.ways[-1].mode), each) for each in beside)
         return [each for i, each in found if i is not None and fits[i].log_evidence < least]
@@ -829,7 +828,7 @@ def _mean_step(total: Float64, families: Families) -> tuple[float, Float64]:
     logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
     weighted = logs[0] + families.log_chance
     whole = float(np.logaddexp.reduce(weighted))
-    return whole, np.exp(weighted - whole) @ steps[0] if math.isfinite(whole) else 0.0 * steps[0, 0]
+    return whole, np.exp(weighted - whole) @ steps[0]
 
 
 def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> RunTable:
