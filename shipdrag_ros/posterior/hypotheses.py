@@ -305,8 +305,8 @@ class ShipRuns:
         found, _ = self._base(priors.NOTHING, 0)
         k = self.coefficients
         for place in self.places:
-            for i in (motion.SPEED, motion.STOP, motion.PLACE, _PORT, _HEADING):
-                found[place[k + i]] = at[place[k + i]]
+            kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING)]]
+            found[kept] = at[kept]
         return found
 
     def width(self, hypothesis: Explanation) -> int:
