@@ -53,10 +53,12 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import checked
 
-_ITERATIONS = 8  # of Gauss and Newton
-_CLOSE = 0.1  # of -2 ln posterior
+_ITERATIONS = 30  # of Gauss and Newton
+_CLOSE = 0.05  # nats that a step may still promise
+_REFUSED = 5  # shorter and shorter steps that lead nowhere
 _LONGEST = 1.5  # of a step in z
-_HOPELESS, _TRIED = 25.0, 3  # nats behind the best, from where none is fitted on, and not before
+_HOPELESS, _TRIED = 15.0, 3  # nats behind the best, from where none is fitted on, and not before
+_STUCK = 4.0  # nats behind nothing, from where the fit of an effect begins anew
 _STARTS = 2  # of each way that are fitted
 _AT_ONCE = 100  # ways scored together: each is compared with each
 _TAUGHT = 6  # likeliest effects with which the noise is learnt
@@ -101,6 +103,8 @@ class Fitted(WeighedFit):
         One a run; linear about `at`.
     cost
         -2 ln of the posterior under usual noise.
+    promised
+        What the linear model promises beyond that, which was not reached: no evidence [nats].
     usual
         Noise of each run that is usual if this is the truth, once it is known.
     log_evidence
@@ -113,6 +117,7 @@ class Fitted(WeighedFit):
     at: Float64
     tables: list[RunTable] | None = None
     cost: float = math.inf
+    promised: float = 0.0
     usual: list[Settings] | None = None
     log_evidence: float = -math.inf
     z: Float64 | None = None
@@ -142,6 +147,15 @@ class _RunNoise(NamedTuple):
     learnt: NoisePosterior
     log_prior: Float64
     typical: Settings
+
+
+class _Step(NamedTuple):
+    """Cost at some unknowns; step, log evidence and promise of the model that is linear there."""
+
+    cost: float
+    step: Float64
+    log_evidence: float = -math.inf
+    promised: float = 0.0
 
 
 class RunResidual(NamedTuple):
@@ -264,12 +278,12 @@ class Comparing:
         ways = [way for each in self.ways.values() for way in each]
         scores, amounts, responses = self._score(nothing, ways)
         self._learn(nothing, ways, scores, responses)
-        singles = self._likeliest(nothing, ways, scores, amounts, responses)
+        singles, beside = self._likeliest(nothing, ways, scores, amounts, responses)
         smooth = [replace(self.base, smooth=where) for where in self.smooth]
         nothing.cost = math.inf
         every = [nothing, *(Fitted(each, self.widened(nothing, each)) for each in smooth)]
-        every += singles
-        every = self._fitted(every)
+        every = self._fitted(every + singles)
+        self._keep_better(every, self._stuck(every, beside))
         for more in (self._pairs, self._differing):
             every += self._fitted(more(every), max(fit.log_weight for fit in every))
         self._again(every)
@@ -380,10 +394,11 @@ class Comparing:
     def _climb(self, fits: Sequence[Fitted]) -> None:
         """Fit hypotheses, all in step, under the usual noise of each run."""
         for fit in fits:
-            fit.tables, fit.cost = None, math.inf
+            fit.tables, fit.cost, fit.promised = None, math.inf, 0.0
         trials = [fit.at for fit in fits]
         steps = [np.zeros(0)] * len(fits)
-        active = list(range(len(fits)))
+        most = [-math.inf] * len(fits)  # log weight by the linear model, reached or not
+        refused, active = [0] * len(fits), list(range(len(fits)))
         for number in range(_ITERATIONS):
             if not active:
                 break
@@ -393,59 +408,50 @@ class Comparing:
             going = []
             for i, table in zip(active, tables, strict=True):
                 fit = fits[i]
-                if table is None:
-                    if fit.tables is None:
-                        continue
-                    cost, step = math.inf, steps[i]
-                else:
-                    cost, step = self._step(fit, table, trials[i])
-                if cost < fit.cost:
-                    gained = fit.cost - cost
-                    fit.tables, fit.cost, fit.at, steps[i] = table, cost, trials[i], step
-                    if gained < _CLOSE:
+                found = self._step(fit, table, trials[i])
+                if found.cost < fit.cost:
+                    fit.tables, fit.at, steps[i] = table, trials[i], found.step
+                    fit.cost, fit.promised = found.cost, found.promised
+                    most[i], refused[i] = found.log_evidence + fit.hypothesis.log_odds, 0
+                    if found.promised < _CLOSE:
                         continue
                 else:
-                    steps[i] = 0.3 * steps[i]
-                    if np.max(np.abs(steps[i]), initial=0.0) == 0.0:
+                    steps[i], refused[i] = 0.3 * steps[i], refused[i] + 1
+                    if refused[i] > _REFUSED or fit.tables is None:
                         continue
                 trials[i] = fit.at + steps[i]
                 going.append(i)
-            least = min(fit.cost - 2.0 * fit.hypothesis.log_odds for fit in fits)
-            active = [
-                i
-                for i in going
-                if number < _TRIED
-                or fits[i].cost - 2.0 * fits[i].hypothesis.log_odds < least + 2.0 * _HOPELESS
-            ]
+            reached = max(each - fit.promised for each, fit in zip(most, fits, strict=True))
+            active = [i for i in going if number < _TRIED or most[i] > reached - _HOPELESS]
 
     def _usual_of(self, fit: Fitted, j: int) -> Settings:
         return fit.usual[j] if fit.usual else self.noise[j].typical
 
-    def _step(self, fit: Fitted, tables: list[RunTable], at: Float64) -> tuple[float, Float64]:
-        """Return -2 ln of the posterior here, and the step to the mean of the linear model."""
-        total = np.zeros((len(at) + 1, len(at) + 1))
+    def _step(self, fit: Fitted, tables: list[RunTable] | None, at: Float64) -> _Step:
+        """Return the cost here, -2 ln of the posterior, and what the linear model makes of it."""
+        if tables is None:
+            return _Step(math.inf, np.zeros(len(at)))
+        total, log_det = np.zeros((len(at) + 1, len(at) + 1)), 0.0
         for j, table in enumerate(tables):
-            products, _ = self._of_run(j, table, self._usual_of(fit, j))
+            products, of_noise = self._of_run(j, table, self._usual_of(fit, j))
             _put(total, products[0], table.place)
-        mean, precision, log_chance = self.runs.priors(fit.hypothesis, at)
-        density = (
-            log_chance
-            + 0.5 * np.log(precision).sum(axis=1)
-            - 0.5 * (precision * mean**2).sum(axis=1)
-        )
-        cost = float(total[0, 0] - 2.0 * np.logaddexp.reduce(density))
-        logs, steps, _ = solve(total[None], mean, precision, 0, 0)
-        if not np.isfinite(logs).any():
-            return math.inf, np.zeros(len(at))
-        weight = np.exp(logs[0] + log_chance - (logs[0] + log_chance).max())
-        step = (weight / weight.sum()) @ steps[0]
+            log_det += float(of_noise[0])
+        families = self.runs.priors(fit.hypothesis, at)
+        cost = _cost(total, families, np.zeros(len(at)))
+        log_evidence, step = _mean_step(total, families)
+        if not np.isfinite(step).all():
+            return _Step(math.inf, np.zeros(len(at)))
+        below = [i for i in half(fit.hypothesis, self.runs.size) if step[i] < -at[i]]
+        if below:  # the others go where that one stays at its bound
+            mean, precision = families.mean.copy(), families.precision.copy()
+            mean[:, below], precision[:, below] = -at[below], EXACT**-2.0
+            _, step = _mean_step(total, Families(mean, precision, families.log_chance))
+            step[below] = -at[below]
+        promised = 0.5 * max(cost - _cost(total, families, step), 0.0)
         first, q = self.runs.size, len(fit.hypothesis.unknowns)
-        own = step[first : first + q]
-        longest = float(np.max(np.abs(own), initial=0.0))
+        longest = float(np.max(np.abs(step[first : first + q]), initial=0.0))
         step *= min(1.0, _LONGEST / max(longest, 1e-12))
-        for i in half(fit.hypothesis, first):
-            step[i] = max(step[i], -at[i])
-        return cost, step
+        return _Step(cost, step, log_evidence - 0.5 * log_det, promised)
 
     def _of_run(self, j: int, table: RunTable, settings: Settings) -> tuple[Float64, Float64]:
         model = self.runs.runs[j].model
@@ -590,10 +596,10 @@ class Comparing:
         scores: Float64,
         amounts: Float64,
         responses: Sequence[Float64],
-    ) -> list[Fitted]:
-        """Return the most promising starts of each way."""
+    ) -> tuple[list[Fitted], list[Fitted]]:
+        """Return the most promising starts of each way: as stated, and at the best of nothing."""
         kept: dict[tuple[object, ...], int] = {}
-        found = []
+        found, beside = [], []
         shown = sum((np.abs(each).max(axis=1) for each in responses), np.zeros(len(ways)))
         for i in np.lexsort((-scores, shown == 0.0)).tolist():  # no fit leaves where nothing shows
             way = ways[i]
@@ -601,10 +607,11 @@ class Comparing:
             if kept[way.mode] > _STARTS:
                 continue
             fit = self._begun(nothing, Explanation((*self.stated, way)), float(amounts[i]))
+            beside.append(Fitted(fit.hypothesis, fit.at.copy()))
             # at the best of nothing, nuisances stand for the effect as far as they can
             fit.at[: self.runs.size] = self.runs.as_stated(nothing.at)
             found.append(fit)
-        return found
+        return found, beside
 
     def _begun(self, base: Fitted, hypothesis: Explanation, amount: float) -> Fitted:
         """Return where the fit of one more way begins, at so much of its trace."""
@@ -661,7 +668,7 @@ class Comparing:
             replace(each.learnt, settings=each.learnt.settings._replace(weight=weight)).typical
             for each, weight in zip(self.noise, weights, strict=True)
         ]
-        log_evidence += self.log_known(fit.hypothesis)
+        log_evidence += self.log_known(fit.hypothesis) - fit.promised
         fit.log_evidence = log_evidence if math.isfinite(log_evidence) else -math.inf
         first = self.runs.size
         q = len(fit.hypothesis.unknowns)
@@ -743,15 +750,25 @@ class Comparing:
             found.append(Fitted(hypothesis, at))
         return found
 
-    def _again(self, fits: list[Fitted]) -> None:
-        """Fit single effects from where likely larger hypotheses have them; keep the better."""
-        first = self.runs.size + len(self.base.unknowns)
-        top = max(fit.log_weight for fit in fits)
-        alone = {
+    def _alone(self, fits: Sequence[Fitted]) -> dict[tuple[object, ...], int]:
+        """Return the place of each effect by itself."""
+        return {
             fit.hypothesis.ways[-1].mode: i
             for i, fit in enumerate(fits)
             if len(fit.hypothesis.ways) == 1 + len(self.stated) and not fit.hypothesis.smooth
         }
+
+    def _stuck(self, fits: Sequence[Fitted], beside: Sequence[Fitted]) -> list[Fitted]:
+        """Return other starts of effects whose fit is far worse than that of nothing missing."""
+        alone, least = self._alone(fits), fits[0].log_evidence - _STUCK
+        found = ((alone.get(each.hypothesis.ways[-1].mode), each) for each in beside)
+        return [each for i, each in found if i is not None and fits[i].log_evidence < least]
+
+    def _again(self, fits: list[Fitted]) -> None:
+        """Fit single effects from where likely larger hypotheses have them."""
+        first = self.runs.size + len(self.base.unknowns)
+        top = max(fit.log_weight for fit in fits)
+        alone = self._alone(fits)
         found = []
         for fit in fits:
             ways = fit.hypothesis.ways[len(self.stated) :]
@@ -766,9 +783,14 @@ class Comparing:
                     single = fits[i].hypothesis
                     at = np.concatenate([fit.at[:first], fit.at[own]])
                     beyond = np.zeros(self.runs.width(single) - len(at))
-                    found.append((i, Fitted(single, np.concatenate([at, beyond]))))
-        self._fitted([fit for _, fit in found], top)
-        for i, fit in found:
+                    found.append(Fitted(single, np.concatenate([at, beyond])))
+        self._keep_better(fits, found)
+
+    def _keep_better(self, fits: list[Fitted], starts: Sequence[Fitted]) -> None:
+        """Fit single effects from other starts; each stands for its own where it is better."""
+        alone = self._alone(fits)
+        for fit in self._fitted(starts, max(fit.log_weight for fit in fits)):
+            i = alone[fit.hypothesis.ways[-1].mode]
             if fit.log_evidence > fits[i].log_evidence:
                 fits[i] = fit
 
@@ -790,6 +812,23 @@ class Comparing:
             for fit, table in zip(tried, tables, strict=True):
                 fit.tables, fit.cost = table, 0.0
         return tried
+
+
+def _cost(total: Float64, families: Families, step: Float64) -> float:
+    """Return -2 ln of the posterior a step (p,) away, by the products of the linear model."""
+    mean, precision, log_chance = families
+    density = log_chance + 0.5 * np.log(precision).sum(axis=1)
+    density -= 0.5 * (precision * (mean - step) ** 2).sum(axis=1)
+    data = total[0, 0] - 2.0 * total[0, 1:] @ step + step @ total[1:, 1:] @ step
+    return float(data - 2.0 * np.logaddexp.reduce(density))
+
+
+def _mean_step(total: Float64, families: Families) -> tuple[float, Float64]:
+    """Return log evidence by the linear model, and the step to its mean."""
+    logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
+    weighted = logs[0] + families.log_chance
+    whole = float(np.logaddexp.reduce(weighted))
+    return whole, np.exp(weighted - whole) @ steps[0]
 
 
 def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> RunTable:
