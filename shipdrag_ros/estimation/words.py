@@ -108,18 +108,18 @@ def conditions(estimate: Estimate) -> str:
     )
 
 
-def in_calm(estimate: Estimate) -> str:
+def in_calm(estimate: Estimate, speed_m_s: float) -> str:
     """
-    Say what r is in calm deep water, where that is known best; '' where it is what is shown.
+    Say what r is in calm deep water next to some speed [m/s]; '' where it is what is shown.
     """
     curve = estimate.valid_calm
     if not estimate.reference.unknown or not estimate.sigma_parts or not len(curve):
         return ''
-    best = int(np.argmin(curve.sigma_m_s2 / np.abs(curve.resistance_m_s2)))
-    r, sigma = float(curve.resistance_m_s2[best]), float(curve.sigma_m_s2[best])
+    near = int(np.argmin(np.abs(curve.speed_m_s - speed_m_s)))
+    r, sigma = float(curve.resistance_m_s2[near]), float(curve.sigma_m_s2[near])
     return (
         f' In calm deep water, whatever the weather was, it is {plus_minus(r, 2.0 * sigma)} m/s² '
-        f'at {speed_text(float(curve.speed_m_s[best]), highest_m_s=float(curve.speed_m_s[-1]))} '
+        f'at {speed_text(float(curve.speed_m_s[near]), highest_m_s=float(curve.speed_m_s[-1]))} '
         'm/s.'
     )
 
@@ -141,7 +141,7 @@ def specific(estimate: Estimate) -> str:
     return (
         f'In SI: r(v) is known from {shown(low)} to {shown(high)} m/s, best at {shown(speed)} '
         f'm/s: there the specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard '
-        f'deviations), {conditions(estimate)}.{in_calm(estimate)}'
+        f'deviations), {conditions(estimate)}.{in_calm(estimate, speed)}'
     )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -92,6 +93,8 @@ def test_a_wind_stays_in_the_curve_of_the_run_and_is_shown_where_it_is_not_known
     said = summary(found)[-1]
     assert 'in the wind and depth of the run, which are not known' in said
     assert 'In calm deep water, whatever the weather was' in said
+    first, second = re.findall(r'at (\S+) m/s[:.]', said)
+    assert first == second  # one speed for both figures
 
 
 def test_shallow_water_that_is_measured_is_taken_out() -> None:

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hypotheses are compared at their best, and by what was reached there."""
+
+from __future__ import annotations
+
+import math
+
+from benchmarks.accuracy import diagnosis_score
+
+
+def test_no_effect_is_named_by_a_fit_that_did_not_settle() -> None:
+    # two runs of a sound ship; waves that were fitted half way promised more than they reach
+    found = diagnosis_score.answer('command', 992, 'b')['found']
+    probability = {tuple(each['names']): each['probability'] for each in found['candidates']}
+    assert not found['effects']
+    assert max(probability, key=lambda names: probability[names]) == ('none',)
+    assert probability['none',] > 0.7
+    assert math.fsum(probability.values()) < 1.0 + 1e-9
