@@ -303,23 +303,13 @@ def _result(
     calm = _curve(part, use, ship)
     curve = conditions if reference.unknown else calm
     stamps = np.concatenate(list(record.stamps.values()))
-    tracks = {}
-    for name, times in record.stamps.items():
-        chosen = coast.kind == CODES[name]
-        measured = coast.value[chosen]
-        tracks[name] = Track(times, measured, measured - table[0, chosen])
+    without = _CONDITIONS if reference.unknown else _CALM
     over_ground = any(CODES[name] % KIND_COUNT != LOG for name in record.stamps)
     current = k + motion.CURRENT
     return Estimate(
         NAME,
         **ValidRange.of_branch(curve)._asdict(),
-        **_at_end(
-            found,
-            coast,
-            last,
-            float(whole.resistance_m_s2[-1]),
-            without=_CONDITIONS if reference.unknown else _CALM,
-        )._asdict(),
+        **_at_end(found, coast, last, float(whole.resistance_m_s2[-1]), without)._asdict(),
         calm=calm,
         conditions=conditions,
         whole=whole,
@@ -332,13 +322,23 @@ def _result(
         orders=(),
         samples={name: len(times) for name, times in record.stamps.items()},
         noise_sd=dict(record.white_sd),
-        tracks=tracks,
+        tracks=_tracks(record, table[0]),
         current_m_s=float(found.mean[current]) if over_ground else None,
         current_sigma_m_s=float(np.sqrt(found.covariance[current, current]))
         if over_ground
         else None,
         notes=(*window.notes, *ship.warnings, *notes),
     )
+
+
+def _tracks(record: RunRows, predicted: Float64) -> dict[str, Track]:
+    """Return readings and residuals of each input."""
+    found = {}
+    for name, times in record.stamps.items():
+        chosen = record.coast.kind == CODES[name]
+        measured = record.coast.value[chosen]
+        found[name] = Track(times, measured, measured - predicted[chosen])
+    return found
 
 
 def _slowing(part: ReadOut) -> slice:
@@ -383,7 +383,7 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
 
 
 def _at_end(
-    found: RunPosterior, coast: Rows, last: float, at_stop: float, *, without: tuple[str, ...]
+    found: RunPosterior, coast: Rows, last: float, at_stop: float, without: tuple[str, ...]
 ) -> AtEnd:
     """Return what is known of the end; `at_stop` [m/s^2] is what slows her at the stop."""
     problem, k = found.problem, found.problem.coefficients
