@@ -828,6 +828,8 @@ def _mean_step(total: Float64, families: Families) -> tuple[float, Float64]:
     logs, steps, _ = solve(total[None], families.mean, families.precision, 0, 0)
     weighted = logs[0] + families.log_chance
     whole = float(np.logaddexp.reduce(weighted))
+    if not math.isfinite(whole):
+        return whole, np.full(steps.shape[-1], np.nan)
     return whole, np.exp(weighted - whole) @ steps[0]
 
 
