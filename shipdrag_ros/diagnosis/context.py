@@ -160,7 +160,7 @@ class Context:
     def __len__(self) -> int:
         return len(self.value)
 
-    def predict(self, columns: Columns, actions: Sequence[Action]) -> Float64:
+    def predict(self, columns: Columns, actions: Sequence[Action], stop_s: float) -> Float64:
         """
         Return what columns predict, (k, c).
 
@@ -170,6 +170,8 @@ class Context:
             Of one simulation.
         actions
             What acts in each column.
+        stop_s
+            Time of the stop [s].
 
         Returns
         -------
@@ -185,8 +187,8 @@ class Context:
             depth = np.array([action.depth_m for action in actions]) / self.draught_m
             parts.append(np.log(np.clip(depth, 1.0, _DEEP_DRAUGHTS))[:, None])
         if len(self.at_shaft):
-            parts += self._shafts(columns, actions)
-        after = columns.time_s[self.at_yaw] - self.stop.lead_in_s
+            parts += self._shafts(columns, actions, stop_s)
+        after = columns.time_s[self.at_yaw] - stop_s
         yaw = np.zeros((len(actions), len(after)))
         for i, action in enumerate(actions):
             for turn in action.turns:
@@ -204,9 +206,9 @@ class Context:
         fall_s = (1.0 - fraction) * own + fraction * action.residual_decay_s
         return math.log(max(fall_s, _SHORTEST_S))
 
-    def _shafts(self, columns: Columns, actions: Sequence[Action]) -> list[Float64]:
+    def _shafts(self, columns: Columns, actions: Sequence[Action], stop_s: float) -> list[Float64]:
         """Return shaft speeds over the steady one, and how odd it is that the shaft stands."""
-        after = columns.time_s[self.at_shaft] - self.stop.lead_in_s
+        after = columns.time_s[self.at_shaft] - stop_s
         speed = columns.speed_through_water_m_s[:, self.at_shaft]
         wanted = attrgetter(
             'stall_m_s', 'friction_m_s', 'free_shaft', 'residual_fraction', 'residual_decay_s'

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TypeVar
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
 from shipdrag_ros.diagnosis.earlier import Carried, EarlierDiagnosis, carried
@@ -41,8 +39,6 @@ from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
-_NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
-_LOOKS = 3  # at a run
 _APART_M_S = 0.15  # slowly: six times what is usual of water
 
 Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
@@ -123,8 +119,7 @@ def diagnose(
     ['log_scale']
     """
     baseline = 'fitted_here' if ship.baseline is None else 'stated'
-    look = partial(observed, runs, ship, parameters, progress=progress)
-    seen, notes = look({})
+    seen, notes = observed(runs, ship, parameters, progress=progress)
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
@@ -137,17 +132,14 @@ def diagnose(
             runs=_seen_runs(seen),
         )
 
-    def compared(seen: tuple[Observation, ...]) -> _Case:
-        stated = stated_in(runs, seen, ship, facts)
-        before = carried(
-            earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
-        )
-        progress('comparing hypotheses', 0, 0)
-        comparing = compare(seen, ship, stated, before)
-        return _Case(seen, comparing, comparing.compare(), stated, before)
-
-    case, notes = settled(look, (seen, notes), compared)
-    return _answer(case, ship, notes, baseline, progress, advise=advise)
+    stated = stated_in(runs, seen, ship, facts)
+    before = carried(
+        earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
+    )
+    progress('comparing hypotheses', 0, 0)
+    comparing = compare(seen, ship, stated, before)
+    case = _Case(seen, comparing, comparing.compare(), stated, before)
+    return _answer(case, ship, (*notes, *of_one_day(case)), baseline, progress, advise=advise)
 
 
 def _answer(
@@ -229,57 +221,7 @@ class _Case(ComparedRuns):
     earlier: Carried | None
 
 
-Case = TypeVar('Case', bound=ComparedRuns)
-
-
-def settled(
-    look: Callable[[Mapping[str, float]], Observed],
-    first: Observed,
-    compared: Callable[[tuple[Observation, ...]], Case],
-) -> tuple[Case, tuple[str, ...]]:
-    """
-    Compare hypotheses, and look at the runs again where their stops are moved by that.
-
-    Parameters
-    ----------
-    look
-        Sees the runs, as `observed` does, with their stops later by so much.
-    first
-        What it gives where none is moved.
-    compared
-        Compares.
-
-    Returns
-    -------
-    case
-        With the runs as they were seen last.
-    notes
-        What is to be said about them.
-    """
-    moved_s: dict[str, float] = {}
-    seen, notes = first
-    case = compared(seen)
-    for _ in range(_LOOKS - 1):
-        more_s = _moved_stops(case)
-        if not more_s:
-            break
-        moved_s |= {name: moved_s.get(name, 0.0) + by_s for name, by_s in more_s.items()}
-        # effects are simulated from the stop as the run was seen
-        seen, notes = look(moved_s)
-        case = compared(seen)
-    return case, (
-        *notes,
-        *_of_one_day(case),
-        *(
-            f'{name}: after {_LOOKS} looks the likeliest stop is still {by_s:+.0f} s from the one '
-            'that effects are simulated from; tell the stop, or record the shaft'
-            for name, by_s in _moved_stops(case).items()
-            if abs(by_s) > _NEAR_S
-        ),
-    )
-
-
-def _of_one_day(case: ComparedRuns) -> Iterator[str]:
+def of_one_day(case: ComparedRuns) -> Iterator[str]:
     """Say which effects of the ship file are of the water and air of one day, and taken as so."""
     earth = [way.effect for way in case.comparing.stated if way.effect.scope is Scope.EARTH]
     if earth:
@@ -344,15 +286,6 @@ def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
     return tuple(SeenRun(run.name, run.stopped_ns) for run in seen)
 
 
-def _moved_stops(case: ComparedRuns) -> dict[str, float]:
-    """Return by how much the likeliest has each stop later; empty where that hardly matters."""
-    likeliest = max(case.found.fitted, key=lambda fit: fit.log_weight)
-    more_s = case.comparing.runs.stop_s(likeliest.at)
-    if all(abs(by_s) <= _NEAR_S for by_s in more_s):
-        return {}
-    return {run.name: by_s for run, by_s in zip(case.seen, more_s, strict=True)}
-
-
 def _has_both(run: Observation) -> bool:
     """Say whether a run has a log and the way over ground, to be held against each other."""
     by_log = run.along.rows.kind == LOG
@@ -363,7 +296,6 @@ def observed(
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,
-    moved_s: Mapping[str, float],
     progress: Progress,
 ) -> Observed:
     """
@@ -371,8 +303,6 @@ def observed(
 
     Parameters
     ----------
-    moved_s
-        By how much the stop of each run is later than it is taken for at first.
     progress
         Called with how many runs are seen.
     """
@@ -384,16 +314,8 @@ def observed(
         window = run.window.one_of_each()
         notes += [f'{run.name}: {note}' for note in window.notes[len(run.window.notes) :]]
         try:
-            by_s = moved_s.get(run.name, 0.0)
-            seen.append(
-                Observation.of(
-                    window,
-                    usual_baseline(run.ship or ship),
-                    parameters,
-                    name=run.name,
-                    stop_moved_s=by_s,
-                )
-            )
+            own = usual_baseline(run.ship or ship)
+            seen.append(Observation.of(window, own, parameters, name=run.name))
         except (DiagnosisError, EstimationError) as error:
             refused[run.name] = error
     if not seen:

@@ -94,8 +94,6 @@ class Observation:
         What is measured besides.
     ship
         As she was in this run, without effects.
-    stop_moved_s
-        By how much the end of the lead-in is later than the stop was taken for at first.
     notes
         A sentence for each input that is left out.
     """
@@ -114,7 +112,6 @@ class Observation:
     across_whitener: Float64
     context: Context
     ship: Ship
-    stop_moved_s: float = 0.0
     notes: tuple[str, ...] = ()
 
     @property
@@ -133,15 +130,7 @@ class Observation:
         return {Input(code % KIND_COUNT).key for code in np.unique(self.along.rows.kind).tolist()}
 
     @classmethod
-    def of(
-        cls,
-        window: Window,
-        ship: Ship,
-        parameters: Parameters,
-        *,
-        name: str,
-        stop_moved_s: float = 0.0,
-    ) -> Observation:
+    def of(cls, window: Window, ship: Ship, parameters: Parameters, *, name: str) -> Observation:
         """
         Condense a coastdown with the steady record before it.
 
@@ -155,8 +144,6 @@ class Observation:
             For the noise of the sensors and the convention of the heading.
         name
             For the user.
-        stop_moved_s
-            By how much the stop is known to be later than it is taken for [s].
 
         Returns
         -------
@@ -179,7 +166,6 @@ class Observation:
         # the first mean is of as much time at most
         first_ns = run_down.stop_ns + round((float(record.steady.time_s[0]) - BIN_S) * 1e9)
         since_ns = max(window.before.start_ns, first_ns)
-        run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
         heading_rad, heading_sd = _heading(window, since_ns, record.white_sd.get('position', 0.0))
         halved_s = 2.0 / float(damping_of(ship, np.array([speed_m_s]))[0][0])
@@ -216,7 +202,6 @@ class Observation:
             else whitener_of(aside, ship, speed_m_s, lead_in_s, run_down.stop_sd_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
-            stop_moved_s,
             record.notes,
         )
 
@@ -373,7 +358,6 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         run.heading_sd_rad,
         stated,
         ship.baseline.run_scatter if ship.baseline else 0.0,
-        -run.stop_moved_s,
         len(run.context.at_shaft) > 0,
         _simulating(run, frame),
     )
@@ -381,13 +365,15 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
 
 def _simulating(
     run: Observation, frame: Frame
-) -> Callable[[Sequence[Action], Float64], SimulatedRows]:
-    def simulate(actions: Sequence[Action], speed_m_s: Float64) -> SimulatedRows:
-        columns = simulate_columns(
-            frame.ship, frame.scenario, actions, run.time_s, speed_m_s=speed_m_s
-        )
+) -> Callable[[Sequence[Action], Float64, float], SimulatedRows]:
+    first, length = frame.scenario.lead_in_s, frame.scenario.length_s
+
+    def simulate(actions: Sequence[Action], speed_m_s: Float64, stop_s: float) -> SimulatedRows:
+        lead_in_s = min(max(first + stop_s, 1.0), length - 1.0)  # within the record
+        scenario = replace(frame.scenario, lead_in_s=lead_in_s, duration_s=length - lead_in_s)
+        columns = simulate_columns(frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s)
         along, across, distance = rows_of(run, columns)
-        context = run.context.predict(columns, actions)
+        context = run.context.predict(columns, actions, lead_in_s)
         at = distance[:, :0] if run.across is None else distance[:, run.across.at]
         return SimulatedRows(along, np.hstack([across, context]), at)
 

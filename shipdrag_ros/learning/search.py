@@ -13,7 +13,6 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from shipdrag_ros.diagnosis.diagnose import (
     ComparedRuns,
     effects_about,
     observed,
-    settled,
+    of_one_day,
     stated_in,
 )
 from shipdrag_ros.diagnosis.gaps import held_out, where
@@ -146,10 +145,9 @@ def learn(
             f'ship {ship.name!r} has no baseline, and what is learnt is what it lacks; add '
             '`baseline` to her ship file, or learn one with `shipdrag baseline`'
         )
-    look = partial(observed, runs, ship, parameters, progress=progress)
-    compared = partial(_LearningCase.of, runs, ship=ship, progress=progress)
-    case, notes = settled(look, look({}), compared)
-    return _Judged(case, name, notes, progress).answer()
+    seen, notes = observed(runs, ship, parameters, progress=progress)
+    case = _LearningCase.of(runs, seen, ship, progress)
+    return _Judged(case, name, (*notes, *of_one_day(case)), progress).answer()
 
 
 @dataclass(frozen=True)

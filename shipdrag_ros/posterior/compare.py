@@ -436,6 +436,8 @@ class Comparing:
             products, of_noise = self._of_run(j, table, self._usual_of(fit, j))
             _put(total, products[0], table.place)
             log_det += float(of_noise[0])
+        if not np.isfinite(total).all():  # far from all that is read
+            return _Step(math.inf, np.zeros(len(at)))
         families = self.runs.priors(fit.hypothesis, at)
         cost = _cost(total, families, np.zeros(len(at)))
         log_evidence, step = _mean_step(total, families)
@@ -476,13 +478,13 @@ class Comparing:
         """Return what the last effect of each hypothesis adds to a run's rows, (h, n + q)."""
         run, size = self.runs.runs[j], self.runs.size
         z = base.at[size : size + len(base.hypothesis.unknowns)]
-        still, steady_m_s = self.runs.still(j, base.at)
+        began = self.runs.began(j, base.at)
         air = self.runs.air(j, base.at)
-        whole = Action.total(still, *base.hypothesis.actions(run.frame, j, z), air)
+        whole = Action.total(began.still, *base.hypothesis.actions(run.frame, j, z), air)
         ways = [each.ways[-1] for each in hypotheses]
         more = [way.action(run.frame, way.tried(), j) for way in ways]
         actions = [whole, *(whole + each for each in more)]
-        shown = run.simulate(actions, np.full(len(actions), steady_m_s))
+        shown = run.simulate(actions, np.full(len(actions), began.speed_m_s), began.stop_s)
         change = np.hstack([shown.along, shown.rest])
         change = change[1:] - change[0]
         change[~np.isfinite(change).all(axis=1)] = 0.0

@@ -83,12 +83,10 @@ class RunSight:
         Of the thrust, as the ship file states it; 0 without.
     scatter
         Of the resistance from run to run, relative.
-    stop_s
-        Where the stop was taken for at first.
     shaft
         Whether it is measured after its fall.
     simulate
-        From actions and steady speeds (m,).
+        From actions and steady speeds (m,), and by how much the stop is later than in the frame.
     """
 
     model: RunModel
@@ -99,9 +97,8 @@ class RunSight:
     heading_sd_rad: float
     stated_run_down_s: float
     scatter: float
-    stop_s: float
     shaft: bool
-    simulate: Callable[[Sequence[Action], Float64], SimulatedRows]
+    simulate: Callable[[Sequence[Action], Float64, float], SimulatedRows]
 
     @cached_property
     def over_run(self) -> Float64:
@@ -186,16 +183,32 @@ class Explanation:
 
 @dataclass
 class _Asked:
-    """Columns of one simulation; each is there once."""
+    """Columns of simulations, one for each time of the stop; each column is there once."""
 
-    numbers: dict[tuple[Action, float], int] = field(default_factory=dict)
+    numbers: dict[tuple[float, Action, float], int] = field(default_factory=dict)
 
-    def add(self, action: Action, speed_m_s: float) -> int:
-        return self.numbers.setdefault((action, speed_m_s), len(self.numbers))
+    def add(self, action: Action, began: _Began) -> int:
+        return self.numbers.setdefault((began.stop_s, action, began.speed_m_s), len(self.numbers))
 
     def simulate(self, run: RunSight) -> SimulatedRows:
-        actions = [action for action, _ in self.numbers]
-        return run.simulate(actions, np.array([speed for _, speed in self.numbers]))
+        by_stop: dict[float, list[tuple[int, Action, float]]] = {}
+        for (stop_s, action, speed_m_s), number in self.numbers.items():
+            by_stop.setdefault(stop_s, []).append((number, action, speed_m_s))
+        parts, order = [], list[int]()
+        for stop_s, columns in by_stop.items():
+            numbers, actions, speeds = zip(*columns, strict=True)
+            parts.append(run.simulate(actions, np.array(speeds), stop_s))
+            order += numbers
+        back = np.argsort(order)
+        return SimulatedRows(*(np.concatenate(each)[back] for each in zip(*parts, strict=True)))
+
+
+class _Began(NamedTuple):
+    """What acts in a run without effects, her steady speed, and by how much later she stops."""
+
+    still: Action
+    speed_m_s: float
+    stop_s: float
 
 
 class RunTable(NamedTuple):
@@ -292,12 +305,6 @@ class ShipRuns:
         found[: self.coefficients] = 0.0
         return found
 
-    def stop_s(self, at: Float64) -> list[float]:
-        """
-        Return the stop of each run at some unknowns.
-        """
-        return [float(at[place[self.coefficients + motion.STOP]]) for place in self.places]
-
     def as_stated(self, at: Float64) -> Float64:
         """
         Return unknowns with all that is not a matter of where a run began as it is stated.
@@ -387,7 +394,6 @@ class ShipRuns:
             given[own[acts]] = True
             mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
             precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0
-            mean[place[k + motion.STOP]] = run.stop_s
             precision[place[k + _PORT]] = 1e-6  # of where she was, nothing is known
             precision[place[k + _HEADING]] = max(run.heading_sd_rad, EXACT) ** -2.0
             precision[place[k + _SCATTER]] = max(run.scatter, EXACT) ** -2.0
@@ -427,15 +433,15 @@ class ShipRuns:
 
     def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
         run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)].tolist()
-        still, speed = self.still(j, at)
-        actions = [still, *hypothesis.actions(run.frame, j, z), self.air(j, at)]
+        began = self.began(j, at)
+        actions = [began.still, *hypothesis.actions(run.frame, j, z), self.air(j, at)]
         whole = Action.total(*actions)
 
         def instead(i: int, action: Action) -> int:
             """Ask for a column in which one of the actions is another."""
             changed = [*actions]
             changed[i] = action
-            return batch.add(Action.total(*changed), speed)
+            return batch.add(Action.total(*changed), began)
 
         steps: list[tuple[int, int, float]] = []
         for i, way in enumerate(hypothesis.ways, 1):
@@ -444,13 +450,13 @@ class ShipRuns:
                 column = instead(i, way.action(run.frame, stepped, j))
                 steps.append((_LOCAL + len(steps), column, _STEP_Z))
         for line, wind in zip(_AIR, ((_STEP_M_S, 0.0), (0.0, _STEP_M_S))):
-            steps.append((line, batch.add(whole + Action(wind_m_s=wind), speed), _STEP_M_S))
+            steps.append((line, batch.add(whole + Action(wind_m_s=wind), began), _STEP_M_S))
         stalled = whole.friction_m_s * math.expm1(priors.SHAFT_FRICTION.sd * _STEP_Z)
         shafts = Action(free_shaft=_STEP_Z), Action(friction_m_s=stalled)
         for line, shaft in zip((_FREE, _STALL), shafts if run.shaft else ()):
-            steps.append((line, batch.add(whole + shaft, speed), _STEP_Z))
+            steps.append((line, batch.add(whole + shaft, began), _STEP_Z))
         without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
-        base, acting = batch.add(still, speed), batch.add(whole, speed)
+        base, acting = batch.add(began.still, began), batch.add(whole, began)
         return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
@@ -458,8 +464,8 @@ class ShipRuns:
         east, north = (float(at[self.places[j][self.coefficients + i]]) for i in _AIR)
         return Action(wind_m_s=(east, north))
 
-    def still(self, j: int, at: Float64) -> tuple[Action, float]:
-        """Return what acts in a run without effects, and her steady speed."""
+    def began(self, j: int, at: Float64) -> _Began:
+        """Return how a run began at some unknowns."""
         run, place, k = self.runs[j], self.places[j], self.coefficients
         tau_s = run.model.forces.tau_s * math.exp(float(at[place[k + motion.TAU]]))
         friction = priors.SHAFT_FRICTION
@@ -470,7 +476,8 @@ class ShipRuns:
             * friction.mean
             * math.exp(friction.sd * float(at[place[k + _STALL]])),
         )
-        return still, float(at[place[k + motion.SPEED]])
+        speed_m_s, stop_s = (float(at[place[k + i]]) for i in (motion.SPEED, motion.STOP))
+        return _Began(still, speed_m_s, stop_s)
 
     def _table(
         self, j: int, hypothesis: Explanation, at: Float64, plan: _Places, shown: SimulatedRows

@@ -183,8 +183,9 @@ def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
     prior = way.unknowns[0].prior
     z = [prior.inverse(math.copysign(bound, prior.first)), *way.start[1:]]
     run = runs.runs[0]
-    still, speed = runs.still(0, comparing.nothing.at)
-    shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
+    began = runs.began(0, comparing.nothing.at)
+    actions = began.still, began.still + way.action(run.frame, z)
+    shown = run.simulate(actions, np.full(2, began.speed_m_s), began.stop_s).along
     rows, model = run.model.rows, run.model
     by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
     late = by_log & (rows.time_s > RUN_DOWNS * max(model.forces.tau_s, 1.0))

@@ -159,7 +159,7 @@ def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo
         block, stop_ns, int(block.stamp_ns.max()), before_ns=int(block.stamp_ns.min())
     )
     run = CoastRun('run', window)
-    (seen,), notes = observed([run], cargo, Parameters(), {}, lambda *_: None)
+    (seen,), notes = observed([run], cargo, Parameters(), lambda *_: None)
     assert set(seen.along.rows.kind.tolist()) == {LOG, POSITION}
     if first_heard:
         (note,) = notes
@@ -191,6 +191,8 @@ def answer(*effects: str, ship: Ship = SHIP) -> DiagnosisResult:
         ('log_lag=25', 'lag_s', 25.0),
         # at the best of nothing, the filter of the log stands for it
         ('time_offset=30', 'offset_s', 30.0),
+        # a minute and a half late: what dates the stop is late too
+        ('time_offset=90', 'offset_s', 90.0),
     ],
 )
 def test_what_is_hidden_is_named_with_its_size(text: str, parameter: str, size: float) -> None:

@@ -16,6 +16,7 @@ from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.effects import ways_of
@@ -231,6 +232,25 @@ def test_hypotheses_together_are_as_each_alone(runs: ShipRuns) -> None:
         assert alone is not None
         np.testing.assert_allclose(one.along, alone.along, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(one.rest, alone.rest, rtol=1e-9, atol=1e-9)
+
+
+def test_what_an_effect_does_begins_with_the_stop_of_each_hypothesis(runs: ShipRuns) -> None:
+    hypothesis, at = with_effect(runs, 'fouling')
+    run, stop = runs.runs[0], runs.places[0][runs.coefficients + motion.STOP]
+    rows = run.model.rows
+    by_log = rows.kind == LOG
+    shown = {}
+    for later_s in (0.0, 50.0):
+        at[stop] = later_s
+        began = runs.began(0, at)
+        actions = [began.still, began.still + hypothesis.actions(run.frame, 0, at[runs.size :])[0]]
+        along = run.simulate(actions, np.full(2, began.speed_m_s), began.stop_s).along
+        shown[later_s] = (along[1] - along[0])[by_log]
+    time_s = rows.time_s[by_log]
+    after = (time_s > 60.0) & (time_s < time_s[-1] - 50.0)
+    moved = np.interp(time_s[after] + 50.0, time_s, shown[50.0])
+    assert np.abs(shown[0.0][after]).max() > 0.1
+    np.testing.assert_allclose(moved, shown[0.0][after], atol=0.01)
 
 
 def test_wind_and_depth_are_felt_by_their_sensors(seen: Observation, runs: ShipRuns) -> None:
