@@ -212,7 +212,7 @@ class EndedCoastdown:
 @dataclass(frozen=True)
 class WholeGlide:
     """
-    A stretch without thrust in which something but the water acted.
+    A stretch without thrust that is probably not one glide: something but the water acted.
 
     It is more than the coastdown in it, or holds none.
     """

@@ -27,7 +27,7 @@ from shipdrag_ros.simulation.effects import effects_of
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
-_PLACES = (-1.4, 0.0, 1.4)  # the same of a speed at which something changes
+_PLACES = (-1.5, -0.9, -0.3, 0.3, 0.9, 1.5)  # the same of a speed at which something changes
 _SIZES = tuple(np.linspace(-1.6, 1.6, 17).tolist())  # where an effect has nothing else
 _EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # shares of the longest run
 _MOST, _JUMP = 4.0, 0.8  # of z that is tried, and of z, from the linear response

@@ -14,7 +14,7 @@ from shipdrag_ros.coastdown.regimes.births import brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS
-from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by
+from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by, unpowered
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     AMID,
@@ -23,6 +23,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     GLIDE,
     HELD,
     KIND,
+    LEVEL,
     LN_A,
     LN_U,
     N_EDDY,
@@ -358,3 +359,15 @@ def test_regimes_that_are_long_over_took_no_speed() -> None:
     spans = Spans(code, before, before, end_s, end_s, weight, code, before > 0.0)
     assert probability_of(spans, 40, 5.0)[25:].max() > 0.0
     assert slowed_by(spans, np.linspace(5.0, 3.0, 40), 25, 5.0) is None
+
+
+@pytest.mark.parametrize(('one_glide', 'found'), [(0.9, []), (0.4, [(20.0, 600.0)])])
+def test_a_glide_that_may_have_been_held_at_first_is_followed_whole(ship, one_glide, found):
+    """A glide from 20 s on; or a brake, or power for a while, and then a glide."""
+    other = 0.5 * (1.0 - one_glide)
+    what = np.array([GLIDE, BRAKE, GLIDE, GLIDE, LEVEL, GLIDE])
+    begin_s = np.array([20.0, 20.0, 200.0, 20.0, 150.0, 200.0])
+    end_s = np.array([600.0, 200.0, 600.0, 150.0, 200.0, 600.0])
+    weight = np.array([one_glide, *[other] * 5])
+    spans = Spans(what, begin_s, begin_s, begin_s, end_s, weight, what, what == LEVEL)
+    assert unpowered(spans, 120, BankSetting.of(HullPrior.of(ship), BIN_S)) == found

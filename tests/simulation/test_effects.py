@@ -138,9 +138,10 @@ def test_an_anemometer_feels_wind_and_motion():
 
 
 @pytest.mark.parametrize(('side', 'sign'), [('ahead', 1.0), ('astern', -1.0)])
-def test_waves_push_by_the_square_of_the_encounter(side, sign):
-    truth = run(quadratic(), f'waves=3e4,from={side}')
-    omega = np.sqrt(2 * np.pi * 9.81 / 75.0)
+@pytest.mark.parametrize(('more', 'length_m'), [('', 75.0), (',length=2', 300.0)])
+def test_waves_push_by_the_square_of_the_encounter(side, sign, more, length_m):
+    truth = run(quadratic(), f'waves=3e4,from={side}{more}')
+    omega = np.sqrt(2 * np.pi * 9.81 / length_m)
     force = sign * 3e4 * (1.0 + sign * omega * 8.0 / 9.81) ** 2
     expected = -(DRAG_1_M * 64.0 + force / MASS) / (1 + N_R)
     np.testing.assert_allclose(first_rate(truth), expected, rtol=1e-5)

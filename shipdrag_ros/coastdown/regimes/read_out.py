@@ -38,7 +38,6 @@ from shipdrag_ros.samples import Float64, Int64
 
 _LIKELY = 0.5
 _UNPOWERED = (GLIDE, BRAKE, GLIDE_TURN)
-_ACTED = (BRAKE, GLIDE_TURN)  # something but the water
 
 
 class SmoothedGlide(NamedTuple):
@@ -261,19 +260,20 @@ def _even_s(speed: Float64, glide: SmoothedGlide, step_s: float) -> float:
     return float('inf')
 
 
-def unpowered(found: Spans, bins: int, step_s: float) -> list[tuple[float, float]]:
+def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float, float]]:
     """
-    Return the stretches [s] without thrust in which something but the water acted.
+    Return the stretches [s] without thrust that are probably not one glide from end to end.
     """
-    likely, acted = (
-        probability_of(found.part(np.isin(found.what, codes)), bins, step_s)
-        for codes in (_UNPOWERED, _ACTED)
-    )
-    return [
-        (first * step_s, last * step_s)
-        for first, last in stretches(likely > _LIKELY)
-        if acted[first:last].max() > _LIKELY
-    ]
+    step_s, spared_s = setting.step_s, n.SHORTEST_S * setting.pace
+    likely = probability_of(found.part(np.isin(found.what, _UNPOWERED)), bins, step_s)
+    glide = found.part(found.what == GLIDE)
+    several = []
+    for first, last in stretches(likely > _LIKELY):
+        first_s, last_s = first * step_s, last * step_s
+        within_s = np.minimum(glide.end_s, last_s) - np.maximum(glide.begin_s, first_s)
+        if glide.weight[within_s > last_s - first_s - spared_s].sum() <= _LIKELY:
+            several.append((first_s, last_s))
+    return several
 
 
 def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSpeed | None:

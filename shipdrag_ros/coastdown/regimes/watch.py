@@ -391,10 +391,10 @@ class RegimeFilter:
 
     def whole_glides(self) -> list[tuple[float, float]]:
         """
-        Return the stretches without thrust in which something but the water acted [s].
+        Return the stretches without thrust in which more than one glide is likely [s].
         """
         zero = self._zero_s
-        found = unpowered(self._spans, len(self._out), self._setting.step_s)
+        found = unpowered(self._spans, len(self._out), self._setting)
         return [(zero + first_s, zero + last_s) for first_s, last_s in found]
 
     def regimes(self) -> Regimes | None:

@@ -10,11 +10,9 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import stated
 from shipdrag_ros.simulation.effect import Frame
 
-_LENGTHS = 0.5  # of a wave, in lengths of the ship: shorter ones than those that heave her
 
-
-def _act(frame: Frame, force_n: float, side: float) -> Action:
-    frequency = sqrt(2.0 * pi * GRAVITY_M_S2 / (_LENGTHS * frame.ship.length_m))
+def _act(frame: Frame, force_n: float, side: float, length: float) -> Action:
+    frequency = sqrt(2.0 * pi * GRAVITY_M_S2 / (length * frame.ship.length_m))
     return Action(
         wave_force_n=frame.earth(-side * force_n, 0.0),
         wave_encounter_s_m=frequency / GRAVITY_M_S2,
