@@ -19,7 +19,7 @@ from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library import replaying
 from shipdrag_ros.library.diagnosing import coasts_of, diagnose_runs
-from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.record import Record, ShipGiven, ship_of
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
 from shipdrag_ros.progress import Progress, silent
@@ -230,7 +230,7 @@ def _earlier(given: str | PathLike[str] | Diagnosis, place: int) -> EarlierDiagn
 def diagnose(
     records: Record | Sequence[Record],
     *,
-    ship: Ship | None = None,
+    ship: ShipGiven = None,
     facts: Sequence[str] = (),
     earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
     window: replaying.WindowSpan | None = None,
@@ -245,7 +245,7 @@ def diagnose(
         Of one ship, from `read` or `simulate`; all their coastdowns are taken together,
         and effects of the earth are stated along the first.
     ship
-        To compare them with; None: that of the records.
+        To compare them with, or the path of its file; None: that of the records.
     facts
         What a log book knows of all runs: `no_towed_cable`, `shaft=locked`.
     earlier
@@ -298,14 +298,14 @@ def diagnose(
     before = [earlier] if isinstance(earlier, str | PathLike | Diagnosis) else earlier
     known = [_earlier(each, place) for place, each in enumerate(before, start=1)]
     found, used = diagnose_runs(
-        listener, runs, ship or parts[0].given, given, earlier=known, stop=stop
+        listener, runs, ship_of(ship) or parts[0].given, given, earlier=known, stop=stop
     )
     return Diagnosis(found, used, tuple(listener.lines))
 
 
 @says_it_in_python
 def learn(
-    records: Record | Sequence[Record], *, ship: Ship | None = None, name: str = 'learnt'
+    records: Record | Sequence[Record], *, ship: ShipGiven = None, name: str = 'learnt'
 ) -> Learnt:
     """
     Learn the effect that several runs of a ship share and the library has no name for.
@@ -315,7 +315,7 @@ def learn(
     records
         Of one ship; with one run nothing is written.
     ship
-        With a baseline; None: the one attached to the first record.
+        With a baseline, or the path of its file; None: the one attached to the first record.
     name
         Of the effect: small letters, digits and _.
 
@@ -347,7 +347,7 @@ def learn(
     """
     parts = records_of(records)
     runs = [replaying.WindowedRun(run, None) for record in parts for run in record.runs]
-    return learn_from(replaying.Notes(), runs, ship or parts[0].given, name)
+    return learn_from(replaying.Notes(), runs, ship_of(ship) or parts[0].given, name)
 
 
 def learn_from(

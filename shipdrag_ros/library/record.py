@@ -29,6 +29,9 @@ from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 
+ShipGiven = Ship | str | PathLike[str] | None
+"""A ship, or the path of her file."""
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -332,11 +335,27 @@ def _when(run: Run) -> str:
     return f'{duration((end_ns - start_ns) / SECOND_NS)} from {utc(start_ns)}'
 
 
+def ship_of(ship: ShipGiven) -> Ship | None:
+    """
+    Return the ship that is given, or that a file holds.
+
+    Raises
+    ------
+    BagError
+        If it is neither.
+    ShipFileError
+        If the file holds none.
+    """
+    if not isinstance(ship, Ship | str | PathLike | None):
+        raise BagError(f'ship={ship!r}: expected a Ship, or the path of a ship file')
+    return ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
+
+
 @says_it_in_python
 def read(
     source: Any,
     *,
-    ship: Ship | str | PathLike[str] | None = None,
+    ship: ShipGiven = None,
     columns: Mapping[str, str | Sequence[str]] | None = None,
     time: str | None = None,
     rate_hz: float | None = None,
@@ -402,9 +421,7 @@ def read(
     """
     from shipdrag_ros.library.logs import is_frame
 
-    if not isinstance(ship, Ship | str | PathLike | None):
-        raise BagError(f'ship={ship!r}: expected a Ship, or the path of a ship file')
-    given = ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
+    given = ship_of(ship)
     alone = isinstance(source, str | PathLike) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
     sources = [each if is_frame(each) else _path(each) for each in several]

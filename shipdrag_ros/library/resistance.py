@@ -14,7 +14,7 @@ from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.library import forecasts
-from shipdrag_ros.library.record import Coastdown, Record, force_columns
+from shipdrag_ros.library.record import Coastdown, Record, ShipGiven, force_columns, ship_of
 from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
 from shipdrag_ros.library.shown import ShownResistance, says_it_in_python, writing
 from shipdrag_ros.parameters import Parameters
@@ -206,7 +206,7 @@ class Resistance(ShownResistance):
 def estimate(
     records: Record | Sequence[Record],
     *,
-    ship: Ship | None = None,
+    ship: ShipGiven = None,
     window: WindowSpan | None = None,
     stop: StopTime | None = None,
     parameters: Parameters | None = None,
@@ -219,7 +219,7 @@ def estimate(
     records
         Of one ship, from `read` or `simulate`.
     ship
-        To estimate with; None: that of the records.
+        To estimate with, or the path of its file; None: that of the records.
     window
         Begin and end of the coastdown [s from the start of each run], instead of
         looking for one; what in it is no coastdown is cut.
@@ -255,13 +255,13 @@ def estimate(
     >>> bool(abs(found.curve.resistance_m_s2 / true - 1.0).min() < 0.05)
     True
     """
-    listener = Notes()
+    listener, given = Notes(), ship_of(ship)
     return Resistance(
         tuple(
             replay_run(
                 run,
                 listener,
-                ship=ship or record.given,
+                ship=given or record.given,
                 parameters=parameters,
                 window=window,
                 stop=stop,

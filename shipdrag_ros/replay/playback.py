@@ -383,8 +383,10 @@ def told_ns(run: Run, stop: StopTime) -> int:
     Raises
     ------
     BagError
-        If it lies outside of the bag, or is a date without a zone.
+        If it lies outside of the bag, is a date without a zone, or neither date nor number.
     """
+    if not isinstance(stop, datetime | float | int):
+        raise BagError(f'stop is {stop!r}: expected seconds as a number, or a datetime')
     if isinstance(stop, datetime) and stop.tzinfo is None:  # would be of this computer
         raise BagError(f'stop at {stop.isoformat()}: expected a date with its zone')
     span = run.span_ns

@@ -170,6 +170,20 @@ def test_where_there_is_no_coastdown_it_says_why() -> None:
     assert 'No coastdown found' in found._repr_html_()
 
 
+def test_a_ship_may_be_given_by_its_file_and_a_stop_by_no_text(record, tmp_path) -> None:
+    path = tmp_path / 'ship.yaml'
+    path.write_text(record.ship.to_yaml())
+    found, by_file = (sd.estimate(record, ship=ship) for ship in (sd.Ship.load(path), path))
+    assert by_file.summary() == found.summary()
+    with pytest.raises(sd.ShipdragError, match='expected a Ship, or the path'):
+        sd.estimate(record, ship=3)
+    for verb in (sd.estimate, sd.diagnose):
+        with pytest.raises(sd.ShipdragError, match='cannot be read: No such file'):
+            verb(record, ship=tmp_path / 'none.yaml')
+        with pytest.raises(sd.ShipdragError, match="stop is '602': expected seconds"):
+            verb(record, stop='602')
+
+
 def test_what_is_no_record_is_refused() -> None:
     with pytest.raises(sd.ShipdragError, match=r'make one with shipdrag_ros\.read'):
         sd.estimate(['run.mcap'])  # type: ignore[list-item]
