@@ -368,8 +368,8 @@ def _simulating(
 ) -> Callable[[Sequence[Action], Float64, float], SimulatedRows]:
     first, length = frame.scenario.lead_in_s, frame.scenario.length_s
 
-    def simulate(actions: Sequence[Action], speed_m_s: Float64, stop_s: float) -> SimulatedRows:
-        lead_in_s = min(max(first + stop_s, 1.0), length - 1.0)  # within the record
+    def simulate(actions: Sequence[Action], speed_m_s: Float64, later_s: float) -> SimulatedRows:
+        lead_in_s = min(max(first + later_s, 1.0), length - 1.0)  # within the record
         scenario = replace(frame.scenario, lead_in_s=lead_in_s, duration_s=length - lead_in_s)
         columns = simulate_columns(frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s)
         along, across, distance = rows_of(run, columns)

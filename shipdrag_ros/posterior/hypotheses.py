@@ -188,16 +188,16 @@ class _Asked:
     numbers: dict[tuple[float, Action, float], int] = field(default_factory=dict)
 
     def add(self, action: Action, began: _Began) -> int:
-        return self.numbers.setdefault((began.stop_s, action, began.speed_m_s), len(self.numbers))
+        return self.numbers.setdefault((began.later_s, action, began.speed_m_s), len(self.numbers))
 
     def simulate(self, run: RunSight) -> SimulatedRows:
         by_stop: dict[float, list[tuple[int, Action, float]]] = {}
-        for (stop_s, action, speed_m_s), number in self.numbers.items():
-            by_stop.setdefault(stop_s, []).append((number, action, speed_m_s))
+        for (later_s, action, speed_m_s), number in self.numbers.items():
+            by_stop.setdefault(later_s, []).append((number, action, speed_m_s))
         parts, order = [], list[int]()
-        for stop_s, columns in by_stop.items():
+        for later_s, columns in by_stop.items():
             numbers, actions, speeds = zip(*columns, strict=True)
-            parts.append(run.simulate(actions, np.array(speeds), stop_s))
+            parts.append(run.simulate(actions, np.array(speeds), later_s))
             order += numbers
         back = np.argsort(order)
         return SimulatedRows(*(np.concatenate(each)[back] for each in zip(*parts, strict=True)))
@@ -208,7 +208,7 @@ class _Began(NamedTuple):
 
     still: Action
     speed_m_s: float
-    stop_s: float
+    later_s: float
 
 
 class RunTable(NamedTuple):
@@ -476,8 +476,8 @@ class ShipRuns:
             * friction.mean
             * math.exp(friction.sd * float(at[place[k + _STALL]])),
         )
-        speed_m_s, stop_s = (float(at[place[k + i]]) for i in (motion.SPEED, motion.STOP))
-        return _Began(still, speed_m_s, stop_s)
+        speed_m_s, later_s = (float(at[place[k + i]]) for i in (motion.SPEED, motion.STOP))
+        return _Began(still, speed_m_s, later_s)
 
     def _table(
         self, j: int, hypothesis: Explanation, at: Float64, plan: _Places, shown: SimulatedRows
