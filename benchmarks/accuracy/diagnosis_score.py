@@ -8,8 +8,9 @@ Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
     python -m benchmarks.accuracy.diagnosis_score --by MODULE:FUNCTION
 
 World a is `hidden`; world b, of another hand, is `hidden_b`: its even cases are for choosing
-methods, its odd ones for scoring. Its oracle knows its physics. `--facts` says what a crew knows
-(world b). A function is given the ship file's text and the readings of each run.
+methods, its odd ones for scoring, and `--seed` draws others. Its oracle knows its physics.
+`--facts` says what a crew knows (world b). A function is given the ship file's text and the
+readings of each run.
 
 Every answer is kept in a file (`--out`) before the truth of its case is asked for; a run
 that was broken off goes on where it was.
@@ -21,9 +22,11 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 
 # before numpy: the processes share the cores with each other alone
@@ -46,6 +49,19 @@ WORLDS: dict[str, Any] = {'a': cases, 'b': cases_b}
 HALVES = {'all': (0, 1), 'even': (0, 2), 'odd': (1, 2)}  # remainder, divisor
 Found = dict[str, Any]
 Diagnose = Callable[[cases.Observation], Found]
+
+
+def drawn(world: str, seed: int = 0) -> Any:
+    """
+    Return the functions of a world, of another seed than its own where one is given.
+    """
+    module = WORLDS[world]
+    if not seed:
+        return module
+    asked_for = 'count', 'observe', 'reveal', 'known'
+    return SimpleNamespace(
+        SEED=seed, **{each: partial(getattr(module, each), seed=seed) for each in asked_for}
+    )
 
 
 def as_block(recording: Recording) -> Block:
@@ -80,17 +96,17 @@ def write_bags(seen: cases.Observation, folder: Path) -> tuple[Path, list[Path]]
     return ship, [write_bag(folder / f'run_{k}.mcap', seen.ship_file, run) for k, run in runs]
 
 
-def diagnosis(by: str, number: int, world: str = 'a', facts: bool = False) -> Diagnose:
+def diagnosis(by: str, number: int, hidden: Any, facts: bool = False) -> Diagnose:
     """
     Return the diagnosis that is asked for; the oracle alone knows of the noise.
     """
     if by == 'oracle':
-        return lambda seen: oracle.diagnose(seen, cases_b.known(number))
+        return lambda seen: oracle.diagnose(seen, hidden.known(number))
     if by != 'command':
         module, _, name = by.partition(':')
         function = getattr(import_module(module), name)
         return lambda seen: function(seen.ship_file, [as_block(run) for run in seen.runs])
-    more = facts_b.arguments(cases_b.reveal(number).facts) if facts else []
+    more = facts_b.arguments(hidden.reveal(number).facts) if facts else []
 
     def command(seen: cases.Observation) -> Found:
         with TemporaryDirectory() as folder:
@@ -100,28 +116,31 @@ def diagnosis(by: str, number: int, world: str = 'a', facts: bool = False) -> Di
     return command
 
 
-def answer(by: str, number: int, world: str = 'a', facts: bool = False) -> dict[str, Any]:
+def answer(
+    by: str, number: int, world: str = 'a', facts: bool = False, seed: int = 0
+) -> dict[str, Any]:
     """
     Diagnose one case.
     """
-    seen, diagnose = WORLDS[world].observe(number), diagnosis(by, number, world, facts)
+    hidden = drawn(world, seed)
+    seen, diagnose = hidden.observe(number), diagnosis(by, number, hidden, facts)
     start = time.process_time()
     found = diagnose(seen)
     return {'case': number, 'cpu_s': time.process_time() - start, 'found': found}
 
 
-def _answer(task: tuple[str, int, str, bool]) -> dict[str, Any]:
+def _answer(task: tuple[str, int, str, bool, int]) -> dict[str, Any]:
     try:
         return answer(*task)
     except Exception as error:
         return {'case': task[1], 'error': f'{type(error).__name__}: {error}'}
 
 
-def trials(rows: Sequence[dict[str, Any]], world: str = 'a') -> list[scoring.Trial]:
+def trials(rows: Sequence[dict[str, Any]], world: str = 'a', seed: int = 0) -> list[scoring.Trial]:
     """
     Reveal the truth of the cases that were answered.
     """
-    reveal = WORLDS[world].reveal
+    reveal = drawn(world, seed).reveal
     return [
         scoring.Trial(reveal(row['case']), scoring.parse(row['found']), row['cpu_s'])
         for row in rows
@@ -162,20 +181,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     options = asked(
         __doc__, arguments, by='command', world=tuple(WORLDS), half=tuple(HALVES), first=0,
-        count=int, facts=False, processes=2, out=Path,
+        count=int, seed=0, facts=False, processes=2, out=Path,
     )  # fmt: skip
     by, world = options.by, options.world
-    if world == 'a' and (options.facts or by == 'oracle'):
-        raise SystemExit('world a has neither facts nor an oracle')
-    hidden = WORLDS[world]
+    if world == 'a' and (options.facts or options.seed or by == 'oracle'):
+        raise SystemExit('world a has neither facts nor an oracle nor other seeds')
+    hidden = drawn(world, options.seed)
     place, step = HALVES[options.half]
     numbers = [n for n in range(options.first, hidden.count()) if n % step == place]
     numbers = numbers[: options.count]
     name = by.replace(':', '_') + '_b' * (world == 'b') + '_facts' * options.facts
+    name += f'_{options.seed}' * bool(options.seed)
     out = options.out or OUT / f'diagnosis_{name}.jsonl'
     out.parent.mkdir(parents=True, exist_ok=True)
     kept = _kept(out)
-    tasks = [(by, number, world, options.facts) for number in numbers if number not in kept]
+    tasks = [
+        (by, number, world, options.facts, options.seed)
+        for number in numbers
+        if number not in kept
+    ]
     with out.open('a', encoding='utf-8') as file:
         for row in pooled(_answer, tasks, options.processes):
             print(json.dumps(row), file=file, flush=True)
@@ -188,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f'case {row["case"]}: {row["error"]}')
     if failed:
         print(f'{len(failed)} cases without an answer, not counted below')
-    done = trials(rows, world)
+    done = trials(rows, world, options.seed)
     print(*table(done), sep='\n')
     if world == 'b':
         print(f'\nnothing hidden, and named what is always there: {_always(done)}')

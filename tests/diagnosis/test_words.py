@@ -15,7 +15,13 @@ from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})
 WAVES = EffectEstimate(
-    'waves', 0.95, {'force_n': Parameter(51234.0, 3000.0), 'from': Parameter(-1.0, 0.0)}
+    'waves',
+    0.95,
+    {
+        'force_n': Parameter(51234.0, 3000.0),
+        'from': Parameter(-1.0, 0.0),
+        'wave_length': Parameter(0.8, 0.1),
+    },
 )
 
 
@@ -57,8 +63,8 @@ def diagnosis(
         ),
         (
             diagnosis(Verdict.NAMED, (('waves',), 0.95), effects=(WAVES,)),
-            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern); probability '
-            '95.0 %.',
+            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern, wave length 0.80 ± '
+            '0.20); probability 95.0 %.',
         ),
         (
             diagnosis(Verdict.ONE_OF, (('log_scale',), 0.6), (('radar_scale',), 0.4)),
@@ -121,7 +127,7 @@ def test_tables_leave_out_what_is_not_there() -> None:
     assert diagnosis_cells.gaps(found).rows == (('model as stated', '0.200', '-', '20.00'),)
     (row,) = diagnosis_cells.parameters(found.effects).rows
     assert row[:4] == ('fouling', 'friction_factor', '0.401', '0.012')
-    size, side = diagnosis_cells.parameters([WAVES]).rows
+    size, side, _ = diagnosis_cells.parameters([WAVES]).rows
     assert size[2:4] == ('51200', '3000')
     assert side[2:4] == ('astern', '-')
     assert diagnosis_cells.noise(found.traces).rows == ()
