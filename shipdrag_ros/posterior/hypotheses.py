@@ -41,7 +41,7 @@ _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # 
 _PORT, _HEADING, _FREE, _STALL, _SCATTER, *_AIR, _LOCAL = range(EXTRAS, EXTRAS + 8)
 _OF_MOTION = slice(EXTRAS - _LOCAL)  # what `motion.predict` knows
 _ABSENT = 1e10  # precision from which an instrument is not there
-_STEP_M_S = 0.1  # of differences
+_STEP_M_S, _STEP_S = 0.1, 0.5  # of differences
 _NOTHING = Action()
 
 
@@ -456,7 +456,12 @@ class ShipRuns:
         for line, shaft in zip((_FREE, _STALL), shafts if run.shaft else ()):
             steps.append((line, batch.add(whole + shaft, began), _STEP_Z))
         without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
-        base, acting = batch.add(began.still, began), batch.add(whole, began)
+        at_stop = began, began._replace(later_s=began.later_s + _STEP_S)
+        # what an effect does begins with the stop
+        base, acting = (
+            [batch.add(action, each) for each in at_stop[: 1 + bool(hypothesis.ways)]]
+            for action in (began.still, whole)
+        )
         return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
@@ -493,26 +498,31 @@ class ShipRuns:
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
         along, rest = np.zeros((lines, n)), np.zeros((lines, len(run.rest)))
-        along[0] = residual[0] - (shown.along[plan.acting] - shown.along[plan.base])
+        acted, *later = shown.along[plan.acting] - shown.along[plan.base]
+        along[0] = residual[0] - acted
         along[1 : 1 + k + EXTRAS] = table[1:]
         along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
+        acting, *acting_later = plan.acting
+        for moved, column in zip(later, acting_later, strict=True):
+            along[1 + k + motion.STOP] += (moved - acted) / _STEP_S
+            rest[1 + k + motion.STOP] = (shown.rest[column] - shown.rest[acting]) / _STEP_S
         along[0] -= at[place[k + _SCATTER]] * along[1 + k + _SCATTER]
-        rest[0] = run.rest - shown.rest[plan.acting]
+        rest[0] = run.rest - shown.rest[acting]
         a, first = run.across, 1 + k + _LOCAL
         if a:
             port, heading = place[k + _PORT], place[k + _HEADING]
-            distance = shown.distance[plan.acting]
+            distance = shown.distance[acting]
             rest[0, :a] -= at[port] + at[heading] * distance
             rest[1 + k + _PORT, :a], rest[1 + k + _HEADING, :a] = 1.0, distance
         line, stepped, step = map(np.array, zip(*plan.steps, strict=True))
         for found, columns in ((along, shown.along), (rest, shown.rest)):
-            found[1 + k + line] = (columns[stepped] - columns[plan.acting]) / step[:, None]
+            found[1 + k + line] = (columns[stepped] - columns[acting]) / step[:, None]
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
-            trace = sd * (shown.along[plan.acting] - shown.along[column])
+            trace = sd * (shown.along[acting] - shown.along[column])
             along[to : to + _FORMS] = run.form_bumps * trace
             if a:
-                trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
+                trace = sd * (shown.rest[acting, :a] - shown.rest[column, :a])
                 rest[to : to + _FORMS, :a] = run.across_bumps * trace
         along[first + q + extra :] = smooth
         # forms and what is smooth stand at some unknowns too
@@ -563,10 +573,14 @@ class ShipRuns:
 
 
 class _Places(NamedTuple):
-    """Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much."""
+    """
+    Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much.
 
-    base: int
-    acting: int
+    `base` and `acting`, without effects and with them, are followed by those of a later stop.
+    """
+
+    base: list[int]
+    acting: list[int]
     steps: list[tuple[int, int, float]]
     without: list[int]
     action: Action

@@ -223,6 +223,21 @@ def test_the_derivatives_by_an_effect_are_those_of_the_residual(runs: ShipRuns, 
             assert np.sqrt(np.mean(off**2)) < 0.05 * size + 1e-6
 
 
+@pytest.mark.parametrize('name', ['time_offset', 'fouling'])
+def test_the_derivatives_by_the_stop_hold_what_an_effect_does(runs: ShipRuns, name: str) -> None:
+    hypothesis, at = with_effect(runs, name)
+    at[runs.size] = 1.5
+    stop, step_s = runs.places[0][runs.coefficients + motion.STOP], 1.0
+    later = at.copy()
+    later[stop] += step_s
+    base, other = runs.linearise_run(0, [hypothesis] * 2, [at, later])
+    assert base is not None
+    assert other is not None
+    line = base.along[1 + int(np.flatnonzero(base.place == stop)[0])]
+    off = (base.along[0] - other.along[0]) / step_s - line
+    assert np.sqrt(np.mean(off**2)) < 0.05 * np.sqrt(np.mean(line**2))
+
+
 def test_hypotheses_together_are_as_each_alone(runs: ShipRuns) -> None:
     every = [with_effect(runs, name) for name in ('turning', 'current', 'fouling')]
     together = runs.linearise_run(0, [each for each, _ in every], [at for _, at in every])
