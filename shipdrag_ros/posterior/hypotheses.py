@@ -504,7 +504,7 @@ class ShipRuns:
         along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
         acting, *acting_later = plan.acting
         for moved, column in zip(later, acting_later, strict=True):
-            along[1 + k + motion.STOP] += (moved - acted) / _STEP_S
+            along[1 + k + motion.STOP] = residual[1 + motion.STOP] + (moved - acted) / _STEP_S
             rest[1 + k + motion.STOP] = (shown.rest[column] - shown.rest[acting]) / _STEP_S
         along[0] -= at[place[k + _SCATTER]] * along[1 + k + _SCATTER]
         rest[0] = run.rest - shown.rest[acting]
