@@ -50,25 +50,8 @@ _MOST_BYTES = 1 << 20  # of messages compared at once
 _KEPT, _KEPT_BYTES = 64, 4096  # layouts, by the size of their messages, none of a longer one
 
 
-class Joints(NamedTuple):
-    """
-    What messages hold beyond their first joint.
-
-    Attributes
-    ----------
-    message : (m,) int64
-        Place of the message of each.
-    code : (m,) uint8
-        Its channel.
-    value : (m,)
-    surplus
-        How many joints had no place left.
-    """
-
-    message: NDArray[np.intp]
-    code: UInt8
-    value: Float64
-    surplus: int
+Further = tuple[NDArray[np.intp], int, Float64]
+"""Joints beyond the first of their messages: places of these, one channel, and the values."""
 
 
 class MessageRows(NamedTuple):
@@ -99,7 +82,8 @@ def read_joints(
     place: NDArray[np.intp],
     channel: Channel,
     rows: MessageRows,
-) -> Joints:
+    more: list[Further],
+) -> int:
     """
     Read the joints of some messages.
 
@@ -115,8 +99,14 @@ def read_joints(
         Of the rudder, or of any shaft.
     rows
         Filled with the first joint of each.
+    more
+        Lengthened by the others.
+
+    Returns
+    -------
+    int
+        How many joints had no place left.
     """
-    more: list[tuple[NDArray[np.intp], int, Float64]] = []
     surplus, left, width = 0, place, _WINDOW
     while len(left):
         first = left[0]
@@ -136,13 +126,7 @@ def read_joints(
         surplus += layout.surplus * len(taken)
         left = np.concatenate((near[~alike], left[len(near) :]))
         width = min(2 * width, _MOST) if alike.all() else _WINDOW
-    codes = [np.full(len(messages), code, np.uint8) for messages, code, _ in more]
-    return Joints(
-        np.concatenate([np.empty(0, np.intp), *(messages for messages, _, _ in more)]),
-        np.concatenate([np.empty(0, np.uint8), *codes]),
-        np.concatenate([np.empty(0), *(values for _, _, values in more)]),
-        surplus,
-    )
+    return surplus
 
 
 def _fill(
@@ -150,7 +134,7 @@ def _fill(
     taken: NDArray[np.intp],
     messages: UInt8,
     layout: _JointLayout,
-    more: list[tuple[NDArray[np.intp], int, Float64]],
+    more: list[Further],
 ) -> None:
     """Read messages of one layout, (n, bytes of each)."""
     order = '>' if messages[0, 1] == 0 else '<'
@@ -385,14 +369,13 @@ def decode_batch(
     width = max((reading.width for reading in readings), default=_COLUMNS)
     stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
     unreadable = []
-    more: list[Joints] = []
+    more: list[Further] = []
     for i, reading in enumerate(readings):
         place = np.flatnonzero(number == i)
         if not reading.steps:
             into = MessageRows(code, stamp_ns, rows, found)
-            joints = read_joints(data, start, end, place, reading.channel, into)
-            more.append(joints)
-            unreadable.append(_count(found[place], joints.surplus))
+            surplus = read_joints(data, start, end, place, reading.channel, into, more)
+            unreadable.append(_count(found[place], surplus))
             continue
         code[place] = reading.channel
         if not reading.stamped:
@@ -407,7 +390,7 @@ def decode_batch(
             place = place[found[place] != GatherResult.READ]
         unreadable.append(_count(found[place]) if unread else Counter())
     kept = np.flatnonzero(found == GatherResult.READ)
-    if any(len(joints.message) for joints in more):
+    if more:
         kept, code, rows = _with_more(kept, code, rows, more)
         stamp_ns, receive_ns = stamp_ns[kept], receive_ns[kept]
     elif len(kept) < n:
@@ -417,32 +400,31 @@ def decode_batch(
 
 
 def _with_more(
-    kept: NDArray[np.intp], code: UInt8, rows: Float64, more: Sequence[Joints]
+    kept: NDArray[np.intp], code: UInt8, rows: Float64, more: Sequence[Further]
 ) -> tuple[NDArray[np.intp], UInt8, Float64]:
     """Put further joints behind the first one of their message."""
-    message = np.concatenate([kept, *(joints.message for joints in more)])
+    message = np.concatenate([kept, *(messages for messages, _, _ in more)])
     order = np.argsort(message, kind='stable')
     message = message[order]
     code, rows = code[message], rows[message]
     further = np.flatnonzero(order >= len(kept))
     which = order[further] - len(kept)
-    code[further] = np.concatenate([joints.code for joints in more])[which]
-    rows[further, 0] = np.concatenate([joints.value for joints in more])[which]
+    codes = [np.full(len(messages), channel, np.uint8) for messages, channel, _ in more]
+    code[further] = np.concatenate(codes)[which]
+    rows[further, 0] = np.concatenate([values for _, _, values in more])[which]
     return message, code, rows
 
 
 def _count(found: UInt8, surplus: int = 0) -> Counter[Unreadable]:
     """Count what gave no sample."""
-    counts = Counter(_UNREADABLE[each] for each in found[found != GatherResult.READ].tolist())
+    results, times = np.unique(found[found != GatherResult.READ], return_counts=True)
+    reasons = [Unreadable[GatherResult(each).name] for each in results]
+    counts = Counter(dict(zip(reasons, times.tolist(), strict=True)))
     if surplus:
         counts[Unreadable.SURPLUS_JOINT] = surplus
     return counts
 
 
-_UNREADABLE = {
-    int(GatherResult.MALFORMED): Unreadable.MALFORMED,
-    int(GatherResult.NO_JOINT): Unreadable.NO_JOINT,
-}
 _COLUMNS = 4  # two values and two variances, which the extra fields follow
 Converted = Callable[[Float64], Float64]
 
