@@ -13,8 +13,8 @@ import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from itertools import chain, count, islice
+from dataclasses import dataclass, replace
+from itertools import count, islice
 from pathlib import Path
 from time import monotonic
 from uuid import uuid4
@@ -199,7 +199,7 @@ class PartLimits:
     duration_s: float = 21_600.0
 
 
-@dataclass(frozen=True)
+@dataclass
 class RecordingProgress:
     """
     How a recording stands.
@@ -232,17 +232,17 @@ class RecordingProgress:
     """
 
     directory: Path
-    path: Path | None
-    part: int
-    messages: int
-    size_bytes: int
-    waiting: int
-    lost: int
-    oldest_s: float
-    error: str
-    uncompacted: int
-    why_uncompacted: str
-    vanished: int
+    path: Path | None = None
+    part: int = 0
+    messages: int = 0
+    size_bytes: int = 0
+    waiting: int = 0
+    lost: int = 0
+    oldest_s: float = 0.0
+    error: str = ''
+    uncompacted: int = 0
+    why_uncompacted: str = ''
+    vanished: int = 0
 
 
 class DurableRecording:
@@ -263,8 +263,6 @@ class DurableRecording:
         Messages to begin with; read in the thread that writes.
     queue_bytes
         Memory for what waits for the disk; what finds no room is counted.
-    at_once
-        Whether a file is made before there is a message.
     """
 
     def __init__(
@@ -276,7 +274,6 @@ class DurableRecording:
         limits: PartLimits,
         earlier: Iterable[EncodedMessage] = (),
         queue_bytes: int = QUEUE_BYTES,
-        at_once: bool = True,
     ) -> None:
         self._directory = directory
         self._stem = stem
@@ -284,25 +281,19 @@ class DurableRecording:
         self._limits = limits
         self._earlier: Iterator[EncodedMessage] | None = iter(earlier)
         self._queue_bytes = queue_bytes
-        self._wanted = at_once  # a file
+        self._wanted = False  # a file
         self._recording_id = uuid4().hex
-        self._part = 0
         self._file: LiveFile | None = None
-        self._path: Path | None = None
+        self._told = RecordingProgress(directory)
         # handed over -> queue -> due to be written -> written, not yet safe -> safe
         self._lock = threading.Lock()
         self._queue: list[EncodedMessage] = []
         self._due: list[EncodedMessage] = []
         self._unsynced: list[EncodedMessage] = []
-        self._held_bytes = 0
-        self._accepted = self._safe = self._lost = 0
-        self._size_bytes = 0
+        self._held_bytes = self._accepted = 0
         self._oldest_s = self._taken_s = self._synced_s = monotonic()
         self._retry_s = 0.0
-        self._error = ''
         self._uncompacted: list[LiveFile] = []
-        self._why_uncompacted = ''
-        self._vanished = 0
         self._compactor: threading.Thread | None = None
         self._ending = threading.Event()
         self._tried = threading.Event()
@@ -330,9 +321,9 @@ class DurableRecording:
                 self._held_bytes -= _held_bytes([self._queue.pop(0)])
                 self._accepted -= 1
             if self._held_bytes + size > self._queue_bytes:
-                self._lost += 1
+                self._told.lost += 1
                 return
-            if self._accepted == self._safe:
+            if self._accepted == self._told.messages:
                 self._oldest_s = monotonic()
             self._queue.append(message)
             self._held_bytes += size
@@ -362,25 +353,18 @@ class DurableRecording:
         Return how the recording stands; asks no disk.
         """
         with self._lock:
-            waiting = self._accepted - self._safe if self._wanted else 0
-            return RecordingProgress(
-                directory=self._directory,
-                path=self._path,
-                part=self._part,
-                messages=self._safe,
-                size_bytes=self._size_bytes,
+            waiting = self._accepted - self._told.messages if self._wanted else 0
+            return replace(
+                self._told,
                 waiting=waiting,
-                lost=self._lost,
                 oldest_s=monotonic() - self._oldest_s if waiting else 0.0,
-                error=self._error,
                 uncompacted=len(self._uncompacted),
-                why_uncompacted=self._why_uncompacted if self._uncompacted else '',
-                vanished=self._vanished,
+                why_uncompacted=self._told.why_uncompacted if self._uncompacted else '',
             )
 
     def _run(self) -> None:
         while True:
-            hurry = self._earlier is not None and not self._error
+            hurry = self._earlier is not None and not self._told.error
             ending = self._ending.wait(0.0 if hurry else WRITE_S)
             try:
                 self._take()
@@ -390,7 +374,7 @@ class DurableRecording:
                         self._sync()
             except Exception as error:  # a thread that ends unseen would lose all
                 self._fail(error)
-            if ending and (self._error or self._earlier is None):
+            if ending and (self._told.error or self._earlier is None):
                 break
         self._finish()
 
@@ -445,22 +429,33 @@ class DurableRecording:
         if self._file is not None and self._unsynced:
             self._file.sync()
             with self._lock:
-                self._safe += len(self._unsynced)
+                self._told.messages += len(self._unsynced)
                 self._held_bytes -= _held_bytes(self._unsynced)
                 self._oldest_s = self._taken_s
-                self._size_bytes = self._file.synced_bytes
+                self._told.size_bytes = self._file.synced_bytes
             self._unsynced = []
         self._synced_s = monotonic()
-        self._error = ''
+        self._told.error = ''
 
     def _open(self) -> LiveFile:
+        """Make the next file, under a name that no other recording has taken."""
         self._make_directory()
-        file = next(filter(None, map(self._made, self._names())))
+        name, part = f'{self._stem}_{self._told.part:03d}', self._told.part
+        for number in count(1):
+            path = self._directory / f'{name}{f"_{number}" if number > 1 else ""}.mcap'
+            with suppress(NameTakenError):
+                self._file = LiveFile(
+                    path,
+                    recording_id=self._recording_id,
+                    part=part,
+                    attachments=self._attachments,
+                )
+                break
+        assert self._file is not None
         with self._lock:
-            self._path, self._size_bytes = file.path, file.synced_bytes
-        self._file = file
+            self._told.path, self._told.size_bytes = path, self._file.synced_bytes
         self._tried.set()
-        return file
+        return self._file
 
     def _make_directory(self) -> None:
         try:
@@ -472,22 +467,6 @@ class DurableRecording:
             raise BagError(f'{str(self._directory)!r} has become a link to {str(real)!r}')
         if not os.access(self._directory, os.W_OK | os.X_OK):
             raise BagError(f'{str(self._directory)!r}: Permission denied')
-
-    def _names(self) -> Iterator[str]:
-        name = f'{self._stem}_{self._part:03d}'
-        return chain([name], (f'{name}_{i}' for i in count(2)))
-
-    def _made(self, name: str) -> LiveFile | None:
-        """Return the file of this name, None where another recording has just taken it."""
-        try:
-            return LiveFile(
-                self._directory / f'{name}.mcap',
-                recording_id=self._recording_id,
-                part=self._part,
-                attachments=self._attachments,
-            )
-        except NameTakenError:
-            return None
 
     def _end_part(self, file: LiveFile) -> None:
         self._sync()
@@ -502,7 +481,7 @@ class DurableRecording:
     def _leave(self, file: LiveFile) -> None:
         self._uncompacted.append(file)
         self._file = None
-        self._part += 1
+        self._told.part += 1
 
     def _fail(self, error: Exception) -> None:
         """Let the file be as it was when last safe; what came behind goes to the next."""
@@ -513,7 +492,7 @@ class DurableRecording:
                 self._leave(file)
         self._due = self._unsynced + self._due
         self._unsynced = []
-        self._error = reason_of(error)
+        self._told.error = reason_of(error)
         self._retry_s = monotonic() + RETRY_S
         self._tried.set()
 
@@ -526,8 +505,8 @@ class DurableRecording:
                 self._fail(error)
         with self._lock:
             if self._wanted:
-                self._lost += self._accepted - self._safe
-            self._accepted = self._safe
+                self._told.lost += self._accepted - self._told.messages
+            self._accepted = self._told.messages
         if self._compactor is not None:
             self._compactor.join()
         self._compact()
@@ -542,7 +521,7 @@ class DurableRecording:
                     file.release()
                 self._uncompacted.remove(file)
             except Exception as error:  # it is tried again with the next part, and counted
-                self._why_uncompacted = reason_of(error)
+                self._told.why_uncompacted = reason_of(error)
 
     def _gone(self, file: LiveFile) -> bool:
         """Say whether somebody removed a file; what was in it is lost, and counted."""
@@ -550,10 +529,10 @@ class DurableRecording:
             return False
         file.release()
         with self._lock:
-            self._vanished += 1
-            self._lost += file.synced_messages
+            self._told.vanished += 1
+            self._told.lost += file.synced_messages
             self._accepted -= file.synced_messages
-            self._safe -= file.synced_messages
+            self._told.messages -= file.synced_messages
         return True
 
 

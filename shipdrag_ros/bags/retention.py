@@ -142,27 +142,27 @@ class Retention:
             return []
         parts = self._parts()
         worth = self._worth_keeping(parts)
-        removed = []
+        old = set()
         if self._keep.days:
             limit_s = now_s - self._keep.days * DAY_S
-            for part in [it for it in parts if it.changed_s < limit_s and it not in worth]:
-                removed += self._remove(part, f'older than {self._keep.days:g} days', False)
+            old = {part for part in parts if part.changed_s < limit_s} - worth
+        # a default takes no coastdown: somebody must have said how much to keep
+        order = [part for part in parts if part not in worth]
+        order += [part for part in parts if part in worth and self._keep.size_bytes]
         limit = self._limit_bytes()
-        if limit:
-            gone = {each.path for each in removed}
-            parts = [part for part in parts if part.path not in gone]
-            total = sum(part.size_bytes for part in parts)
-            order = [it for it in parts if it not in worth]
-            if self._keep.size_bytes:  # somebody has said how much; a default takes no coastdown
-                order += [it for it in parts if it in worth]
-            for part in order:
-                if total <= limit:
-                    break
+        total = sum(part.size_bytes for part in parts)
+        removed = []
+        for part in sorted(order, key=lambda part: part not in old):
+            if part in old:
+                why = f'older than {self._keep.days:g} days'
+            elif limit and total > limit:
                 why = f'recordings take more than {limit} bytes'
-                done = self._remove(part, why, part in worth)
-                total -= part.size_bytes * len(done)
-                removed += done
-            self.over_bytes = max(total - limit, 0)
+            else:
+                break
+            done = self._remove(part, why, part in worth)
+            total -= part.size_bytes * len(done)
+            removed += done
+        self.over_bytes = max(total - limit, 0) if limit else 0
         return removed
 
     def _limit_bytes(self) -> int:

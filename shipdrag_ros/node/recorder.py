@@ -395,7 +395,6 @@ class Recorder:
             attachments=self._attachments,
             limits=self._limits,
             earlier=iter(self._ring),
-            at_once=False,
         )
         return self._recording
 

@@ -241,7 +241,7 @@ def test_recordings_that_begin_at_once_never_take_the_name_of_another(tmp_path: 
     for round_ in range(10):
         folder = tmp_path / str(round_)
         recordings = [
-            DurableRecording(folder, stem='a', attachments={}, limits=PartLimits(), at_once=False)
+            DurableRecording(folder, stem='a', attachments={}, limits=PartLimits())
             for _ in range(16)
         ]
         for number, it in enumerate(recordings):
