@@ -33,9 +33,7 @@ from mcap.records import (
 )
 
 from shipdrag_ros.bags.mcap_file import locate, not_mcap
-from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
 from shipdrag_ros.bags.records import (
-    HEAD,
     IN_CHUNK,
     MAGIC,
     MESSAGE_HEAD,
@@ -46,12 +44,11 @@ from shipdrag_ros.bags.records import (
     Place,
     attachment_agrees,
     checksum,
-    place_at,
+    has_end,
     read,
-    unpack,
-    walk,
 )
 from shipdrag_ros.bags.recover import opened
+from shipdrag_ros.bags.scan import OpenChunk, scan
 from shipdrag_ros.bags.writer import chunk_index, index_of, statistics
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
@@ -162,21 +159,17 @@ class _Facts:
     def gather(self, progress: PartDone) -> None:
         """Walk over the file."""
         data, damages = self._data, self._damages
-        begin = len(MAGIC) if data[: len(MAGIC)] == MAGIC else 0
-        if not begin:
-            damages.add(0, 'magic', DamageKind.MISSING, f'{data[:8]!r}')
-        elif data[begin : begin + 1] != bytes([Opcode.HEADER]):
+        begin = len(MAGIC)
+        if data[:begin] == MAGIC and data[begin : begin + 1] != bytes([Opcode.HEADER]):
             damages.add(begin, 'header', DamageKind.MISSING)
         if data[-len(MAGIC) :] != MAGIC:
             damages.add(len(data), 'magic', DamageKind.MISSING, 'not closed, or cut off')
-        for place in walk(data, begin, len(data)):
-            if place.damage is not None:
-                damages.add(place.offset, place.name, place.damage)
+        for place, chunk in scan(data, damages):
             if place.opcode != Opcode.MESSAGE_INDEX:
                 self._close_chunk()
-            if place.opcode == Opcode.CHUNK and place.readable:
+            if chunk is not None and place.readable:
                 progress(place.offset, len(data))
-                self._open_chunk(place)
+                self._open_chunk(chunk)
             elif place.readable:
                 self._record(data, place, place.offset)
             self.records += place.readable
@@ -238,47 +231,36 @@ class _Facts:
             self._damages.add(place.offset, place.name, DamageKind.DUPLICATE)
         self._said.add(f'{place.name} {key}')
 
-    def _open_chunk(self, place: Place) -> None:
-        records, damage, *_ = unpack(self._data, place)
-        if damage is not None:
-            records = b''
-            if damage is not place.damage:
-                self._damages.add(place.offset, 'chunk', damage)
-        messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
-        inside = [place_at(records, at) for at in others.tolist()]
-        if notes or any(each.opcode not in IN_CHUNK for each in inside):
-            for each in walk(records, 0, len(records), IN_CHUNK):
+    def _open_chunk(self, chunk: OpenChunk) -> None:
+        offset = chunk.place.offset
+        self._entries = {}
+        self._expected[ChunkIndex, offset] = None  # of a damaged one nothing is known
+        if chunk.damage is not None:
+            return
+        if chunk.notes or any(each.opcode not in IN_CHUNK for each in chunk.others):
+            for each in chunk.walk():
                 if each.damage is not None:
                     where = f'at byte {each.offset} of the unpacked chunk'
-                    self._damages.add(place.offset, each.name, each.damage, where)
-        for each in inside:
+                    self._damages.add(offset, each.name, each.damage, where)
+        for each in chunk.others:
             if each.opcode in IN_CHUNK:
-                self._record(records, each, place.offset)
-        offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
-        entries = np.column_stack((messages.log_ns, offsets))
-        self._entries = {
-            channel: entries[messages.channel == channel]
-            for channel in np.unique(messages.channel).tolist()
-        }
+                self._record(chunk.records, each, offset)
+        self._entries = chunk.entries()
         for channel, of_channel in self._entries.items():
-            self._count(channel, len(of_channel), place.offset)
-        self._index_chunk(place, messages.log_ns, sound=damage is None and place.damage is None)
-
-    def _index_chunk(self, place: Place, log_ns: Int64, *, sound: bool) -> None:
-        """Make the index that the chunk should have; None where it is damaged itself."""
-        self._expected[ChunkIndex, place.offset] = None
-        if not sound:
+            self._count(channel, len(of_channel), offset)
+        record, span = chunk.chunk, chunk.times_ns
+        if record is None or chunk.place.damage is not None:
             return
-        chunk = read(self._data, place)
-        stated = chunk.message_start_time, chunk.message_end_time
-        if len(log_ns):
-            span = int(log_ns.min()), int(log_ns.max())
+        if not has_end(record):
+            self._damages.add(offset, 'chunk', DamageKind.COMPRESSION)
+        if span is not None:
             self._span(*span)
+            stated = record.message_start_time, record.message_end_time
             if stated != span:
                 text = f'times {stated}, in it are {span}'
-                self._damages.add(place.offset, 'chunk', DamageKind.DISAGREES, text)
-        self._chunk = chunk_index(chunk, place.offset, place.end - place.offset)
-        self._expected[ChunkIndex, place.offset] = self._chunk
+                self._damages.add(offset, 'chunk', DamageKind.DISAGREES, text)
+        self._chunk = chunk_index(record, offset, chunk.place.end - offset)
+        self._expected[ChunkIndex, offset] = self._chunk
 
     def _message_index(self, place: Place) -> None:
         if self._chunk is None:

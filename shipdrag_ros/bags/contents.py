@@ -15,30 +15,28 @@ from io import BytesIO
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-import numpy as np
-from isal.isal_zlib import crc32
 from mcap import records as mcap_records
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 
-from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
 from shipdrag_ros.bags.records import (
-    HEAD,
     MAGIC,
     MESSAGE_HEAD,
     READ_ERRORS,
     TIME_LIMIT_NS,
     Buffer,
+    DamageKind,
+    DamageList,
     Place,
     attachment_agrees,
-    place_at,
+    footer_of,
     read,
-    unpack,
+    summary_agrees,
     walk,
 )
+from shipdrag_ros.bags.scan import OpenChunk, scan
 
 _SEGMENT_BYTES = 1 << 20
-_FOOTER_BYTES = HEAD.size + 20
 _NOT_USED = 'read from its beginning, without an index'
 
 
@@ -54,14 +52,15 @@ class FileSegment(NamedTuple):
     """
     A chunk, or consecutive messages outside chunks.
 
-    Sorts by the earliest log time [ns], then by place [bytes]. `channels` are those
-    in it, empty where that is not known.
+    Sorts by the earliest log time [ns], then by place [bytes]. `size` is that of its
+    records [bytes]; `channels` are those in it, empty where that is not known.
     """
 
     start_ns: int
     offset: int
     end: int
     end_ns: int
+    size: int
     channels: frozenset[int] = frozenset()
 
 
@@ -140,16 +139,14 @@ def contents_of(data: Buffer) -> Contents:
 
 def _by_index(data: Buffer) -> Contents | None:
     """Return what the summary says; None where it does not say all, as the format allows."""
-    end = len(data) - len(MAGIC)
-    if end < len(MAGIC) + _FOOTER_BYTES or data[end:] != MAGIC:
+    if data[-len(MAGIC) :] != MAGIC or len(data) < 2 * len(MAGIC):
         raise _BadIndexError('the file was not closed, or it is cut off')
-    footer = read(data, Place(data[end - _FOOTER_BYTES], 0, end - 20, end))
-    if not isinstance(footer, mcap_records.Footer):
+    footer = footer_of(data)
+    if footer is None:
         raise _BadIndexError('the footer is damaged')
     if footer.summary_start == 0:
         return None
-    # the checksum covers the footer too, up to itself
-    if footer.summary_crc not in (0, crc32(data[footer.summary_start : end - 4])):
+    if not summary_agrees(data, footer):
         raise _BadIndexError('the index has a wrong checksum')
     summary: dict[type, list[Any]] = {}
     try:
@@ -223,26 +220,31 @@ def _segment(data: Buffer, chunk: mcap_records.ChunkIndex, least: int) -> FileSe
     if late or offset < least or _place(data, offset, Opcode.CHUNK).end != end:
         raise _BadIndexError(f'the record at byte {offset} is not what the index says')
     channels = frozenset(chunk.message_index_offsets)
-    return FileSegment(chunk.message_start_time, offset, end, chunk.message_end_time, channels)
+    return FileSegment(
+        chunk.message_start_time,
+        offset,
+        end,
+        chunk.message_end_time,
+        chunk.uncompressed_size,
+        channels,
+    )
 
 
 def _by_walk(data: Buffer) -> Contents:
     """Return what is there; what is damaged is left out and stated in `warnings`."""
     contents = Contents(indexed=False)
+    damages = DamageList()
     stray = False  # a message that is found in or behind a damaged chunk may be part of anything
-    for place in walk(data, len(MAGIC), len(data)):
+    for place, chunk in scan(data, damages):
         stray = stray or (place.damage is not None and bool(contents.compressions))
         if place.damage is not None:
-            name = place.name.replace('unknown', 'record')
-            contents.warnings.append(
-                f'the {name} at byte {place.offset} is damaged ({place.damage.value}): left out'
-            )
-        elif place.opcode == Opcode.DATA_END:
+            continue
+        if place.opcode == Opcode.DATA_END:
             break
+        if chunk is not None:
+            _add_chunk(chunk, contents)
         elif place.opcode == Opcode.MESSAGE and not stray:
             _add_message(data, place, contents)
-        elif place.opcode == Opcode.CHUNK:
-            _add_chunk(data, place, contents)
         elif place.opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
             contents.warnings.append(
                 f'the attachment {getattr(read(data, place), "name", "")!r} has a wrong checksum: '
@@ -250,6 +252,10 @@ def _by_walk(data: Buffer) -> Contents:
             )
         elif place.opcode in _DECLARATIONS:
             contents.add(read(data, place))
+    first = {each.offset: each for each in reversed(damages.listed)}  # of each place
+    contents.warnings += (
+        left_out(each.record, each.offset, each.kind) for each in reversed(first.values())
+    )
     strangers = sum(n for number, n in contents.counts.items() if number not in contents.channels)
     if strangers:
         contents.warnings.append(f'{strangers} messages of topics that are not declared: left out')
@@ -268,41 +274,39 @@ def _add_message(data: Buffer, place: Place, contents: Contents) -> None:
         )
         return
     contents.counts[channel] += 1
-    segment = FileSegment(log_ns, place.offset, place.end, log_ns)
+    segment = FileSegment(log_ns, place.offset, place.end, log_ns, place.end - place.offset)
     last = contents.segments[-1] if contents.segments else segment
     if last.end == place.offset < last.offset + _SEGMENT_BYTES and not last.channels:
         contents.segments.pop()
         first_ns, end_ns = min(last.start_ns, log_ns), max(last.end_ns, log_ns)
-        segment = FileSegment(first_ns, last.offset, place.end, end_ns)
+        size = place.end - last.offset
+        segment = FileSegment(first_ns, last.offset, place.end, end_ns, size)
     contents.segments.append(segment)
 
 
-def _add_chunk(data: Buffer, place: Place, contents: Contents) -> None:
-    records, damage, _, compression = unpack(data, place)
-    if damage is not None:
-        contents.warnings.append(damaged_chunk(place.offset, damage.value))
+def _add_chunk(chunk: OpenChunk, contents: Contents) -> None:
+    if chunk.chunk is None or chunk.damage is not None:
         return
-    contents.compressions.add(compression)
-    messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
-    for inner in (place_at(records, offset) for offset in others.tolist()):
-        if inner.opcode in _DECLARATIONS:
-            contents.add(read(records, inner))
-    counts = np.bincount(messages.channel)
-    channels = np.flatnonzero(counts).tolist()
-    contents.counts.update({number: int(counts[number]) for number in channels})
-    if len(messages):
-        first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
-        contents.segments.append(
-            FileSegment(first, place.offset, place.end, last, frozenset(channels))
-        )
-    contents.warnings += notes
+    contents.compressions.add(chunk.chunk.compression)
+    for place in chunk.others:
+        if place.opcode in _DECLARATIONS:
+            contents.add(read(chunk.records, place))
+    counts = {number: len(entries) for number, entries in chunk.entries().items()}
+    contents.counts.update(counts)
+    if chunk.times_ns is not None:
+        first, last = chunk.times_ns
+        _, offset, _, end, _ = chunk.place
+        size = len(chunk.records)
+        contents.segments.append(FileSegment(first, offset, end, last, size, frozenset(counts)))
+    contents.warnings += chunk.notes
 
 
-def damaged_chunk(offset: int, why: str) -> str:
+def left_out(record: str, offset: int, why: DamageKind) -> str:
     """
     Return the sentence of a warning.
     """
-    return f'the chunk at byte {offset} is damaged ({why}): left out'
+    name = record.replace('unknown', 'record')
+    return f'the {name} at byte {offset} is damaged ({why.value}): left out'
 
 
 def _full_name(type_name: str) -> str:

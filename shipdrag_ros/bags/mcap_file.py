@@ -22,14 +22,14 @@ from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.bags.contents import FileSegment, contents_of, damaged_chunk
+from shipdrag_ros.bags.contents import FileSegment, contents_of, left_out
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
@@ -84,7 +84,7 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._source = _unpacked_file(path) if path.suffix == '.zstd' else None
+        self._source = unpacked_file(path, self._refuse)
         with self._data() as data:
             head = data[:16]
             if not head.startswith(MAGIC):
@@ -122,7 +122,7 @@ class McapFile:
         read = 0
         waiting: Messages | None = None
         with self._data() as data:
-            groups = deque(_grouped(data, segments))
+            groups = deque(_grouped(segments))
             unpacked = _unpacked_ahead(data, tuple(groups))
             while groups:
                 # as much again as waits, so that what overlaps is not sorted over and over
@@ -136,7 +136,7 @@ class McapFile:
                 loaded = loaded.in_arrival_order()
                 ready = len(loaded)
                 if groups:  # the next may begin before this one ends
-                    ready = int(np.searchsorted(loaded.log_ns, groups[0].segments[0].start_ns))
+                    ready = int(np.searchsorted(loaded.log_ns, groups[0][0].start_ns))
                 if ready < len(loaded):
                     waiting = loaded[ready:].packed()
                     if len(waiting.data) > _WAITING_LIMIT_BYTES:
@@ -153,7 +153,7 @@ class McapFile:
     def _load(
         self,
         unpacked: Iterator[list[Unpacked]],
-        groups: deque[_Group],
+        groups: deque[list[FileSegment]],
         wanted: UInt8,
         least_bytes: int,
     ) -> Messages:
@@ -162,10 +162,10 @@ class McapFile:
         offsets: list[int] = []
         size = 0
         while groups and (not size or size < least_bytes):
-            for segment, chunk in zip(groups.popleft().segments, next(unpacked), strict=True):
+            for segment, chunk in zip(groups.popleft(), next(unpacked), strict=True):
                 size += 1 + len(chunk.records)
                 if chunk.damage is not None:
-                    self._warn(damaged_chunk(segment.offset, chunk.damage.value))
+                    self._warn(left_out('chunk', segment.offset, chunk.damage))
                     continue
                 sound.append(chunk.records)
                 offsets.append(segment.offset)
@@ -177,6 +177,9 @@ class McapFile:
     def _warn(self, text: str) -> None:
         if text not in self.contents.warnings:  # a file may be read twice
             self.contents.warnings.append(text)
+
+    def _refuse(self, kind: DamageKind, why: str) -> None:
+        raise BagError(f'{str(self.path)!r} cannot be unpacked: {why}')
 
     @contextmanager
     def _data(self) -> Iterator[Buffer]:
@@ -226,59 +229,45 @@ def not_mcap(path: Path, head: bytes) -> str:
     )
 
 
-class _Group(NamedTuple):
-    """Segments that are unpacked together, and how many bytes they are then, as they say."""
-
-    segments: list[FileSegment]
-    size: int
-
-
-def _grouped(data: Buffer, segments: Sequence[FileSegment]) -> Iterator[_Group]:
+def _grouped(segments: Sequence[FileSegment]) -> Iterator[list[FileSegment]]:
     """Put small segments together: what each costs beside its bytes is then small."""
     group: list[FileSegment] = []
     size = 0
     for segment in segments:
         group.append(segment)
-        size += _stated_bytes(data, segment)
+        size += segment.size
         if size >= _WORTHWHILE_BYTES or segment is segments[-1]:
-            yield _Group(group, size)
+            yield group
             group, size = [], 0
 
 
-def _stated_bytes(data: Buffer, segment: FileSegment) -> int:
-    size = segment.end - segment.offset
-    if data[segment.offset] != Opcode.CHUNK:
-        return size
-    at = segment.offset + HEAD.size + 16
-    return max(size, int.from_bytes(data[at : at + 8], 'little'))
-
-
-def _unpacked_ahead(data: Buffer, groups: Sequence[_Group]) -> Iterator[list[Unpacked]]:
+def _unpacked_ahead(data: Buffer, groups: Sequence[list[FileSegment]]) -> Iterator[list[Unpacked]]:
     """
     Yield the records of each group in order, unpacked on other cores meanwhile.
 
     Decompression and checksum leave Python's lock to others.
     """
+
+    def unpacked(group: list[FileSegment]) -> list[Unpacked]:
+        return [_unpacked(data, segment) for segment in group]
+
     threads = min(len(os.sched_getaffinity(0)) - 1, _THREADS)
     if threads < 1 or len(groups) < 2:
-        yield from (_records(data, group) for group in groups)
+        yield from map(unpacked, groups)
         return
     with ThreadPoolExecutor(threads, 'shipdrag-unpack') as pool:
         ahead: deque[tuple[int, Future[list[Unpacked]]]] = deque()
         waiting = 0
         for group in groups:
-            while ahead and waiting + group.size > _AHEAD_BYTES:
+            size = sum(segment.size for segment in group)
+            while ahead and waiting + size > _AHEAD_BYTES:
                 done, future = ahead.popleft()
                 waiting -= done
                 yield future.result()
-            ahead.append((group.size, pool.submit(_records, data, group)))
-            waiting += group.size
+            ahead.append((size, pool.submit(unpacked, group)))
+            waiting += size
         while ahead:
             yield ahead.popleft()[1].result()
-
-
-def _records(data: Buffer, group: _Group) -> list[Unpacked]:
-    return [_unpacked(data, segment) for segment in group.segments]
 
 
 def _unpacked(data: Buffer, segment: FileSegment) -> Unpacked:
@@ -287,30 +276,17 @@ def _unpacked(data: Buffer, segment: FileSegment) -> Unpacked:
         return unpack(data, Place(Opcode.CHUNK, segment.offset, start, segment.end))
     records = data[segment.offset : segment.end]
     release(data, segment.offset, segment.end)
-    return Unpacked(records, None, False, '')
+    return Unpacked(None, records, None, False)
 
 
-def _unpacked_file(path: Path) -> IO[bytes]:
-    def refuse(kind: DamageKind, text: str) -> None:
-        raise BagError(f'{str(path)!r} cannot be unpacked: {text}')
-
-    unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
-    unpack_file(path, unpacked, refuse)
-    return unpacked
-
-
-def unpack_file(
-    path: Path, unpacked: IO[bytes], damaged: Callable[[DamageKind, str], object]
-) -> None:
+def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> IO[bytes] | None:
     """
     Unpack a file that rosbag2 has packed as a whole, as far as it goes.
 
     Parameters
     ----------
     path
-        `.mcap.zstd`.
-    unpacked
-        Where to.
+        `.mcap.zstd`; of one that is not packed there is None.
     damaged
         Called with what is wrong with it.
 
@@ -319,10 +295,13 @@ def unpack_file(
     BagError
         If it cannot be read or there is no room.
     """
+    if path.suffix != '.zstd':
+        return None
+    unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
+    decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
     try:
         with path.open('rb') as packed:
             limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
-            decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
             while not decoder.eof:
                 piece = packed.read(_PIECE_BYTES)
                 if not piece:
@@ -332,12 +311,13 @@ def unpack_file(
                 if unpacked.tell() > limit:
                     damaged(DamageKind.TOO_LARGE, f'it unpacks to more than {limit} bytes')
                     break
+        unpacked.flush()
     except OSError as error:
         raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
     except zstandard.ZstdError as error:
-        damaged(DamageKind.COMPRESSION, str(error))
-    finally:
         unpacked.flush()
+        damaged(DamageKind.COMPRESSION, str(error))
+    return unpacked
 
 
 _SUFFIXES = ('.mcap', '.mcap.zstd')

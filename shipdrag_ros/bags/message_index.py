@@ -65,14 +65,8 @@ class Messages:
         return len(self.log_ns)
 
     def __getitem__(self, part: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Messages:
-        return Messages(
-            self.data,
-            self.log_ns[part],
-            self.segment[part],
-            self.channel[part],
-            self.start[part],
-            self.end[part],
-        )
+        _, *columns = (getattr(self, field.name) for field in fields(self))
+        return Messages(self.data, *(column[part] for column in columns))
 
     def payload(self, number: int) -> bytes:
         """

@@ -24,6 +24,7 @@ import zstandard
 from isal.isal_zlib import crc32
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.records import Chunk, Footer
 from mcap.stream_reader import StreamReader
 
 _LISTED = 10_000  # of a file that is damaged everywhere; the others are counted
@@ -205,10 +206,8 @@ def walk(data: Buffer, start: int, end: int, kinds: frozenset[int] = KINDS) -> I
     at = start
     while at < end:
         place = _whole(data, at, end, kinds)
-        if place is None:
-            place = _damaged(data, at, end, kinds)
-        elif not _goes_on(data, place.end, end, kinds):
-            place = _doubted(data, place, end, kinds)
+        if place is None or not _goes_on(data, place.end, end, kinds):
+            place = _inferred(data, at, end, kinds, as_it_says=place)
         yield place
         at = place.end
         release(data, place.offset, at)
@@ -236,6 +235,18 @@ def read(data: Buffer, place: Place) -> Any:
         return None
 
 
+def footer_of(data: Buffer) -> Footer | None:
+    """
+    Return the footer of a file that was closed; None without a whole one.
+    """
+    end = len(data) - len(MAGIC)
+    offset = end - HEAD.size - 20
+    if offset < len(MAGIC) or data[end:] != MAGIC:
+        return None
+    footer = read(data, Place(data[offset], offset, offset + HEAD.size, end))
+    return footer if isinstance(footer, Footer) else None
+
+
 def checksum(data: Buffer, start: int, end: int) -> int:
     """
     Return the CRC-32 of a span of any size.
@@ -245,6 +256,15 @@ def checksum(data: Buffer, start: int, end: int) -> int:
         value = crc32(data[at : min(at + _CRC_BYTES, end)], value)
         release(data, at, min(at + _CRC_BYTES, end))
     return value
+
+
+def summary_agrees(data: Buffer, footer: Footer) -> bool:
+    """
+    Say whether the summary of a closed file has the checksum that it states, if any.
+    """
+    # which covers the footer too, up to itself
+    end = len(data) - len(MAGIC) - 4
+    return footer.summary_crc in (0, checksum(data, footer.summary_start, end))
 
 
 def attachment_agrees(data: Buffer, place: Place) -> bool:
@@ -315,48 +335,43 @@ def _goes_on(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> bool:
     return opcode != GARBAGE and _whole(data, stop, end, kinds) is not None
 
 
-def _damaged(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place:
-    """Say what lies at an offset where no sound record does."""
+def _inferred(
+    data: Buffer, at: int, end: int, kinds: frozenset[int], *, as_it_says: Place | None
+) -> Place:
+    """Say what lies where no record does, or one behind which none follows: it may be damaged."""
     if end - at < HEAD.size:
         ending = data[at:end] == MAGIC
         return Place(GARBAGE, at, at, end, None if ending else DamageKind.TRUNCATED)
     opcode, length = HEAD.unpack_from(data, at)
     start = at + HEAD.size
-    known = opcode in kinds
     stop = start + length
-    if known and opcode != Opcode.MESSAGE:
-        by_fields = _fields_end(data, opcode, start, end)
-        if by_fields is not None and by_fields <= end and _goes_on(data, by_fields, end, kinds):
-            return Place(opcode, at, start, by_fields, DamageKind.LENGTH)
-    if stop <= end and _goes_on(data, stop, end, kinds):
-        # its length is right, and something else is not
-        near = (opcode ^ 1 << bit for bit in range(8))
-        mended = [it for it in near if it in kinds and _fills(data, it, start, stop)]
-        if known and Opcode.MESSAGE in mended:  # which anything fills
-            mended.remove(Opcode.MESSAGE)
-        kind = DamageKind.OPCODE if mended or not known else DamageKind.CONTENT
-        return Place([*mended, opcode if known else GARBAGE][0], at, start, stop, kind)
-    chunk = known and opcode == Opcode.CHUNK and _is_chunk(data, start)
+    known = opcode in kinds
+    if as_it_says is None:
+        if known and opcode != Opcode.MESSAGE:
+            filled = _fields_end(data, opcode, start, end)
+            if filled is not None and filled <= end and _goes_on(data, filled, end, kinds):
+                return Place(opcode, at, start, filled, DamageKind.LENGTH)
+        if stop <= end and _goes_on(data, stop, end, kinds):
+            # its length is right, and something else is not
+            near = (opcode ^ 1 << bit for bit in range(8))
+            mended = [it for it in near if it in kinds and _fills(data, it, start, stop)]
+            if known and Opcode.MESSAGE in mended:  # which anything fills
+                mended.remove(Opcode.MESSAGE)
+            kind = DamageKind.OPCODE if mended or not known else DamageKind.CONTENT
+            return Place([*mended, opcode if known else GARBAGE][0], at, start, stop, kind)
+    chunk = opcode == Opcode.CHUNK in kinds and _is_chunk(data, start)
     after = _next(data, at + 1, end, kinds - IN_CHUNK if chunk else kinds)
-    cut_off = known and after == end < stop < start + _POSSIBLE_BYTES
-    kind = DamageKind.TRUNCATED if cut_off else DamageKind.LENGTH
-    if not known:
+    if as_it_says is not None and after >= stop:
+        # the fields of others end where the record does; a message may be longer by a flipped bit
+        flipped = length ^ (after - start)
+        longer = opcode == Opcode.MESSAGE and flipped.bit_count() == 1
+        return as_it_says._replace(damage=DamageKind.LENGTH) if longer else as_it_says
+    if not known and as_it_says is None:
         return Place(GARBAGE, at, at, after, DamageKind.GARBAGE)
+    cut_off = after == end < stop < start + _POSSIBLE_BYTES
+    kind = DamageKind.TRUNCATED if cut_off else DamageKind.LENGTH
     # part of a chunk may be unpacked
     return Place(opcode, at, start if chunk and start < after else at, after, kind)
-
-
-def _doubted(data: Buffer, place: Place, end: int, kinds: frozenset[int]) -> Place:
-    """Say what a record is behind which no sound one follows: it, or the next, is damaged."""
-    chunk = place.opcode == Opcode.CHUNK
-    after = _next(data, place.offset + 1, end, kinds - IN_CHUNK if chunk else kinds)
-    if after >= place.end:
-        # the fields of others end where the record does; a message may be longer by a flipped bit
-        flipped = (place.end - place.start) ^ (after - place.start)
-        longer = place.opcode == Opcode.MESSAGE and flipped.bit_count() == 1
-        return place._replace(damage=DamageKind.LENGTH) if longer else place
-    start = place.start if chunk else place.offset
-    return Place(place.opcode, place.offset, start, after, DamageKind.LENGTH)
 
 
 def _next(data: Buffer, begin: int, end: int, kinds: frozenset[int]) -> int:
@@ -392,21 +407,20 @@ class Unpacked(NamedTuple):
 
     Attributes
     ----------
+    chunk
+        As it stands in the file, packed; None where it cannot be read.
     records
         Unpacked, as far as it goes.
     damage
-        What is wrong with the chunk; None where nothing is.
+        What is wrong with it.
     verified
-        Whether its checksum was tested and is right; then it is whole,
-        whatever else is wrong.
-    compression
-        As stated; '' for none.
+        Whether its own checksum vouches for the records.
     """
 
+    chunk: Chunk | None
     records: bytes
     damage: DamageKind | None
     verified: bool
-    compression: str
 
 
 class _OfThread(threading.local):
@@ -419,19 +433,9 @@ class _OfThread(threading.local):
 _of_thread = _OfThread()
 
 
-class _Packed(NamedTuple):
-    """What a chunk states of itself, and its packed bytes as far as they are there."""
-
-    size: int
-    checksum: int
-    compression: str
-    content: bytes
-    cut_off: bool
-
-
 def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
     """
-    Unpack a chunk that is whole; of another one nothing.
+    Unpack a chunk that is whole; of another one nothing that can be relied on.
 
     Parameters
     ----------
@@ -439,42 +443,30 @@ def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
     partly
         As much of it as can be, up to `CHUNK_LIMIT_BYTES`.
     """
-    packed = _packed(data, place)
-    if packed is None:
-        return Unpacked(b'', DamageKind.CONTENT, False, '')
-    damage, records, limit = None, b'', CHUNK_LIMIT_BYTES
-    try:
-        if packed.size <= limit:
-            records = _decompress(packed)
-            damage = None if len(records) == packed.size else DamageKind.SIZE
-        else:
-            damage = DamageKind.TOO_LARGE
-    except _UNPACKING_ERRORS:
-        damage = DamageKind.TRUNCATED if packed.cut_off else DamageKind.COMPRESSION
-    if partly and damage is not None:
-        records = _decompress_partly(packed)
-        damage = DamageKind.TOO_LARGE if len(records) > limit else damage
-    if len(records) > limit or (not partly and damage not in (None, DamageKind.SIZE)):
-        return Unpacked(b'', damage, False, packed.compression)
-    verified = packed.checksum != 0 and crc32(records) == packed.checksum
-    if packed.cut_off:
-        damage = damage or DamageKind.TRUNCATED
-    if packed.checksum and not verified:
-        damage = damage or DamageKind.CHECKSUM
-    return Unpacked(records, damage, verified, packed.compression)
-
-
-def _packed(data: Buffer, place: Place) -> _Packed | None:
-    at = place.start + _CHUNK_HEAD.size
-    if at + 12 > place.end or not _is_chunk(data, place.start):
-        return None
-    _, _, size, stated = _CHUNK_HEAD.unpack_from(data, place.start)
-    name_end = at + 4 + int.from_bytes(data[at : at + 4], 'little')
-    start = name_end + 8
-    end = start + int.from_bytes(data[name_end:start], 'little')
-    content = data[start : min(end, place.end)]
+    chunk = read(data, place)
     release(data, place.offset, place.end)
-    return _Packed(size, stated, data[at + 4 : name_end].decode(), content, end > place.end)
+    if chunk is None or not _is_chunk(data, place.start):
+        return Unpacked(None, b'', DamageKind.CONTENT, False)
+    records, damage = b'', None
+    try:
+        if chunk.uncompressed_size > CHUNK_LIMIT_BYTES:
+            damage = DamageKind.TOO_LARGE
+        else:
+            records = _decompress(chunk)
+            damage = None if len(records) == chunk.uncompressed_size else DamageKind.SIZE
+    except _UNPACKING_ERRORS:
+        damage = DamageKind.COMPRESSION
+    if partly and damage is not None:
+        records = _decompress_partly(chunk)
+    if len(records) > CHUNK_LIMIT_BYTES:
+        return Unpacked(chunk, b'', DamageKind.TOO_LARGE, False)
+    verified = chunk.uncompressed_crc != 0 and crc32(records) == chunk.uncompressed_crc
+    stated_end = _fields_end(data, Opcode.CHUNK, place.start, place.end) or place.end
+    if stated_end > place.end and damage in (None, DamageKind.COMPRESSION):
+        damage = DamageKind.TRUNCATED
+    if chunk.uncompressed_crc and not verified:
+        damage = damage or DamageKind.CHECKSUM
+    return Unpacked(chunk, records, damage, verified)
 
 
 def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
@@ -492,33 +484,44 @@ def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
     return _of_thread.zstd.decompress(packed, max_output_size=limit_bytes)
 
 
-def _decompress(packed: _Packed) -> bytes:
-    if packed.compression == 'zstd':
-        return unpack_zstd(packed.content, packed.size)
-    if packed.compression == 'lz4':
+def has_end(chunk: Chunk) -> bool:
+    """
+    Say whether the packed bytes of a chunk end as they should; else other readers refuse it.
+    """
+    if chunk.compression != 'lz4':  # of the others it is an error to unpack such
+        return True
+    decoder = lz4.frame.LZ4FrameDecompressor()
+    with suppress(*_UNPACKING_ERRORS):
+        decoder.decompress(chunk.data, max_length=chunk.uncompressed_size + 1)
+    return bool(decoder.eof)
+
+
+def _decompress(chunk: Chunk) -> bytes:
+    size = chunk.uncompressed_size
+    if chunk.compression == 'zstd':
+        return unpack_zstd(chunk.data, size)
+    if chunk.compression == 'lz4':
         # one byte more than stated, so that a larger one is not cut off in silence
         decoder = lz4.frame.LZ4FrameDecompressor()
-        return bytes(decoder.decompress(packed.content, max_length=packed.size + 1))
-    if len(packed.content) > CHUNK_LIMIT_BYTES:
-        raise ValueError('too large')
-    return packed.content
+        return bytes(decoder.decompress(chunk.data, max_length=size + 1))
+    return bytes(chunk.data)
 
 
-def _decompress_partly(packed: _Packed) -> bytes:
+def _decompress_partly(chunk: Chunk) -> bytes:
     """Unpack piece by piece, up to the damage or beyond the limit."""
     decoder: Any
-    if packed.compression == 'zstd':
+    if chunk.compression == 'zstd':
         decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
-    elif packed.compression == 'lz4':
+    elif chunk.compression == 'lz4':
         decoder = lz4.frame.LZ4FrameDecompressor()
     else:
-        return packed.content[: CHUNK_LIMIT_BYTES + 1]
+        return bytes(chunk.data[: CHUNK_LIMIT_BYTES + 1])
     out: list[bytes] = []
     size = 0
     with suppress(*_UNPACKING_ERRORS):
-        for at in range(0, len(packed.content), _PIECE_BYTES):
+        for at in range(0, len(chunk.data), _PIECE_BYTES):
             if decoder.eof or size > CHUNK_LIMIT_BYTES:
                 break
-            out.append(decoder.decompress(packed.content[at : at + _PIECE_BYTES]))
+            out.append(decoder.decompress(chunk.data[at : at + _PIECE_BYTES]))
             size += len(out[-1])
     return b''.join(out)

@@ -11,25 +11,20 @@ is made compact in the same way: its name holds a whole file at every moment.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
-import numpy as np
 import zstandard
-from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.mcap_file import BagFiles, locate, mapped, unpack_file
-from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
+from shipdrag_ros.bags.mcap_file import BagFiles, locate, mapped, unpacked_file
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
     GARBAGE,
     HEAD,
-    IN_CHUNK,
     MAGIC,
     MESSAGE_HEAD,
     TIME_LIMIT_NS,
@@ -39,18 +34,18 @@ from shipdrag_ros.bags.records import (
     DamageList,
     Place,
     attachment_agrees,
-    place_at,
+    footer_of,
+    has_end,
     read,
-    unpack,
+    summary_agrees,
     unpack_zstd,
     walk,
 )
+from shipdrag_ros.bags.scan import OpenChunk, scan
 from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes, sync_directory
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 
-_FOOTER_BYTES = HEAD.size + 20
-_STATED = ((20, 8), (4, 4))  # before the last magic: start and checksum of the summary
 _PART = '.part'
 
 
@@ -158,12 +153,8 @@ def opened(path: Path, damages: DamageList) -> Iterator[Buffer]:
     BagError
         If it cannot be read.
     """
-    with ExitStack() as stack:
-        unpacked = None
-        if path.suffix == '.zstd':
-            unpacked = stack.enter_context(TemporaryFile(prefix='shipdrag_'))
-            unpack_file(path, unpacked, lambda kind, text: damages.add(0, 'file', kind, text))
-        data = stack.enter_context(mapped(path, unpacked))
+    unpacked = unpacked_file(path, lambda kind, text: damages.add(0, 'file', kind, text))
+    with unpacked or nullcontext(), mapped(path, unpacked) as data:
         if not data:
             damages.add(0, 'file', DamageKind.TRUNCATED, 'it is empty')
         yield data
@@ -208,19 +199,15 @@ class DeclaredTopics:
         """
         Take note of those that stand outside of chunks, wherever they do.
         """
-        end = len(data) - len(MAGIC)
-        start, checksum = (int.from_bytes(data[end - at :][:n], 'little') for at, n in _STATED)
-        verified = checksum and start < end and crc32(data[start : end - 4]) == checksum
-        if end > _FOOTER_BYTES and verified:
-            self._add_between(data, start, end, verified=True)
-        self._add_between(data, 0, len(data), verified=False)
-
-    def _add_between(self, data: Buffer, start: int, end: int, *, verified: bool) -> None:
-        for place in walk(data, start, end):
+        footer = footer_of(data)
+        begin = len(data)
+        if footer is not None and footer.summary_crc and summary_agrees(data, footer):
+            begin = footer.summary_start
+        for place in walk(data, 0, len(data)):
             if place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL) and place.damage is None:
                 record = read(data, place)
                 if record is not None:
-                    self.add(record, verified=verified)
+                    self.add(record, verified=place.offset >= begin)
 
 
 class _Salvaged:
@@ -329,17 +316,12 @@ class _Salvage:
         self._doubtful.numbers.clear()
 
     def _walk(self, data: Buffer) -> None:
-        begin = len(MAGIC) if data[: len(MAGIC)] == MAGIC else 0
-        if not begin:
-            self.damages.add(0, 'magic', DamageKind.MISSING)
         chunked = False
-        for place in walk(data, begin, len(data)):
-            if place.damage is not None:
-                self.damages.add(place.offset, place.name, place.damage)
-            if place.opcode == Opcode.CHUNK and place.start > place.offset:
+        for place, chunk in scan(data, self.damages, partly=True):
+            if chunk is not None:
                 chunked = True
                 self._progress(place.offset, len(data))
-                self._chunk(data, place)
+                self._chunk(chunk)
             elif place.readable:
                 # a message between chunks may be part of a damaged one
                 stray = chunked and place.opcode == Opcode.MESSAGE
@@ -347,58 +329,52 @@ class _Salvage:
             elif place.damage is not None or place.opcode != GARBAGE:
                 self.bytes_lost += place.end - place.offset
 
-    def _chunk(self, data: Buffer, chunk: Place) -> None:
-        records, damage, verified, _ = unpack(data, chunk, partly=True)
-        if damage not in (None, chunk.damage):
-            self.damages.add(chunk.offset, 'chunk', damage)
-        sound = verified or (damage is None and chunk.damage is None)
-        indexed = index_messages([records], [0], EVERY_CHANNEL)
-        messages, others, notes = indexed
-        if sound and not notes:
-            for at in others.tolist():
-                place = place_at(records, at)
-                self._record(records, place, chunk.offset, sound=True, verified=verified)
-            as_it_is = verified and damage is None and not self._bag.message_compression
-            if as_it_is and self._copy(data, chunk, records, indexed):
+    def _chunk(self, chunk: OpenChunk) -> None:
+        records, offset, verified = chunk.records, chunk.place.offset, chunk.verified
+        sound = verified or chunk.sound
+        if sound and not chunk.notes:
+            for place in chunk.others:
+                self._record(records, place, offset, sound=True, verified=verified)
+            as_it_is = verified and chunk.damage is None and not self._bag.message_compression
+            if as_it_is and self._copy(chunk):
                 return
+            messages = chunk.messages
             starts = (messages.start - MESSAGE_HEAD.size).tolist()
             for start, end in zip(starts, messages.end.tolist(), strict=True):
-                self._message(records[start:end], chunk.offset, self._sound)
+                self._message(records[start:end], offset, self._sound)
             return
         used = 0
-        for place in walk(records, 0, len(records), IN_CHUNK):
+        for place in chunk.walk():
             if place.damage is not None and sound:
                 # elsewhere it is what the damage of the chunk has made
-                self.damages.add(chunk.offset, place.name, place.damage)
+                self.damages.add(offset, place.name, place.damage)
             if place.readable:
                 used += place.end - place.offset
                 believed = sound and place.damage is None
-                self._record(records, place, chunk.offset, sound=believed, verified=verified)
-        packed = chunk.end - chunk.start
+                self._record(records, place, offset, sound=believed, verified=verified)
+        packed = chunk.place.end - chunk.place.start
         self.bytes_lost += packed * (len(records) - used) // len(records) if records else packed
 
-    def _copy(self, data: Buffer, chunk: Place, records: bytes, indexed: Indexed) -> bool:
+    def _copy(self, chunk: OpenChunk) -> bool:
         """Write a chunk as it is, if it needs no other numbers and is worth it; say whether."""
-        messages, others, _ = indexed
-        record, declared = read(data, chunk), self._declared.channels
-        numbers = np.unique(messages.channel).tolist()
-        small = not record.compression and len(record.data) < CHUNK_RANGE[0]
-        if small or not numbers or not declared.keys() >= set(numbers):
+        record, entries, times_ns = chunk.chunk, chunk.entries(), chunk.times_ns
+        if record is None or times_ns is None or not has_end(record):
             return False
-        inside = [read(records, place_at(records, at)) for at in others.tolist()]
-        for number in {*numbers, *(it.id for it in inside if isinstance(it, Channel))}:
+        if not self._declared.channels.keys() >= entries.keys():
+            return False
+        if not record.compression and len(record.data) < CHUNK_RANGE[0]:  # a small one
+            return False
+        inside = [read(chunk.records, place) for place in chunk.others]
+        for number in {*entries, *(it.id for it in inside if isinstance(it, Channel))}:
             if self._sound.number(number, self._declared) != number:
                 return False
         if not all(self._sound.writer.says(it) for it in inside):
             return False
-        offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
-        entries = np.column_stack((messages.log_ns, offsets)).astype('<u8')
-        first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
+        first, last = times_ns
         self._sound.writer.add_chunk(
-            replace(record, message_start_time=first, message_end_time=last),
-            {number: entries[messages.channel == number].ravel() for number in numbers},
+            replace(record, message_start_time=first, message_end_time=last), entries
         )
-        self._sound.messages += len(messages)
+        self._sound.messages += len(chunk.messages)
         return True
 
     def _record(

@@ -41,14 +41,13 @@ from mcap.records import (
     Schema,
     Statistics,
 )
-from numpy.typing import NDArray
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import OUTPUT_TOPICS, EncodedMessage, encode, types
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import Block, Int64
 
 PROFILE = 'ros2'
 METADATA = 'shipdrag_ros'
@@ -373,12 +372,12 @@ class RecordWriter:
             uncompressed_crc=crc32(records),
             uncompressed_size=len(records),
         )
-        entries = {number: np.array(each, '<u8') for number, each in self._entries.items()}
+        entries = {number: np.array(each, np.int64) for number, each in self._entries.items()}
         self._chunk.clear()
         self._entries.clear()
         self.add_chunk(chunk, entries)
 
-    def add_chunk(self, chunk: Chunk, entries: Mapping[int, NDArray[np.uint64]]) -> None:
+    def add_chunk(self, chunk: Chunk, entries: Mapping[int, Int64]) -> None:
         """
         Write a chunk as it is, behind what was added before.
 

@@ -22,7 +22,7 @@ from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionMode
 
-from shipdrag_ros.bags import BagWriter, info, open_runs
+from shipdrag_ros.bags import BagWriter, Compression, info, open_runs
 from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.bags.recover import recover
@@ -364,3 +364,20 @@ def test_chunks_of_two_files_whose_numbers_meet_keep_their_topics(tmp_path: Path
     for place, channel in enumerate((Channel.DEPTH, Channel.SPEED_THROUGH_WATER)):
         assert np.all(block.value[block.channel == channel, 0] == 5.0 + place)
         assert np.sum(block.channel == channel) == 2000
+
+
+def test_a_chunk_without_the_end_of_its_frame_is_packed_again(tmp_path: Path) -> None:
+    """All of it can be unpacked and its checksum is right, but other readers refuse it."""
+    block = Block.of(Channel.DEPTH, range(START_NS, START_NS + 4000), np.arange(4000) % 97)
+    with BagWriter(tmp_path / 'a.mcap', compression=Compression.LZ4, chunk_bytes=1 << 14) as bag:
+        bag.write_samples(block)
+    data = bytearray((tmp_path / 'a.mcap').read_bytes())
+    chunk = next(each for each in walk(bytes(data), 8, len(data)) if each.opcode == Opcode.CHUNK)
+    data[chunk.end - 4] ^= 1  # of the four bytes that end a frame
+    (tmp_path / 'b.mcap').write_bytes(data)
+    assert ('chunk', 'compression') in {
+        (each.record, each.kind.value) for each in check([tmp_path / 'b.mcap'])[0].damage
+    }
+    assert recover(tmp_path / 'b.mcap', tmp_path / 'c.mcap').messages_recovered == 4000
+    with (tmp_path / 'c.mcap').open('rb') as file:
+        assert len(list(make_reader(file).iter_messages())) == 4000
