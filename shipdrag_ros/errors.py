@@ -8,7 +8,9 @@ that is raised is a defect of this package.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
 
 class ShipdragError(Exception):
@@ -70,6 +72,29 @@ class DataError(ProblemsError):
 
 class BagError(ShipdragError):
     """A bag that cannot be read or written."""
+
+
+@contextmanager
+def disk_errors(path: Path, done: str) -> Iterator[None]:
+    """
+    Make errors of the system those of a bag.
+
+    Parameters
+    ----------
+    path
+        Of the bag.
+    done
+        What is done to it, `read` for instance.
+
+    Raises
+    ------
+    BagError
+        If the disk refuses.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be {done}: {error.strerror}') from error
 
 
 class ImportDataError(ShipdragError):

@@ -30,7 +30,7 @@ from shipdrag_ros.bags.writer import (
     as_bytes,
     sync_directory,
 )
-from shipdrag_ros.errors import BagError, reason_of
+from shipdrag_ros.errors import BagError, disk_errors, reason_of
 from shipdrag_ros.messages import EncodedMessage
 
 DECLARE_BYTES = 1 << 20  # topics are declared anew behind so much
@@ -81,7 +81,7 @@ class LiveFile(BagWriter):
                 attachments=attachments,
             )
             self.sync()
-            with self._errors_named():
+            with disk_errors(self.path, 'written'):
                 sync_directory(path.parent)
         except BagError:
             if hasattr(self, '_file'):
@@ -116,12 +116,10 @@ class LiveFile(BagWriter):
         BagError
             If the disk does not take it, or the file is no longer in its place.
         """
-        try:
+        with disk_errors(self.path, 'written'):
             os.fsync(self._file.fileno())
             if not self.in_place():
                 raise BagError(f'{str(self.path)!r} was removed or replaced by somebody else')
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r}: {error.strerror}') from error
         self.synced_bytes, self.synced_messages = self.size_bytes, self._messages
 
     def in_place(self) -> bool:

@@ -42,7 +42,7 @@ from shipdrag_ros.bags.records import (
     release,
     unpack,
 )
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
@@ -206,12 +206,9 @@ def mapped(path: Path, unpacked: IO[bytes] | None) -> Iterator[Buffer]:
     BagError
         If it cannot be read.
     """
-    try:
-        with path.open('rb') as file:
-            source = unpacked or file
-            data = mmap(source.fileno(), 0, access=ACCESS_READ) if source.seek(0, 2) else None
-    except OSError as error:
-        raise BagError(f'{str(path)!r} cannot be read: {error.strerror}') from error
+    with disk_errors(path, 'read'), path.open('rb') as file:
+        source = unpacked or file
+        data = mmap(source.fileno(), 0, access=ACCESS_READ) if source.seek(0, 2) else None
     with data or nullcontext(b'') as held:
         yield held
 
@@ -300,7 +297,7 @@ def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> I
     unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
     decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
     try:
-        with path.open('rb') as packed:
+        with disk_errors(path, 'unpacked'), path.open('rb') as packed:
             limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
             while not decoder.eof:
                 piece = packed.read(_PIECE_BYTES)
@@ -311,9 +308,7 @@ def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> I
                 if unpacked.tell() > limit:
                     damaged(DamageKind.TOO_LARGE, f'it unpacks to more than {limit} bytes')
                     break
-        unpacked.flush()
-    except OSError as error:
-        raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
+            unpacked.flush()
     except zstandard.ZstdError as error:
         unpacked.flush()
         damaged(DamageKind.COMPRESSION, str(error))

@@ -21,7 +21,7 @@ from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.writer import METADATA
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.messages import (
     OUTPUT_TOPICS,
     TOPICS,
@@ -322,10 +322,8 @@ class Run:
         BagError
             If the disk does not take it.
         """
-        try:
+        with disk_errors(out, 'written'):
             shutil.copyfile(self.parts[0].path, out)
-        except OSError as error:
-            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
 
     def part(self, start_s: float, end_s: float) -> Run:
         """

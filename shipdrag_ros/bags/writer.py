@@ -11,8 +11,8 @@ from __future__ import annotations
 import os
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
 from fcntl import LOCK_EX, LOCK_NB, flock
@@ -45,7 +45,7 @@ from mcap.records import (
 from shipdrag_ros import __version__
 from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.messages import OUTPUT_TOPICS, EncodedMessage, encode, types
 from shipdrag_ros.samples import Block, Int64
 
@@ -353,7 +353,7 @@ class RecordWriter:
             # its checksum covers the footer too, up to itself
             covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
             self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
-            with self._errors_named():
+            with disk_errors(self.path, 'written'):
                 self._file.flush()
                 os.fsync(self._file.fileno())
         finally:
@@ -408,17 +408,10 @@ class RecordWriter:
 
     def _write(self, data: bytes) -> None:
         left = memoryview(data)
-        with self._errors_named():
+        with disk_errors(self.path, 'written'):
             while left:
                 left = left[self._file.write(left) :]
         self.size_bytes += len(data)
-
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
 
     def __enter__(self) -> Self:
         return self

@@ -42,9 +42,7 @@ def test_a_ship_file_is_refused_soon_without_a_word_of_what_is_in_it(kind, tmp_p
 
 def record(directory: Path) -> None:
     """Record one message into a folder."""
-    it = DurableRecording(
-        directory, stem='coastdown_x', attachments={}, limits=PartLimits()
-    )
+    it = DurableRecording(directory, stem='coastdown_x', attachments={}, limits=PartLimits())
     it.put(EncodedMessage('/depth', 'sensor_msgs/msg/Range', b'\x00\x01\x00\x00', 1, 1))
     time.sleep(0.5)
     it.stop()
