@@ -291,10 +291,11 @@ def _add_chunk(chunk: OpenChunk, contents: Contents) -> None:
     for place in chunk.others:
         if place.opcode in _DECLARATIONS:
             contents.add(read(chunk.records, place))
-    counts = {number: len(entries) for number, entries in chunk.entries().items()}
+    counts = Counter(chunk.messages.channel.tolist())
     contents.counts.update(counts)
-    if chunk.times_ns is not None:
-        first, last = chunk.times_ns
+    times_ns = chunk.times_ns
+    if times_ns is not None:
+        first, last = times_ns
         _, offset, _, end, _ = chunk.place
         size = len(chunk.records)
         contents.segments.append(FileSegment(first, offset, end, last, size, frozenset(counts)))

@@ -65,8 +65,14 @@ class Messages:
         return len(self.log_ns)
 
     def __getitem__(self, part: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Messages:
-        _, *columns = (getattr(self, field.name) for field in fields(self))
-        return Messages(self.data, *(column[part] for column in columns))
+        return Messages(
+            self.data,
+            self.log_ns[part],
+            self.segment[part],
+            self.channel[part],
+            self.start[part],
+            self.end[part],
+        )
 
     def payload(self, number: int) -> bytes:
         """

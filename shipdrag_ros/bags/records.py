@@ -443,10 +443,10 @@ def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
     partly
         As much of it as can be, up to `CHUNK_LIMIT_BYTES`.
     """
-    chunk = read(data, place)
-    release(data, place.offset, place.end)
-    if chunk is None or not _is_chunk(data, place.start):
+    if place.start + _CHUNK_HEAD.size + 12 > place.end or not _is_chunk(data, place.start):
         return Unpacked(None, b'', DamageKind.CONTENT, False)
+    chunk, cut_off = _chunk_at(data, place.start, place.end)
+    release(data, place.offset, place.end)
     records, damage = b'', None
     try:
         if chunk.uncompressed_size > CHUNK_LIMIT_BYTES:
@@ -461,12 +461,22 @@ def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
     if len(records) > CHUNK_LIMIT_BYTES:
         return Unpacked(chunk, b'', DamageKind.TOO_LARGE, False)
     verified = chunk.uncompressed_crc != 0 and crc32(records) == chunk.uncompressed_crc
-    stated_end = _fields_end(data, Opcode.CHUNK, place.start, place.end) or place.end
-    if stated_end > place.end and damage in (None, DamageKind.COMPRESSION):
+    if cut_off and damage in (None, DamageKind.COMPRESSION):
         damage = DamageKind.TRUNCATED
     if chunk.uncompressed_crc and not verified:
         damage = damage or DamageKind.CHECKSUM
     return Unpacked(chunk, records, damage, verified)
+
+
+def _chunk_at(data: Buffer, start: int, end: int) -> tuple[Chunk, bool]:
+    """Return a chunk as far as it is there, and whether it is cut off; faster than `read`."""
+    first_ns, last_ns, size, stated = _CHUNK_HEAD.unpack_from(data, start)
+    at = start + _CHUNK_HEAD.size
+    name_end = at + 4 + int.from_bytes(data[at : at + 4], 'little')
+    begin = name_end + 8
+    stop = begin + int.from_bytes(data[name_end:begin], 'little')
+    compression, packed = data[at + 4 : name_end].decode(), data[begin : min(stop, end)]
+    return Chunk(compression, packed, last_ns, first_ns, stated, size), stop > end
 
 
 def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:

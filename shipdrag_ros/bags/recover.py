@@ -357,12 +357,13 @@ class _Salvage:
 
     def _copy(self, chunk: OpenChunk) -> bool:
         """Write a chunk as it is, if it needs no other numbers and is worth it; say whether."""
-        record, entries, times_ns = chunk.chunk, chunk.entries(), chunk.times_ns
+        record, times_ns = chunk.chunk, chunk.times_ns
         if record is None or times_ns is None or not has_end(record):
             return False
-        if not self._declared.channels.keys() >= entries.keys():
-            return False
         if not record.compression and len(record.data) < CHUNK_RANGE[0]:  # a small one
+            return False
+        entries = chunk.entries()
+        if not self._declared.channels.keys() >= entries.keys():
             return False
         inside = [read(chunk.records, place) for place in chunk.others]
         for number in {*entries, *(it.id for it in inside if isinstance(it, Channel))}:

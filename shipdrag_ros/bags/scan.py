@@ -110,7 +110,8 @@ def scan(
             yield place, None
             continue
         chunk, records, damage, verified = unpack(data, place, partly=partly)
-        if damage not in (None, place.damage):
+        # of a chunk that cannot be read it matters only to those who unpack what is left of it
+        if damage not in (None, place.damage) and (partly or place.readable):
             damages.add(place.offset, place.name, damage)
         messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
         inside = tuple(place_at(records, at) for at in others.tolist())
