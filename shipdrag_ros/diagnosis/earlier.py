@@ -104,7 +104,14 @@ class EarlierDiagnosis:
             That they were of; None where none is known.
         name
             For the user.
+
+        Raises
+        ------
+        DiagnosisError
+            If its verdict waits for an answer.
         """
+        if found.question:
+            raise DiagnosisError(f'{name}: its verdict waits for an answer: {found.question}')
         return cls(
             name,
             '' if ship is None else ship.name,
@@ -262,6 +269,8 @@ def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
         given = _mapping(each, place)
         if given.get('used') is True:
             before += _runs(given.get('runs'), f'{place}.runs')
+    if whole.get('question'):
+        raise _Wrong('question: its verdict waits for the answer; diagnose its runs again')
     of_force = whole.get('baseline') == 'stated'
     candidates = _candidates(whole.get('candidates'), all_sized=of_force)
     return EarlierDiagnosis(
