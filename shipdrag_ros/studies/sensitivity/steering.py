@@ -18,7 +18,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 from shipdrag_ros.studies.manoeuvring.simulate import (
     Manoeuvre,
-    ManoeuvreMotion,
+    Motions,
     overshoots_rad,
     steer,
     turn,
@@ -90,8 +90,8 @@ class ReducedModelCheck:
     """
 
     manoeuvre: Manoeuvre
-    full: ManoeuvreMotion
-    reduced: ManoeuvreMotion
+    full: Motions
+    reduced: Motions
 
     @property
     def overshoots_rad(self) -> tuple[Float64, Float64]:
@@ -105,11 +105,11 @@ class ReducedModelCheck:
     def rms_difference(self) -> dict[str, float]:
         """Root mean square over the manoeuvre, by quantity; not finite where a model is lost."""
         names = ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad')
-        pairs = ((getattr(self.full, name), getattr(self.reduced, name)) for name in names)
-        return {
-            name: float(np.sqrt(np.mean((full - reduced) ** 2)))
-            for name, (full, reduced) in zip(names, pairs)
-        }
+        full, reduced = (
+            np.column_stack([motion.speeds, motion.heading_rad])
+            for motion in (self.full, self.reduced)
+        )
+        return dict(zip(names, np.sqrt(np.mean((full - reduced) ** 2, axis=0)).tolist()))
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,9 @@ def test_a_loss_is_that_of_two_manoeuvres(steered):
     values[i] *= 1.0 + change
     one, other = (steer(SHIP, ZIGZAG, v, control_s=0.0)[0] for v in (SHIP.values, values))
     length_s = SHIP.length_m / SHIP.speed_m_s
-    squares = ((one.surge_m_s - other.surge_m_s) / SHIP.speed_m_s) ** 2
-    squares += ((one.sway_m_s - other.sway_m_s) / SHIP.speed_m_s) ** 2
-    squares += ((one.yaw_rate_rad_s - other.yaw_rate_rad_s) * length_s) ** 2
+    squares = ((one.speeds[:, 0] - other.speeds[:, 0]) / SHIP.speed_m_s) ** 2
+    squares += ((one.speeds[:, 1] - other.speeds[:, 1]) / SHIP.speed_m_s) ** 2
+    squares += ((one.speeds[:, 2] - other.speeds[:, 2]) * length_s) ** 2
     assert len(squares) == 1200
     assert steered.losses.table[i, 2] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
     assert steered.mean_norms.table[i, 2] == pytest.approx(np.mean(np.sqrt(squares)), rel=1e-12)

@@ -12,7 +12,7 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.manoeuvring.ship import meaning
-from shipdrag_ros.studies.manoeuvring.simulate import ManoeuvreMotion
+from shipdrag_ros.studies.manoeuvring.simulate import Motions
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     CONTROL_S,
@@ -67,7 +67,7 @@ def check_picture(found: SteeringStudy) -> Figure:
     """
     full, kept = found.check.full, found.check.reduced
     by_group = found.group_check.reduced
-    lines: Sequence[tuple[ManoeuvreMotion, str, str, str]] = (
+    lines: Sequence[tuple[Motions, str, str, str]] = (
         (full, 'full', '#444444', '-'),
         (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
         (by_group, f'{found.independent} measurements kept', BLUE, ':'),
@@ -76,11 +76,12 @@ def check_picture(found: SteeringStudy) -> Figure:
         figure = new_figure(9.0, 5.2)
         axes = figure.subplots(2, 2, sharex=True)
         for motion, label, color, style in lines:
+            surge, sway, yaw = motion.speeds.T
             for axis, name, values in (
                 (axes[0, 0], 'heading [deg]', np.degrees(motion.heading_rad)),
-                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(motion.yaw_rate_rad_s)),
-                (axes[1, 0], 'speed ahead u [m/s]', motion.surge_m_s),
-                (axes[1, 1], 'sway v [m/s]', motion.sway_m_s),
+                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(yaw)),
+                (axes[1, 0], 'speed ahead u [m/s]', surge),
+                (axes[1, 1], 'sway v [m/s]', sway),
             ):
                 axis.plot(motion.time_s, values, color=color, linestyle=style, label=label)
                 axis.set_ylabel(name)
