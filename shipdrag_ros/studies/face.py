@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.display import Section
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 
@@ -67,3 +67,10 @@ def show(output: Output, shown: Presentation, report: Path | None) -> None:
     about = {'sentence': shown.sentence, 'source': shown.source, 'foot': shown.foot}
     write_page(report, shown.title, sections, **about)
     output.log(f'report in {report}')
+
+
+def by_columns(columns: Mapping[str, Iterable[str]]) -> Table:
+    """
+    Return a table from the cells of each column, by its head.
+    """
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))

@@ -43,7 +43,7 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_error,
     tangent_range,
 )
-from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.face import Presentation, by_columns, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -284,16 +284,15 @@ def errors(tangent: Tangent, tolerance: float) -> Table:
     """
     Show what the lines err at speeds about V0.
     """
-    rows = tuple(
-        (
-            f'{u:.4f}',
-            f'{u * tangent.speed_m_s:.3f}',
-            f'{100.0 * naive:+.1f}',
-            f'{100.0 * touching:.1f}',
-        )
-        for u, naive, touching in compare_errors(tangent.speed_m_s, tolerance)
+    u, naive, touching = compare_errors(tangent.speed_m_s, tolerance).T
+    return by_columns(
+        {
+            'u = V/V0': (f'{each:.4f}' for each in u),
+            'V [m/s]': (f'{each:.3f}' for each in u * tangent.speed_m_s),
+            'C V: error [%]': (f'{each:+.1f}' for each in 100.0 * naive),
+            'tangent: error [%]': (f'{each:.1f}' for each in 100.0 * touching),
+        }
     )
-    return Table(('u = V/V0', 'V [m/s]', 'C V: error [%]', 'tangent: error [%]'), rows)
 
 
 def notes(cable: Cable) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.table import read_numbers
-from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.surface.face import verb
@@ -222,14 +222,13 @@ def coefficients(found: fit.ResidualFit) -> Table:
     """
     Show the coefficients of the form, by the terms that they stand before.
     """
-    return Table(
-        ('term', 'coefficient', 'sd'),
-        tuple(
-            (term, f'{value:.5g}', f'{sd:.2g}' if np.isfinite(sd) else 'open')
-            for term, value, sd in zip(
-                found.form.terms, found.fit.coefficients, found.coefficient_sd, strict=True
-            )
-        ),
+    deviations = found.coefficient_sd
+    return by_columns(
+        {
+            'term': found.terms,
+            'coefficient': (f'{value:.5g}' for value in found.fit.coefficients),
+            'sd': (f'{sd:.2g}' if np.isfinite(sd) else 'open' for sd in deviations),
+        }
     )
 
 
@@ -237,10 +236,10 @@ def domain(found: fit.ResidualFit) -> Table:
     """
     Show the ranges of the data.
     """
-    return Table(
-        ('', 'from', 'to'),
-        tuple(
-            (name, f'{low:.4g}', f'{high:.4g}')
-            for name, (low, high) in found.domain.ranges.items()
-        ),
+    return by_columns(
+        {
+            '': found.domain.names,
+            'from': (f'{low:.4g}' for low in found.domain.lower),
+            'to': (f'{high:.4g}' for high in found.domain.upper),
+        }
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, one_axis
-from shipdrag_ros.studies.face import Presentation
+from shipdrag_ros.studies.face import Presentation, by_columns
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import WORST, CoastStudy
 
@@ -171,63 +171,44 @@ def loss_table(found: CoastStudy) -> Table:
     """
     Show what each value does, the most important first.
     """
-    names = found.losses.names
     order = [*found.selection.kept, *found.selection.dropped]
-    rows = []
-    for name in order:
-        i = names.index(name)
-        one = found.importance[i]
-        sd = one.particular.sd
-        rows.append(
-            (
-                name,
-                '-' if math.isnan(one.particular.value) else f'{one.particular.value:.4g}',
-                '-' if math.isnan(sd) else f'{sd:.1%}',
-                *(_number(value) for value in found.losses.table[i, :5]),
-                f'{one.estimated:.2%}',
-                f'{one.stated:.2%}',
-                _tolerable(one.tolerable),
-                'yes' if name in found.selection.kept else 'no',
-            )
-        )
-    heads = (
-        '',
-        'value',
-        'sd',
-        '+10 %',
-        '-10 %',
-        '+50 %',
-        '-50 %',
-        '+1 sd',
-        'estimated r',
-        'stated r',
-        'know within',
-        'kept',
+    places = [found.losses.names.index(name) for name in order]
+    changed = found.losses.table[places]
+    ranked = [found.importance[place] for place in places]
+    stated = [one.particular for one in ranked]
+    heads = ('+10 %', '-10 %', '+50 %', '-50 %', '+1 sd')
+    return by_columns(
+        {
+            '': order,
+            'value': ('-' if math.isnan(one.value) else f'{one.value:.4g}' for one in stated),
+            'sd': ('-' if math.isnan(one.sd) else f'{one.sd:.1%}' for one in stated),
+            **{head: map(_number, column) for head, column in zip(heads, changed.T)},
+            'estimated r': (f'{one.estimated:.2%}' for one in ranked),
+            'stated r': (f'{one.stated:.2%}' for one in ranked),
+            'know within': (_tolerable(one.tolerable) for one in ranked),
+            'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
+        }
     )
-    return Table(heads, tuple(rows))
 
 
 def mimic_table(found: CoastStudy) -> Table:
     """
     Show which wrong value looks like which effect.
     """
-    rows = []
-    for mimic in found.mimics:
-        quantity = mimic.effect.parameters[0]
-        # at the limit the value would have to be wrong by more than is thought of
-        bound = 'at least ' if abs(mimic.error) >= WORST else ''
-        rows.append(
-            (
-                mimic.effect.name,
-                f'{mimic.size:.3g} {quantity.unit}'.rstrip(),
-                f'{mimic.distance:.2f}',
-                mimic.particular.key,
-                f'{bound}{mimic.error:+.0%}',
-                f'{mimic.left:.1%}',
-            )
-        )
-    heads = ('effect', 'size', 'distance [sd]', 'looks like', 'wrong by', 'left')
-    return Table(heads, tuple(rows))
+    mimics = found.mimics
+    units = [mimic.effect.parameters[0].unit for mimic in mimics]
+    # at the limit the value would have to be wrong by more than is thought of
+    bounds = ['at least ' if abs(mimic.error) >= WORST else '' for mimic in mimics]
+    return by_columns(
+        {
+            'effect': (mimic.effect.name for mimic in mimics),
+            'size': (f'{one.size:.3g} {unit}'.rstrip() for one, unit in zip(mimics, units)),
+            'distance [sd]': (f'{mimic.distance:.2f}' for mimic in mimics),
+            'looks like': (mimic.particular.key for mimic in mimics),
+            'wrong by': (f'{bound}{one.error:+.0%}' for one, bound in zip(mimics, bounds)),
+            'left': (f'{mimic.left:.1%}' for mimic in mimics),
+        }
+    )
 
 
 def _number(value: float) -> str:

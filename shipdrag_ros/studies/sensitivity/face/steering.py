@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
-from shipdrag_ros.studies.face import Presentation
+from shipdrag_ros.studies.face import Presentation, by_columns
 from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.manoeuvring.simulate import Motions
 from shipdrag_ros.studies.sensitivity.steering import (
@@ -230,21 +230,21 @@ def loss_table(found: SteeringStudy) -> Table:
     """
     Show the losses, the most important derivative first.
     """
-    names = found.losses.names
-    rows = []
-    for name in found.losses.ranking:
-        i = names.index(name)
-        values = (*found.losses.table[i], found.losses.mean[i], found.mean_norms.mean[i])
-        rows.append(
-            (
-                name,
-                *(f'{1e3 * value:.3f}' for value in values),
-                'yes' if name in found.selection.kept else 'no',
-                found.ship.multiples.get(name, '-'),
-            )
-        )
-    heads = ('', '+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm', 'kept', 'multiple of')
-    return Table(heads, tuple(rows))
+    order = found.losses.ranking
+    table = np.column_stack([found.losses.table, found.losses.mean, found.mean_norms.mean])
+    ranked = table[[found.losses.names.index(name) for name in order]]
+    heads = ('+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm')
+    return by_columns(
+        {
+            '': order,
+            **{
+                head: [f'{1e3 * value:.3f}' for value in column]
+                for head, column in zip(heads, ranked.T)
+            },
+            'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
+            'multiple of': (found.ship.multiples.get(name, '-') for name in order),
+        }
+    )
 
 
 def check_table(found: SteeringStudy) -> Table:
@@ -295,33 +295,24 @@ def design_table(shown: Experiment) -> Table:
     """
     Show which manoeuvre makes which derivative visible.
     """
-    rows = []
-    for i, name in enumerate(shown.names):
-        best = int(np.argmax(shown.loss[i]))
-        rows.append(
-            (
-                name,
-                *(f'{1e3 * value:.2f}' for value in shown.loss[i]),
-                shown.best[i].name,
-                f'{shown.partial_contribution[i, best]:.1%}',
-                f'{shown.partial_contribution_together[i]:.1%}',
-            )
-        )
-    heads = (
-        '',
-        *(manoeuvre.name for manoeuvre in shown.manoeuvres),
-        'shown most by',
-        'partial contribution there',
-        'in all together',
+    there = shown.partial_contribution[np.arange(len(shown.names)), np.argmax(shown.loss, axis=1)]
+    return by_columns(
+        {
+            '': shown.names,
+            **{
+                manoeuvre.name: [f'{1e3 * value:.2f}' for value in column]
+                for manoeuvre, column in zip(shown.manoeuvres, shown.loss.T)
+            },
+            'shown most by': (manoeuvre.name for manoeuvre in shown.best),
+            'partial contribution there': (f'{value:.1%}' for value in there),
+            'in all together': (f'{value:.1%}' for value in shown.partial_contribution_together),
+        }
     )
-    return Table(heads, tuple(rows))
 
 
 def meaning_table(found: SteeringStudy) -> Table:
     """
     Show what each derivative is, the most important first.
     """
-    return Table(
-        ('derivative', 'what it is'),
-        tuple((name, meaning(name)) for name in found.losses.ranking),
-    )
+    order = found.losses.ranking
+    return by_columns({'derivative': order, 'what it is': map(meaning, order)})
