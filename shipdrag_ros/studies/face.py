@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,7 +31,7 @@ class Presentation:
     sections
         With their headings, without pictures.
     pictures
-        Draws the figures of sections, by heading, each with its caption; called for a page alone.
+        Heading of the section, figure and caption of each; drawn one by one, for a page alone.
     source, foot
         Of the page: where the data come from, and the formulas.
     """
@@ -39,7 +39,7 @@ class Presentation:
     title: str
     sentence: str
     sections: Sequence[Section]
-    pictures: Callable[[], Mapping[str, Sequence[tuple[Figure, str]]]]
+    pictures: Iterator[tuple[str, Figure, str]]
     source: str = ''
     foot: str = ''
 
@@ -59,9 +59,9 @@ def show(output: Output, shown: Presentation, report: Path | None) -> None:
             output.say(f'- {line}')
     if report is None:
         return
-    drawn = shown.pictures()
+    drawn = [(heading, picture(figure, caption)) for heading, figure, caption in shown.pictures]
     sections = [
-        replace(part, pictures=[picture(*each) for each in drawn.get(part.heading, ())])
+        replace(part, pictures=[each for heading, each in drawn if heading == part.heading])
         for part in shown.sections
     ]
     about = {'sentence': shown.sentence, 'source': shown.source, 'foot': shown.foot}

@@ -35,6 +35,7 @@ from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Se
 
 WORST = 0.5  # relative error beyond which no value is thought to be wrong
 _SPEED_STEP = 1e-3
+_NOTHING = 1e-6  # sd by which an effect moves nothing
 
 
 @dataclass(frozen=True)
@@ -93,55 +94,33 @@ def mimics(
     sizes = [_usual_values(effect, ship) for effect in effects]
     actions = [effect.action(frame, *size) for effect, size in zip(effects, sizes)]
     moved = coast.read(ship, [Action(), *actions])
-    free = _Free.of(ship, coast, moved[0])
-    values = free.without(slopes)
+    axes = _never_known(ship, coast, moved[0])
+    values = slopes - (slopes @ axes) @ axes.T
+    squares = np.einsum('pm,pm->p', values, values)
+    seen = np.flatnonzero(np.isfinite(squares) & (squares > 0.0))
+    traces = _flat(moved[1:] - moved[0])
     found = []
-    for effect, size, trace in zip(effects, sizes, free.without(_flat(moved[1:] - moved[0]))):
+    for effect, size, trace in zip(effects, sizes, traces - (traces @ axes) @ axes.T):
         distance = float(np.linalg.norm(trace))
-        if not (math.isfinite(distance) and distance > 1e-6 * math.sqrt(len(trace))):
+        rms = distance / math.sqrt(len(coast.time_s))
+        if not len(seen) or not (math.isfinite(rms) and rms > _NOTHING):
             continue
-        best = _nearest(trace, listed, values)
-        if best is not None:
-            one, error, left = best
-            rms = distance / math.sqrt(len(coast.time_s))
-            found.append(Mimic(effect, size[0], rms, one, error, left))
+        errors = np.clip(values[seen] @ trace / squares[seen], -WORST, WORST)
+        left = np.linalg.norm(trace - errors[:, None] * values[seen], axis=1) / distance
+        best = int(np.argmin(left))
+        likest, error = listed[seen[best]], float(errors[best])
+        found.append(Mimic(effect, size[0], rms, likest, error, float(left[best])))
     return tuple(sorted(found, key=lambda mimic: mimic.left))
 
 
-def _nearest(
-    trace: Float64, listed: Sequence[Particular], values: Float64
-) -> tuple[Particular, float, float] | None:
-    """Return a value, its error, and the part of the trace that this leaves."""
-    best = None
-    for one, value in zip(listed, values):
-        square = float(value @ value)
-        if not (math.isfinite(square) and square > 0.0):
-            continue
-        error = min(max(float(trace @ value) / square, -WORST), WORST)
-        left = float(np.linalg.norm(trace - error * value) / np.linalg.norm(trace))
-        if best is None or left < best[2]:
-            best = one, error, left
-    return best
-
-
-@dataclass(frozen=True)
-class _Free:
-    """What is never known beforehand: speed and place at the start."""
-
-    axes: Float64
-
-    @classmethod
-    def of(cls, ship: Ship, coast: Coast, reading: Float64) -> _Free:
-        speed = coast.scenario.speed_m_s * (1.0 - _SPEED_STEP)
-        slower = coast.read(ship, [Action()], speed_m_s=speed)[0]
-        rows = np.zeros((3, *reading.shape))
-        rows[0] = slower - reading
-        rows[1, :, 1] = rows[2, :, 2] = 1.0
-        return cls(np.asarray(np.linalg.qr(_flat(rows).T)[0], np.float64))
-
-    def without(self, traces: Float64) -> Float64:
-        """Return what of traces (k, m) is not of this kind."""
-        return traces - (traces @ self.axes) @ self.axes.T
+def _never_known(ship: Ship, coast: Coast, reading: Float64) -> Float64:
+    """Return axes of what is never known beforehand: speed and place at the start."""
+    speed = coast.scenario.speed_m_s * (1.0 - _SPEED_STEP)
+    slower = coast.read(ship, [Action()], speed_m_s=speed)[0]
+    rows = np.zeros((3, *reading.shape))
+    rows[0] = slower - reading
+    rows[1, :, 1] = rows[2, :, 2] = 1.0
+    return np.asarray(np.linalg.qr(_flat(rows).T)[0], np.float64)
 
 
 def _flat(readings: Float64) -> Float64:

@@ -32,7 +32,6 @@ from shipdrag_ros.studies.sensitivity.loss import (
     Selection,
     Simulator,
     partial_contribution,
-    relative,
     vary,
 )
 
@@ -253,7 +252,7 @@ def respond(
     Change each derivative by fractions of it; `control_s` as in `simulator`.
     """
     simulate = simulator(ship, manoeuvre, control_s=control_s)
-    return vary(simulate, FORM, ship.values, relative(FORM, ship.values, changes))
+    return vary(simulate, FORM, ship.values, np.multiply.outer(ship.values, changes))
 
 
 def respond_by_groups(
@@ -267,12 +266,11 @@ def respond_by_groups(
     simulate = simulator(ship, manoeuvre)
     names = [group[0] for group in ship.groups]
     place = np.array([names.index(ship.multiples.get(name, name)) for name in FORM])
-    factors = np.ones(len(names))
 
     def simulate_groups(sets: Float64) -> Float64:
         return simulate(ship.values * sets[:, place])
 
-    return vary(simulate_groups, names, factors, relative(names, factors, changes))
+    return vary(simulate_groups, names, np.ones(len(names)), np.tile(changes, (len(names), 1)))
 
 
 def check(

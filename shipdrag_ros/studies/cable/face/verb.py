@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -200,16 +200,14 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
         Relative error that a line may have.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         lines = (
             'The drag and two lines in place of it, and by how much these err; shaded: where the '
             f'tangent errs by {100.0 * tolerance:.3g} % at most.'
         )
+        yield _LINES, tangent_picture(tangent, tolerance), lines
         measured = 'Drag coefficient of cylinders along the flow, where it was measured.'
-        return {
-            _LINES: [(tangent_picture(tangent, tolerance), lines)],
-            _COEFFICIENT: [(coefficient_picture(cable), measured)],
-        }
+        yield _COEFFICIENT, coefficient_picture(cable), measured
 
     tables = (
         ('Figures of the cable', facts(cable, tangent, tolerance)),
@@ -225,7 +223,7 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
             Section('Before it is used', lines=(*notes(cable), on_a_ship)),
             Section(_COEFFICIENT),
         ],
-        pictures,
+        pictures(),
         foot=_FORMULAS,
     )
 

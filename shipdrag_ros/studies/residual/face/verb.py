@@ -29,7 +29,7 @@ DATA.csv
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -133,14 +133,12 @@ def shown(
         What was measured, and where the data come from.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
-        drawn = [
-            (
-                verb.residual_picture(values - found.fit.residuals, values, target),
-                'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
-                'the line everywhere; a bow or a slope shows a term that the form lacks.',
-            )
-        ]
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
+        left = (
+            'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
+            'the line everywhere; a bow or a slope shows a term that the form lacks.'
+        )
+        yield _FIT, verb.residual_picture(values - found.fit.residuals, values, target), left
         error, _, leverage = fit.leave_hulls_out(found.form, found.hulls, values)
         if np.any(np.isfinite(error)):
             caption = (
@@ -148,8 +146,7 @@ def shown(
                 'right of 1 a hull is more unusual (leverage) than any of the others: there the '
                 'form goes beyond its data, and its predictions are marked as not to be used.'
             )
-            drawn.append((verb.left_out_picture(error, leverage, target), caption))
-        return {_FIT: drawn}
+            yield _FIT, verb.left_out_picture(error, leverage, target), caption
 
     asked = [('Predictions', verb.predictions_table(predictions))] if predictions else []
     tables = (
@@ -167,7 +164,7 @@ def shown(
             ),
             Section(_FIT, tables=tables),
         ],
-        pictures,
+        pictures(),
         source=source,
     )
 

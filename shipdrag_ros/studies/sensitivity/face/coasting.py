@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,20 +88,18 @@ def shown(found: CoastStudy) -> Presentation:
     Return what is printed, and shown on a page.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         known = (
             'How far the record moves when a value of the ship file is wrong by 10 per cent, and '
             'by its stated standard deviation. The longest bars are to be measured well.'
         )
+        yield _KNOWN, particulars_picture(found), known
         mistaken = (
             'What is left of each effect when the value beside its bar is blamed for it. A short '
             'bar: a ship file that is so far wrong is taken for the effect, and no record '
             'separates the two; a long bar: the effect looks like nothing else.'
         )
-        return {
-            _KNOWN: [(particulars_picture(found), known)],
-            _MISTAKEN: [(mimic_picture(found), mistaken)],
-        }
+        yield _MISTAKEN, mimic_picture(found), mistaken
 
     return Presentation(
         'Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
@@ -111,7 +109,7 @@ def shown(found: CoastStudy) -> Presentation:
             Section(_KNOWN, tables=((LOSSES, loss_table(found)),)),
             Section(_MISTAKEN, tables=((MIMICS, mimic_table(found)),)),
         ],
-        pictures,
+        pictures(),
         source=found.ship.summary(),
     )
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -152,24 +152,22 @@ def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
         Of several manoeuvres.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         ranking = (
             'How much the motion changes when a derivative is wrong: the longer the bar, the '
             'better it must be known. Pale bars, short of the line, may be left out of the model.'
         )
+        yield _RANKING, ranking_picture(found), ranking
         checked = (
             f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
             'on each other show that what was left out is not missed.'
         )
+        yield _CHECKED, check_picture(found), checked
         design = (
             'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better it '
             'is seen. Dot: the manoeuvre that shows it best.'
         )
-        return {
-            _RANKING: [(ranking_picture(found), ranking)],
-            _CHECKED: [(check_picture(found), checked)],
-            _SAILED: [(design_picture(sailed), design)],
-        }
+        yield _SAILED, design_picture(sailed), design
 
     return Presentation(
         f'Which derivatives matter: {found.ship.name}',
@@ -181,7 +179,7 @@ def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
             Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
             Section('What the names mean', tables=((MEANINGS, meaning_table(found)),)),
         ],
-        pictures,
+        pictures(),
         source=found.ship.source,
     )
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 import keyword
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -233,23 +233,17 @@ def shown(
         What was measured, and where the data come from.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
-        drawn = [
-            (
-                degree_picture(surface),
-                'Residual standard deviation against the degree; the lowest degree on the plateau '
-                'is chosen.',
-            ),
-            (
-                residual_picture(surface.polynomial(points), values, target),
-                'What the surface leaves of the data.',
-            ),
-        ]
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
+        degrees = (
+            'Residual standard deviation against the degree; the lowest degree on the plateau '
+            'is chosen.'
+        )
+        yield _FIT, degree_picture(surface), degrees
+        rest = residual_picture(surface.polynomial(points), values, target)
+        yield _FIT, rest, 'What the surface leaves of the data.'
         if len(surface.inputs) == 2:
-            drawn.append(
-                (contour_picture(surface, points, target), 'The surface; dots are the data.')
-            )
-        return {_FIT: drawn}
+            drawn = contour_picture(surface, points, target)
+            yield _FIT, drawn, 'The surface; dots are the data.'
 
     asked = [('Predictions', predictions_table(predictions))] if predictions else []
     tables = (
@@ -262,7 +256,7 @@ def shown(
         f'Surface of {target} over {", ".join(surface.inputs)}',
         surface.summary(target)[0],
         [Section(notes, lines=surface.notes), Section(_FIT, tables=tables)],
-        pictures,
+        pictures(),
         source=source,
     )
 
