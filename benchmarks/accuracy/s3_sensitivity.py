@@ -46,8 +46,12 @@ from shipdrag_ros.studies.manoeuvring.simulate import (
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.sensitivity.coast import coast_from, particulars
-from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.coasting import (
+    CoastStudy,
+    coast_from,
+    particulars,
+    study_coast,
+)
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm

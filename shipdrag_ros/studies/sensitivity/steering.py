@@ -30,7 +30,6 @@ from shipdrag_ros.studies.sensitivity.loss import (
     Norm,
     Responses,
     Selection,
-    Simulator,
     partial_contribution,
     vary,
 )
@@ -127,12 +126,11 @@ class SteeringStudy:
         By the root mean square.
     check
         Of the derivatives that are kept.
-    groups
-        Losses where derivatives that are one measurement change together.
-    group_selection
-        As many measurements as the kept derivatives hold.
+    group_derivatives
+        Those of as many measurements as the kept ones hold, chosen where derivatives that are
+        one measurement change together.
     group_check
-        Of all derivatives of these measurements.
+        Of these.
     """
 
     ship: SteeredShip
@@ -141,8 +139,7 @@ class SteeringStudy:
     mean_norms: Losses
     selection: Selection
     check: ReducedModelCheck
-    groups: Losses
-    group_selection: Selection
+    group_derivatives: tuple[str, ...]
     group_check: ReducedModelCheck
 
     def to_dict(self) -> dict[str, Any]:
@@ -169,11 +166,6 @@ class SteeringStudy:
     def independent(self) -> int:
         """How many measurements the kept derivatives hold."""
         return _independent(self.ship, self.selection.kept)
-
-    @property
-    def group_derivatives(self) -> tuple[str, ...]:
-        """All derivatives of the kept measurements."""
-        return _of_groups(self.ship, self.group_selection.kept)
 
     @property
     def norms_agree(self) -> bool:
@@ -222,55 +214,36 @@ class Experiment:
         return tuple(self.manoeuvres[i] for i in np.argmax(self.loss, axis=1))
 
 
-def simulator(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0) -> Simulator:
+def respond(
+    ship: SteeredShip,
+    manoeuvre: Manoeuvre,
+    *,
+    together: bool = False,
+    changes: Sequence[float] = CHANGES,
+    control_s: float = 0.0,
+) -> Responses:
     """
-    Return motions (k, n, 3) of a manoeuvre as a function of the derivatives.
+    Change each derivative by fractions of it; u, v and r are pure numbers.
 
     Parameters
     ----------
+    together
+        Whether derivatives that are one measurement change together, under the name of the first.
     control_s
         As in `steer`. A helmsman who looks now and then reverses a whole look
         earlier or later after the smallest change, which hides it; hence he
         reverses at the very moment by default.
     """
+    groups = ship.groups if together else tuple((name,) for name in FORM)
+    place = [next(i for i, group in enumerate(groups) if name in group) for name in FORM]
     scale = np.array([1.0, 1.0, 1.0 / ship.length_m]) * ship.speed_m_s
 
-    def simulate(derivatives: Float64) -> Float64:
+    def simulate(factors: Float64) -> Float64:
+        derivatives = ship.values * factors[:, place]
         return steer(ship, manoeuvre, derivatives, control_s=control_s).speeds / scale
 
-    return simulate
-
-
-def respond(
-    ship: SteeredShip,
-    manoeuvre: Manoeuvre,
-    *,
-    changes: Sequence[float] = CHANGES,
-    control_s: float = 0.0,
-) -> Responses:
-    """
-    Change each derivative by fractions of it; `control_s` as in `simulator`.
-    """
-    simulate = simulator(ship, manoeuvre, control_s=control_s)
-    return vary(simulate, FORM, ship.values, np.multiply.outer(ship.values, changes))
-
-
-def respond_by_groups(
-    ship: SteeredShip, manoeuvre: Manoeuvre, *, changes: Sequence[float] = CHANGES
-) -> Responses:
-    """
-    Change derivatives that are one measurement together.
-
-    Each group has the name of its first.
-    """
-    simulate = simulator(ship, manoeuvre)
-    names = [group[0] for group in ship.groups]
-    place = np.array([names.index(ship.multiples.get(name, name)) for name in FORM])
-
-    def simulate_groups(sets: Float64) -> Float64:
-        return simulate(ship.values * sets[:, place])
-
-    return vary(simulate_groups, names, np.ones(len(names)), np.tile(changes, (len(names), 1)))
+    names = [group[0] for group in groups]
+    return vary(simulate, names, np.ones(len(names)), np.tile(changes, (len(names), 1)))
 
 
 def check(
@@ -308,8 +281,9 @@ def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStud
     responses = respond(ship, manoeuvre)
     losses = responses.losses()
     selection = losses.select(keep)
-    groups = respond_by_groups(ship, manoeuvre).losses()
-    group_selection = groups.select(_independent(ship, selection.kept))
+    measured = respond(ship, manoeuvre, together=True).losses()
+    firsts = measured.select(_independent(ship, selection.kept)).kept
+    derivatives = tuple(name for group in ship.groups if group[0] in firsts for name in group)
     return SteeringStudy(
         ship=ship,
         manoeuvre=manoeuvre,
@@ -317,9 +291,8 @@ def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStud
         mean_norms=responses.losses(Norm.MEAN_NORM),
         selection=selection,
         check=check(ship, selection.kept),
-        groups=groups,
-        group_selection=group_selection,
-        group_check=check(ship, _of_groups(ship, group_selection.kept)),
+        group_derivatives=derivatives,
+        group_check=check(ship, derivatives),
     )
 
 
@@ -341,7 +314,3 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
 
 def _independent(ship: SteeredShip, kept: Sequence[str]) -> int:
     return len({ship.multiples.get(name, name) for name in kept})
-
-
-def _of_groups(ship: SteeredShip, kept: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for group in ship.groups if group[0] in kept for name in group)

@@ -13,8 +13,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
+from shipdrag_ros.studies.sensitivity.coasting import WORST, coast_from, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as words
 from tests.runs import CARGO
 from tests.runs import CARGO as SHIP

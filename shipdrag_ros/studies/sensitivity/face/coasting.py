@@ -12,8 +12,7 @@ import numpy as np
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, one_axis
 from shipdrag_ros.studies.face import Presentation, by_columns
-from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
-from shipdrag_ros.studies.sensitivity.coasting import WORST, CoastStudy
+from shipdrag_ros.studies.sensitivity.coasting import LOG_SD_M_S, POSITION_SD_M, WORST, CoastStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
