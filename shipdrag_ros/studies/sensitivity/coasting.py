@@ -311,28 +311,30 @@ _NOTHING = 1e-6  # sd by which an effect moves nothing
 @dataclass(frozen=True)
 class Mimic:
     """
-    The wrong value that looks most like an effect.
+    The wrong value that looks most like an effect, as JSON has it.
 
     Attributes
     ----------
     effect
+        Its name.
     size
         Value of its first parameter.
-    distance
+    distance_sd
         How far it moves the record, root mean square in standard deviations,
         beyond what an unknown speed and place at the start do.
-    particular
-    error
+    value
+        Key of the ship file.
+    wrong_by
         Relative error of the value, within `WORST`, that comes nearest to it.
     left
         Part of the distance that this leaves: 0, no record separates the two.
     """
 
-    effect: Effect
+    effect: str
     size: float
-    distance: float
-    particular: Particular
-    error: float
+    distance_sd: float
+    value: str
+    wrong_by: float
     left: float
 
 
@@ -378,8 +380,8 @@ def mimics(
         errors = np.clip(values[seen] @ trace / squares[seen], -WORST, WORST)
         left = np.linalg.norm(trace - errors[:, None] * values[seen], axis=1) / distance
         best = int(np.argmin(left))
-        likest, error = listed[seen[best]], float(errors[best])
-        found.append(Mimic(effect, size[0], rms, likest, error, float(left[best])))
+        key, error = listed[seen[best]].key, float(errors[best])
+        found.append(Mimic(effect.name, size[0], rms, key, error, float(left[best])))
     return tuple(sorted(found, key=lambda mimic: mimic.left))
 
 
@@ -520,17 +522,7 @@ class CoastStudy:
                 }
                 for one in self.importance
             },
-            'mimics': [
-                {
-                    'effect': mimic.effect.name,
-                    'size': mimic.size,
-                    'distance_sd': mimic.distance,
-                    'value': mimic.particular.key,
-                    'wrong_by': mimic.error,
-                    'left': mimic.left,
-                }
-                for mimic in self.mimics
-            ],
+            'mimics': [asdict(mimic) for mimic in self.mimics],
         }
 
     @property

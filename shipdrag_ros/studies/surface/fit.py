@@ -250,14 +250,12 @@ class Domain:
     @cached_property
     def lower(self) -> Float64:
         """(d,) Least value of each variable."""
-        least: Float64 = self.points.min(axis=0)
-        return least
+        return np.asarray(self.points.min(axis=0))
 
     @cached_property
     def upper(self) -> Float64:
         """(d,) Largest value of each variable."""
-        largest: Float64 = self.points.max(axis=0)
-        return largest
+        return np.asarray(self.points.max(axis=0))
 
     @property
     def ranges(self) -> dict[str, list[float]]:
@@ -388,8 +386,7 @@ class Surface:
     def sd(self) -> Float64:
         """(terms,) Standard deviations of `coefficients`."""
         spread = np.einsum('ij,jk,ik->i', self._raw, self.fit.covariance, self._raw)
-        deviations: Float64 = np.sqrt(spread)
-        return deviations
+        return np.asarray(np.sqrt(spread))
 
     @cached_property
     def _raw(self) -> Float64:

@@ -161,8 +161,8 @@ def test_bars_of_values_and_of_effects(coasted):
     wide = {bar.get_y(): bar.get_width() for bar in axis.containers[0]}
     assert wide[max(wide)] == max(wide.values())
     axis = coasting.mimic_picture(coasted).axes[0]
-    assert names(axis.get_yticklabels()) == [mimic.effect.name for mimic in coasted.mimics]
-    assert axis.texts[0].get_text().startswith(coasted.mimics[0].particular.key)
+    assert names(axis.get_yticklabels()) == [mimic.effect for mimic in coasted.mimics]
+    assert axis.texts[0].get_text().startswith(coasted.mimics[0].value)
 
 
 def test_words_hold_the_figures(steered):

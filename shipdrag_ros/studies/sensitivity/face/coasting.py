@@ -11,6 +11,7 @@ import numpy as np
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, one_axis
+from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.studies.face import Presentation, by_columns
 from shipdrag_ros.studies.sensitivity.coasting import LOG_SD_M_S, POSITION_SD_M, WORST, CoastStudy
 
@@ -57,9 +58,9 @@ def mimic_picture(found: CoastStudy) -> Figure:
         left = [mimic.left for mimic in found.mimics]
         axis.barh(places, left, color=BLUE, height=0.65)
         for place, mimic in zip(places, found.mimics):
-            text = f'{mimic.particular.key} {mimic.error:+.0%}'
+            text = f'{mimic.value} {mimic.wrong_by:+.0%}'
             axis.text(mimic.left + 0.01, place, text, va='center', fontsize=7)
-        axis.set_yticks(places, [mimic.effect.name for mimic in found.mimics])
+        axis.set_yticks(places, [mimic.effect for mimic in found.mimics])
         axis.set_xlim(0.0, 1.5)
         axis.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])
         axis.set_xlabel('part of the effect that is left [1]')
@@ -131,9 +132,7 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
     """
     scenario, check = found.coast.scenario, found.check
     near = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
-    alike = '; '.join(
-        f'{mimic.effect.name} like {mimic.particular.key} {mimic.error:+.0%}' for mimic in near
-    )
+    alike = '; '.join(f'{mimic.effect} like {mimic.value} {mimic.wrong_by:+.0%}' for mimic in near)
     said = [
         f'A coastdown of {scenario.duration_s:.0f} s from {scenario.speed_m_s:.2f} m/s, one '
         f'value changed at a time; noise of a sample: log {LOG_SD_M_S:g} m/s, position '
@@ -193,16 +192,17 @@ def mimic_table(found: CoastStudy) -> Table:
     Show which wrong value looks like which effect.
     """
     mimics = found.mimics
-    units = [mimic.effect.parameters[0].unit for mimic in mimics]
+    library = effects_of(found.ship)
+    units = [library[mimic.effect].parameters[0].unit for mimic in mimics]
     # at the limit the value would have to be wrong by more than is thought of
-    bounds = ['at least ' if abs(mimic.error) >= WORST else '' for mimic in mimics]
+    bounds = ['at least ' if abs(mimic.wrong_by) >= WORST else '' for mimic in mimics]
     return by_columns(
         {
-            'effect': (mimic.effect.name for mimic in mimics),
+            'effect': (mimic.effect for mimic in mimics),
             'size': (f'{one.size:.3g} {unit}'.rstrip() for one, unit in zip(mimics, units)),
-            'distance [sd]': (f'{mimic.distance:.2f}' for mimic in mimics),
-            'looks like': (mimic.particular.key for mimic in mimics),
-            'wrong by': (f'{bound}{one.error:+.0%}' for one, bound in zip(mimics, bounds)),
+            'distance [sd]': (f'{mimic.distance_sd:.2f}' for mimic in mimics),
+            'looks like': (mimic.value for mimic in mimics),
+            'wrong by': (f'{bound}{one.wrong_by:+.0%}' for one, bound in zip(mimics, bounds)),
             'left': (f'{mimic.left:.1%}' for mimic in mimics),
         }
     )
