@@ -64,11 +64,12 @@ def _evaluate(points: Float64, steps: Powers, coefficients: Float64) -> Float64:
     # so many points at a time as stay in the fastest memory
     for first in range(0, count, _BLOCK):
         size = min(_BLOCK, count - first)
+        z, here = points[:, first : first + size], result[first : first + size]
         for t in range(1, len(coefficients)):
-            before, by = steps[t]
+            before, by, c = steps[t, 0], steps[t, 1], coefficients[t]
             for i in range(size):
-                value[t, i] = value[before, i] * points[by, first + i]
-                result[first + i] += coefficients[t] * value[t, i]
+                value[t, i] = value[before, i] * z[by, i]
+                here[i] += c * value[t, i]
     return result
 
 
