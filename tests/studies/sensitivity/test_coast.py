@@ -12,7 +12,12 @@ from shipdrag_ros.errors import SensitivityError, ShipdragError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import ConstantAddedMass, Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import Action, simulate
-from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, coast_from, parse_coast, particulars
+from shipdrag_ros.studies.sensitivity.coasting import (
+    LOG_SD_M_S,
+    coast_from,
+    parse_coast,
+    particulars,
+)
 from tests.runs import CARGO
 
 

@@ -13,8 +13,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
+from shipdrag_ros.studies.sensitivity.coasting import WORST, coast_from, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as words
 from tests.runs import CARGO
 from tests.runs import CARGO as SHIP
@@ -76,17 +75,17 @@ def test_the_check_is_a_slower_run_with_all_that_was_dropped_wrong(coasted):
 
 
 def test_wrong_values_look_like_effects_of_the_hull_not_of_the_instruments(coasted):
-    alike = {mimic.effect.name: mimic for mimic in coasted.mimics}
+    alike = {mimic.effect: mimic for mimic in coasted.mimics}
     for name in ('fouling', 'displacement', 'added_mass', 'towed_cable', 'shallow_water'):
         assert alike[name].left < 0.05
     # 12 % more mass and 10.7 % less resistance are the same but for air and thrust
-    assert alike['displacement'].error == pytest.approx(1.0 / 1.12 - 1.0, abs=0.03)
+    assert alike['displacement'].wrong_by == pytest.approx(1.0 / 1.12 - 1.0, abs=0.03)
     for name in ('log_scale', 'log_offset', 'current_change'):
         assert alike[name].left > 0.9
     lefts = [mimic.left for mimic in coasted.mimics]
     assert lefts == sorted(lefts)
     assert all(
-        0.0 <= left <= 1.0 and abs(m.error) <= 0.5 for left, m in zip(lefts, coasted.mimics)
+        0.0 <= left <= 1.0 and abs(m.wrong_by) <= 0.5 for left, m in zip(lefts, coasted.mimics)
     )
 
 
@@ -95,8 +94,8 @@ def test_an_effect_that_is_stated_is_a_value_and_no_longer_missing():
     ship = replace(CARGO, effects=(stated,))
     coasted = study_coast(ship, coast_from(ship))
     assert 'effects.fouling.friction_factor' in coasted.losses.names
-    assert 'fouling' not in {mimic.effect.name for mimic in coasted.mimics}
-    assert {mimic.effect.name for mimic in coasted.mimics} < set(LIBRARY)
+    assert 'fouling' not in {mimic.effect for mimic in coasted.mimics}
+    assert {mimic.effect for mimic in coasted.mimics} < set(LIBRARY)
 
 
 def test_too_large_a_change_is_left_out_and_so_is_its_share_of_all_means():
@@ -116,7 +115,7 @@ def test_a_table_of_resistance_and_a_ship_without_sd():
 
 
 def mimics_of(ship: Ship):
-    return {mimic.effect.name: mimic for mimic in study_coast(ship, coast_from(ship)).mimics}
+    return {mimic.effect: mimic for mimic in study_coast(ship, coast_from(ship)).mimics}
 
 
 def test_more_friction_is_fouling_where_nothing_else_is_viscous():
@@ -126,17 +125,17 @@ def test_more_friction_is_fouling_where_nothing_else_is_viscous():
     signs = {'baseline.C_V': 1.0, 'wetted_surface_m2': 1.0, 'displaced_volume_m3': -1.0}
     assert fouling.size == 0.25
     # linear about 0, where 25 per cent is large
-    assert signs[fouling.particular.key] * fouling.error == pytest.approx(0.21, abs=0.05)
+    assert signs[fouling.value] * fouling.wrong_by == pytest.approx(0.21, abs=0.05)
     assert fouling.left < 0.02
 
 
 def test_a_speed_that_is_not_known_explains_nothing_twice_and_errors_stay_in_what_may_be(coasted):
     # a log that is off and a place that is off leave what the rest of the record shows
-    found = {mimic.effect.name: mimic for mimic in coasted.mimics}
-    assert found['log_offset'].distance > 1.0
+    found = {mimic.effect: mimic for mimic in coasted.mimics}
+    assert found['log_offset'].distance_sd > 1.0
     assert found['log_offset'].left > 0.9
-    assert max(abs(mimic.error) for mimic in found.values()) == WORST
-    assert abs(found['locked_propeller'].error) == WORST
+    assert max(abs(mimic.wrong_by) for mimic in found.values()) == WORST
+    assert abs(found['locked_propeller'].wrong_by) == WORST
 
 
 def test_effects_that_cannot_act_or_move_nothing_are_left_out():
@@ -146,7 +145,7 @@ def test_effects_that_cannot_act_or_move_nothing_are_left_out():
     assert 'log_dead_band' in LIBRARY
     assert 'log_dead_band' not in found
     for mimic in found.values():
-        assert np.isfinite([mimic.distance, mimic.error, mimic.left]).all()
+        assert np.isfinite([mimic.distance_sd, mimic.wrong_by, mimic.left]).all()
 
 
 @pytest.fixture(scope='module')
@@ -178,7 +177,7 @@ def test_a_row_a_value_with_dashes_where_nothing_is_known(found):
 
 def test_a_row_an_effect(found):
     table = words.mimic_table(found)
-    assert [row[0] for row in table.rows] == [mimic.effect.name for mimic in found.mimics]
+    assert [row[0] for row in table.rows] == [mimic.effect for mimic in found.mimics]
     row = next(row for row in table.rows if row[0] == 'locked_propeller')
     assert row[4] == 'at least -50%'
     assert next(row for row in table.rows if row[0] == 'current')[1] == '0.4 m/s'
