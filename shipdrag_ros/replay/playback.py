@@ -109,7 +109,7 @@ class ReplayResult:
     @property
     def whole_glides(self) -> tuple[WholeGlide, ...]:
         """
-        What she did without thrust where something but the water acted.
+        What she did without thrust where that is probably not one glide.
         """
         return tuple(event for event in self.events if isinstance(event, WholeGlide))
 

@@ -32,7 +32,12 @@ _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its f
 _SCALES: Mapping[str, Scale] = {
     scale.text: scale
     for scale in (
-        ABSOLUTE, effect.WEIGHTS, effect.AREAS, effect.SPEEDS, effect.LENGTHS, effect.DRAUGHTS
+        ABSOLUTE,
+        effect.WEIGHTS,
+        effect.AREAS,
+        effect.SPEEDS,
+        effect.LENGTHS,
+        effect.DRAUGHTS,
     )
 }
 _NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
