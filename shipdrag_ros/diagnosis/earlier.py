@@ -318,7 +318,8 @@ def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
         name = _known(effect.get('name'), f'{path}[{i}].name')
         given = _mapping(effect.get('parameters'), f'{path}[{i}].parameters')
         sizes = {}
-        for quantity in find(name).parameters:
+        # the size of what is of its day says nothing today, and earlier versions may lack it
+        for quantity in find(name).parameters if find(name).lasts_s > 0.0 else ():
             place = f'{path}[{i}].parameters.{quantity.name}'
             size = _mapping(given.get(quantity.name), place)
             number = _number(size.get('value'), f'{place}.value', -1e12, 1e12)

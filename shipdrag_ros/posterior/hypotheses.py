@@ -3,8 +3,8 @@
 Hypotheses about runs of one ship: what may be missing, and all rows linear in its unknowns.
 
 The motion and the instruments are those of `motion.predict`. What an effect adds to rows is the
-difference of two simulations at its parameters; the derivatives by all else are those of the
-motion under its force.
+difference of two simulations at its parameters; the derivatives by all else but the stop are those
+of the motion under its force.
 """
 
 from __future__ import annotations
@@ -461,10 +461,7 @@ class ShipRuns:
         without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
         at_stop = began, began._replace(later_s=began.later_s + _STEP_S)
         # what an effect does begins with the stop
-        base, acting = (
-            [batch.add(action, each) for each in at_stop[: 1 + bool(hypothesis.ways)]]
-            for action in (began.still, whole)
-        )
+        base, acting = ([batch.add(each, at) for at in at_stop] for each in (began.still, whole))
         return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
@@ -501,14 +498,13 @@ class ShipRuns:
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
         along, rest = np.zeros((lines, n)), np.zeros((lines, len(run.rest)))
-        acted, *later = shown.along[plan.acting] - shown.along[plan.base]
+        acted, moved = shown.along[plan.acting] - shown.along[plan.base]
         along[0] = residual[0] - acted
         along[1 : 1 + k + EXTRAS] = table[1:]
         along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
-        acting, *acting_later = plan.acting
-        for moved, column in zip(later, acting_later, strict=True):
-            along[1 + k + motion.STOP] = residual[1 + motion.STOP] + (moved - acted) / _STEP_S
-            rest[1 + k + motion.STOP] = (shown.rest[column] - shown.rest[acting]) / _STEP_S
+        acting, later = plan.acting
+        along[1 + k + motion.STOP] = residual[1 + motion.STOP] + (moved - acted) / _STEP_S
+        rest[1 + k + motion.STOP] = (shown.rest[later] - shown.rest[acting]) / _STEP_S
         along[0] -= at[place[k + _SCATTER]] * along[1 + k + _SCATTER]
         rest[0] = run.rest - shown.rest[acting]
         a, first = run.across, 1 + k + _LOCAL
@@ -577,7 +573,7 @@ class _Places(NamedTuple):
     """
     Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much.
 
-    `base` and `acting`, without effects and with them, are followed by those of a later stop.
+    `base` and `acting`, without effects and with them, are each of the stop and of a later one.
     """
 
     base: list[int]
