@@ -31,13 +31,11 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
-QUICK_IN_TIME, QUICK_IN_LOG = 't, quick', 'log, quick'
+QUICK_IN_TIME = 't, quick'
 """Where something smooth without a name may be."""
 _FORMS = 4  # splines over a run, of the error of a formula
-_SLOW, _QUICK = 6, 18
-SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: _SLOW, IN_LOG: _SLOW, IN_GROUND: _SLOW}
-SPLINES |= {QUICK_IN_TIME: _QUICK, QUICK_IN_LOG: _QUICK}
-"""Of something smooth, over a run: water changes slowly, a force or what a log reads need not."""
+SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, QUICK_IN_TIME: 18, IN_LOG: 6, IN_GROUND: 6}
+"""Of something smooth, over a run: a force may change quickly."""
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 # behind the extras: place to port, first heading, shaft speed of a propeller that the water
@@ -555,7 +553,7 @@ class ShipRuns:
             return found
         if where in (IN_TIME, QUICK_IN_TIME):
             return _force_in_time(run, forces, own, count)
-        if where in (IN_LOG, QUICK_IN_LOG):
+        if where == IN_LOG:
             by_log = rows.kind == LOG
             found[:, by_log] = u_0 * bsplines(run.over_run, count)[:, by_log]
             return found
