@@ -492,11 +492,13 @@ class ShipRuns:
         table, speed = motion.predict(forces, own, model.grid_s, rows)
         alone = motion.settled(model.forces, own[:k])  # without effects
         residual, _ = motion.predict(alone, own[k:], model.grid_s, rows)
+        acted, moved = shown.along[plan.acting] - shown.along[plan.base]
+        if not all(np.isfinite(each).all() for each in (table, residual, acted, moved)):
+            return None
         extra = len(hypothesis.forms) * _FORMS
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
         along, rest = np.zeros((lines, n)), np.zeros((lines, len(run.rest)))
-        acted, moved = shown.along[plan.acting] - shown.along[plan.base]
         along[0] = residual[0] - acted
         along[1 : 1 + k + EXTRAS] = table[1:]
         along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
