@@ -316,10 +316,11 @@ def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
     for i, each in enumerate(_list(value, path)):
         effect = _mapping(each, f'{path}[{i}]')
         name = _known(effect.get('name'), f'{path}[{i}].name')
+        known = find(name)
         given = _mapping(effect.get('parameters'), f'{path}[{i}].parameters')
         sizes = {}
         # the size of what is of its day says nothing today, and earlier versions may lack it
-        for quantity in find(name).parameters if find(name).lasts_s > 0.0 else ():
+        for quantity in known.parameters if known.lasts_s > 0.0 else ():
             place = f'{path}[{i}].parameters.{quantity.name}'
             size = _mapping(given.get(quantity.name), place)
             number = _number(size.get('value'), f'{place}.value', -1e12, 1e12)

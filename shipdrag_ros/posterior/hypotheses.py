@@ -30,8 +30,8 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame
 
-IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
-QUICK_IN_TIME = 't, quick'
+IN_SPEED, IN_TIME, QUICK_IN_TIME = 'u', 't', 't, quick'
+IN_LOG, IN_GROUND = 'log', 'ground'
 """Where something smooth without a name may be."""
 _FORMS = 4  # splines over a run, of the error of a formula
 SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, QUICK_IN_TIME: 18, IN_LOG: 6, IN_GROUND: 6}
