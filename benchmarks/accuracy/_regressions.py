@@ -19,8 +19,12 @@ SHAPES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 CUBE = terms_up_to(3, [3] * len(SHAPES))
 CUBIC = RegressionForm(
     'cubic',
-    lambda hulls: monomials(np.column_stack([getattr(hulls, name) for name in SHAPES]), CUBE),
-    tuple(map(str, CUBE)),
+    lambda hulls: dict(
+        zip(
+            map(str, CUBE),
+            monomials(np.column_stack([getattr(hulls, name) for name in SHAPES]), CUBE).T,
+        )
+    ),
     SHAPES,
 )
 Predictor = Callable[[Hulls], Float64]

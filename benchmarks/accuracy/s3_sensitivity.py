@@ -39,15 +39,19 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import (
-    ManoeuvreMotion,
+    Motions,
     Side,
     overshoots_rad,
     steer,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.sensitivity.coast import coast_from, particulars
-from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.coasting import (
+    CoastStudy,
+    coast_from,
+    particulars,
+    study_coast,
+)
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm
@@ -152,7 +156,7 @@ def checks() -> Table:
     )
 
 
-def _turned(motion: ManoeuvreMotion, heading_rad: float, value: Float64) -> float:
+def _turned(motion: Motions, heading_rad: float, value: Float64) -> float:
     """Return what a turning ship has done when her heading has changed by so much."""
     turned = np.abs(motion.heading_rad)
     i = int(np.argmax(turned >= heading_rad))

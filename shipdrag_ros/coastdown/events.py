@@ -20,6 +20,11 @@ BRAKED = (
 """What is said of a coastdown that is `braked`."""
 TURNED = 'the ship turned in a part of it; r(v) is from the rest alone'
 """What is said of a coastdown that is `turned`."""
+NOT_ALL = (
+    'she was without thrust for longer, and probably not in one glide: something but the water '
+    'may have slowed her there; r(v) is from the coastdown alone'
+)
+"""What is said of a coastdown that is part of a `WholeGlide`, and in which nothing acted."""
 
 
 class State(Enum):
@@ -212,9 +217,9 @@ class EndedCoastdown:
 @dataclass(frozen=True)
 class WholeGlide:
     """
-    A stretch without thrust that is probably not one glide: something but the water acted.
+    A stretch without thrust that is probably not one glide.
 
-    It is more than the coastdown in it, or holds none.
+    Something but the water may have acted. It is more than the coastdown in it, or holds none.
     """
 
     start_ns: int

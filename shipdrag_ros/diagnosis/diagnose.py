@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     DiagnosisResult,
     EffectEstimate,
+    Gap,
     SeenRun,
 )
 from shipdrag_ros.diagnosis.verdict import (
@@ -27,7 +29,7 @@ from shipdrag_ros.diagnosis.verdict import (
     waiting,
 )
 from shipdrag_ros.diagnosis.words import names_text
-from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
@@ -123,23 +125,21 @@ def diagnose(
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
-    if questions:
-        return waiting(
-            '; '.join(questions),
-            baseline=baseline,
-            notes=notes,
-            coastdowns_used=len(seen),
-            runs=_seen_runs(seen),
-        )
-
     stated = stated_in(runs, seen, ship, facts)
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
     )
     progress('comparing hypotheses', 0, 0)
-    comparing = compare(seen, ship, stated, before)
-    case = _Case(seen, comparing, comparing.compare(), stated, before)
-    return _answer(case, ship, (*notes, *of_one_day(case)), baseline, progress, advise=advise)
+    try:
+        comparing = compare(seen, ship, stated, before)
+        case = _Case(seen, comparing, comparing.compare(), stated, before)
+        notes = (*notes, *of_one_day(case))
+        found = _answer(case, ship, notes, baseline, progress, advise=advise and not questions)
+    except (DiagnosisError, SimulationError) as error:
+        if not questions:
+            raise
+        found = _nothing_compared(seen, baseline, (*notes, f'if the unit is right: {error}'))
+    return waiting(found, '; '.join(questions))
 
 
 def _answer(
@@ -186,6 +186,24 @@ def _answer(
         runs=_seen_runs(seen),
         earlier=() if case.earlier is None else case.earlier.judged(found),
         limits=limits_of(judged, comparing, never),
+    )
+
+
+def _nothing_compared(
+    seen: Sequence[Observation], baseline: str, notes: tuple[str, ...]
+) -> DiagnosisResult:
+    """Return the diagnosis of runs that no hypothesis can be compared with."""
+    return DiagnosisResult(
+        verdict=Verdict.ONE_OF,
+        effects=(),
+        candidates=(),
+        nothing=0.0,
+        unnamed=0.0,
+        before=Gap(None, None, math.nan),
+        baseline=baseline,
+        notes=notes,
+        coastdowns_used=len(seen),
+        runs=_seen_runs(seen),
     )
 
 

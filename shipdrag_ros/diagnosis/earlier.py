@@ -104,7 +104,14 @@ class EarlierDiagnosis:
             That they were of; None where none is known.
         name
             For the user.
+
+        Raises
+        ------
+        DiagnosisError
+            If its verdict waits for an answer.
         """
+        if found.question:
+            raise DiagnosisError(f'{name}: its verdict waits for an answer: {found.question}')
         return cls(
             name,
             '' if ship is None else ship.name,
@@ -262,6 +269,8 @@ def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
         given = _mapping(each, place)
         if given.get('used') is True:
             before += _runs(given.get('runs'), f'{place}.runs')
+    if whole.get('question'):
+        raise _Wrong('question: its verdict waits for the answer; diagnose its runs again')
     of_force = whole.get('baseline') == 'stated'
     candidates = _candidates(whole.get('candidates'), all_sized=of_force)
     return EarlierDiagnosis(
@@ -307,9 +316,11 @@ def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
     for i, each in enumerate(_list(value, path)):
         effect = _mapping(each, f'{path}[{i}]')
         name = _known(effect.get('name'), f'{path}[{i}].name')
+        known = find(name)
         given = _mapping(effect.get('parameters'), f'{path}[{i}].parameters')
         sizes = {}
-        for quantity in find(name).parameters:
+        # the size of what is of its day says nothing today, and earlier versions may lack it
+        for quantity in known.parameters if known.lasts_s > 0.0 else ():
             place = f'{path}[{i}].parameters.{quantity.name}'
             size = _mapping(given.get(quantity.name), place)
             number = _number(size.get('value'), f'{place}.value', -1e12, 1e12)

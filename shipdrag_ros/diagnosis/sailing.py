@@ -72,9 +72,7 @@ def diagnose_sailing(
             raise
         return _zeros_alone(standing, str(error), no_coastdown)
     question = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
-    if question:
-        return waiting(question, baseline='none', examined=(LOG_TRACK,), no_coastdown=no_coastdown)
-    return _diagnosed(legs, standing, no_coastdown)
+    return waiting(_diagnosed(legs, standing, no_coastdown), question)
 
 
 def _diagnosed(legs: Legs, standing: StandingLog | None, no_coastdown: str) -> DiagnosisResult:

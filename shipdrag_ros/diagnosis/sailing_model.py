@@ -34,7 +34,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import LIKELY, ComparedHypotheses, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay, ways_of
-from shipdrag_ros.posterior.hypotheses import IN_LOG, SMOOTH, Explanation, bsplines
+from shipdrag_ros.posterior.hypotheses import IN_LOG, Explanation, bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -43,6 +43,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
+_SPLINES = 6  # over the speed, of an error without a name
 _NOISE = (
     priors.SAILING_LOG,
     priors.SAILING_LOG,
@@ -226,7 +227,7 @@ class SailingModel:
         straight = [e for e in self.effects if _LOG in e.errs_in] if smooth and not ways else []
         acting = (*ways, *self._plain(straight))
         own = sum(len(way.unknowns) for way in acting)
-        start = np.zeros(own + (SMOOTH if smooth else 0))
+        start = np.zeros(own + (_SPLINES if smooth else 0))
         start[:own] = [each for way in acting for each in way.start]
         n = len(self.legs)
 
@@ -277,7 +278,7 @@ class SailingModel:
         """What neither a scale nor an offset is, (6, n) [m/s]."""
         # not by the way over ground: its noise is in what is left, and would bend with itself
         speed = np.abs(self.legs.log_m_s)
-        splines = bsplines(speed / speed.max(), SMOOTH).T
+        splines = bsplines(speed / speed.max(), _SPLINES).T
         line = np.array([np.ones(len(speed)), speed]).T
         bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]
         found: Float64 = priors.SMOOTH_SIZES[1] * float(speed.max()) * bent.T

@@ -7,10 +7,9 @@ Whether that is `named`, `one_of`, `unknown` or `none` is decided by `inference.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic
+from dataclasses import dataclass, replace
+from typing import Generic
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from shipdrag_ros.diagnosis.result import (
     Candidate,
     DiagnosisResult,
     EffectEstimate,
-    Gap,
     Limit,
     RunSize,
 )
@@ -222,26 +220,21 @@ def asked(ratio: float) -> str:
     )
 
 
-def waiting(question: str, **rest: Any) -> DiagnosisResult:
+def waiting(found: DiagnosisResult, question: str) -> DiagnosisResult:
     """
-    Return a diagnosis that waits for the answer to a question.
+    Return a diagnosis whose verdict waits for the answer to a question.
 
     Parameters
     ----------
+    found
+        As it is if the units are right.
     question
-        A sentence.
-    **rest
-        What else there is to be said, as in `DiagnosisResult`.
+        A sentence; '' where there is none, and the diagnosis stands.
     """
-    return DiagnosisResult(
-        verdict=Verdict.ONE_OF,
-        effects=(),
-        candidates=(),
-        nothing=0.0,
-        unnamed=0.0,
-        before=Gap(None, None, math.nan),
-        question=question,
-        **rest,
+    if not question:
+        return found
+    return replace(
+        found, verdict=Verdict.ONE_OF, effects=(), would_decide=(), where=None, question=question
     )
 
 

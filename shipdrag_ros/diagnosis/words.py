@@ -41,7 +41,8 @@ def sentence(found: DiagnosisResult) -> str:
     Return the verdict in a sentence; first a question, or that there is no clean hull.
     """
     if found.question:
-        return f'{found.question}. The verdict waits for the answer.'
+        right = f'; if the unit is right: {_listed(found.held)}' if found.held else ''
+        return f'{found.question}. The verdict waits for the answer{right}.'
     if found.baseline == 'fitted_here':
         return f'{NO_CLEAN_HULL} {_verdict(found)}'
     return _verdict(found)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
-from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
+from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.joined import with_whole_glides
 from shipdrag_ros.diagnosis.result import DiagnosisResult
@@ -302,7 +302,7 @@ def _diagnosis(
             return _held(result, hull, run), []
         whole = partial(_held, result, hull, replace(run, window=glide))
         alone = partial(_held, result, hull, run)
-        note = coastdown.disturbed or BRAKED
+        note = coastdown.disturbed or NOT_ALL
         found = with_whole_glides(alone, whole, (note,), coastdowns=1)
         return found, [f': {note}' for note in found.notes]
     except (DiagnosisError, EstimationError) as error:

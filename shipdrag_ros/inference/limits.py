@@ -78,6 +78,7 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
     known = [each for each in sizes if each.weight > 0.0 and np.isfinite(each.sd)]
     if not known:
         raise ValueError('no hypothesis with a weight: the size has no distribution')
+    most = max(each.weight for each in known)  # it may be as small as a number can be
     values, weights = [], []
     for each in known:
         sd = max(each.sd, 1e-12)
@@ -94,12 +95,12 @@ def quantile(sizes: Sequence[SizePosterior], share: float) -> float:
         log = -0.5 * z**2 + each.z * apart - 0.5 * information * apart**2
         weight = np.exp(log - log.max()) * np.diff(edge)
         values.append(size[1:])
-        weights.append(each.weight / weight.sum() * weight)
+        weights.append(each.weight / most / weight.sum() * weight)
     value, weight = np.concatenate(values), np.concatenate(weights)
     order = np.argsort(value)
     value, weight = value[order], weight[order]
     # between points: a step of the distribution at the last digit of a weight is none of the limit
-    weight /= weight.sum()  # it may be as small as a number can be
+    weight /= weight.sum()
     return float(np.interp(share, np.cumsum(weight) - 0.5 * weight, value))
 
 

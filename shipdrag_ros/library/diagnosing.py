@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
+from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.joined import with_log_track, with_whole_glides
@@ -341,7 +341,7 @@ def _of_run(
         glide = whole_window(result, coastdown)
         whole.append(coast if glide is None else replace(coast, window=glide))
         if glide is not None:
-            notes.append(f'{coast.name}: {coastdown.disturbed or BRAKED}')
+            notes.append(f'{coast.name}: {coastdown.disturbed or NOT_ALL}')
             glide_end_ns = glide.end_ns
     return _OfRun(coasts, glide_end_ns > 0, whole, tuple(notes))
 

@@ -40,6 +40,7 @@ from shipdrag_ros.posterior.hypotheses import (
     IN_LOG,
     IN_SPEED,
     IN_TIME,
+    QUICK_IN_TIME,
     Explanation,
     RunSight,
     RunTable,
@@ -260,8 +261,9 @@ class Comparing:
         kinds = {int(k) for run in runs.runs for k in np.unique(run.model.rows.kind)}
         both = LOG in kinds and len(kinds) > 1
         # without a baseline the hull is something smooth in any case
-        in_force = (IN_SPEED, IN_TIME) if runs.runs[0].model.law.stated else (IN_TIME,)
-        self.smooth = (*in_force, IN_LOG, IN_GROUND) if both else in_force
+        in_speed = (IN_SPEED,) if runs.runs[0].model.law.stated else ()
+        between = (IN_LOG, IN_GROUND) if both else ()
+        self.smooth = (*in_speed, IN_TIME, QUICK_IN_TIME, *between)
         longest = max(float(run.model.rows.time_s[-1]) for run in runs.runs)
         self.ways: dict[str, list[EffectWay]] = {
             effect.name: list(ways_of(effect, ship, longest, len(runs.runs)))
@@ -568,12 +570,14 @@ class Comparing:
                 mean[p + i], precision[p + i] = amount, held
                 means.append(mean)
                 precisions.append(precision)
-            for i in range(len(smooth)):
-                mean, precision = means[0].copy(), precisions[0].copy()
-                first = p + len(taught) + i * len(smooth[0])
-                precision[first : first + len(smooth[0])] = priors.SMOOTH_SIZES[1] ** -2.0
-                means.append(mean)
-                precisions.append(precision)
+            first = p + len(taught)
+            for columns in smooth:
+                for size in priors.SMOOTH_TAUGHT:
+                    mean, precision = means[0].copy(), precisions[0].copy()
+                    precision[first : first + len(columns)] = size**-2.0
+                    means.append(mean)
+                    precisions.append(precision)
+                first += len(columns)
             seen = Seen(
                 run.model.rows,
                 lines,

@@ -3,8 +3,8 @@
 Hypotheses about runs of one ship: what may be missing, and all rows linear in its unknowns.
 
 The motion and the instruments are those of `motion.predict`. What an effect adds to rows is the
-difference of two simulations at its parameters; the derivatives by all else are those of the
-motion under its force.
+difference of two simulations at its parameters; the derivatives by all else but the stop are those
+of the motion under its force.
 """
 
 from __future__ import annotations
@@ -30,9 +30,12 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame
 
-IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
+IN_SPEED, IN_TIME, QUICK_IN_TIME = 'u', 't', 't, quick'
+IN_LOG, IN_GROUND = 'log', 'ground'
 """Where something smooth without a name may be."""
-_FORMS, SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
+_FORMS = 4  # splines over a run, of the error of a formula
+SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, QUICK_IN_TIME: 18, IN_LOG: 6, IN_GROUND: 6}
+"""Of something smooth, over a run: a force may change quickly."""
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 # behind the extras: place to port, first heading, shaft speed of a propeller that the water
@@ -318,10 +321,8 @@ class ShipRuns:
 
     def width(self, hypothesis: Explanation) -> int:
         """Return the number of unknowns of a hypothesis."""
-        found = self.size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
-        if hypothesis.smooth not in ('', IN_SPEED):
-            found += SMOOTH * len(self.runs)
-        return found
+        effects = len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
+        return self.size + effects + SPLINES[hypothesis.smooth] * len(self.runs)
 
     def priors(self, hypothesis: Explanation, now: Float64) -> Families:
         """
@@ -458,10 +459,7 @@ class ShipRuns:
         without = [instead(1 + form, _NOTHING) for form in hypothesis.forms]
         at_stop = began, began._replace(later_s=began.later_s + _STEP_S)
         # what an effect does begins with the stop
-        base, acting = (
-            [batch.add(action, each) for each in at_stop[: 1 + bool(hypothesis.ways)]]
-            for action in (began.still, whole)
-        )
+        base, acting = ([batch.add(each, at) for at in at_stop] for each in (began.still, whole))
         return _Places(base, acting, steps, without, Action.total(*actions[1:]))
 
     def air(self, j: int, at: Float64) -> Action:
@@ -494,18 +492,19 @@ class ShipRuns:
         table, speed = motion.predict(forces, own, model.grid_s, rows)
         alone = motion.settled(model.forces, own[:k])  # without effects
         residual, _ = motion.predict(alone, own[k:], model.grid_s, rows)
+        acted, moved = shown.along[plan.acting] - shown.along[plan.base]
+        if not all(np.isfinite(each).all() for each in (table, residual, acted, moved)):
+            return None
         extra = len(hypothesis.forms) * _FORMS
         smooth = self._smooth(j, hypothesis.smooth, forces, own)
         lines = 1 + k + _LOCAL + q + extra + len(smooth)
         along, rest = np.zeros((lines, n)), np.zeros((lines, len(run.rest)))
-        acted, *later = shown.along[plan.acting] - shown.along[plan.base]
         along[0] = residual[0] - acted
         along[1 : 1 + k + EXTRAS] = table[1:]
         along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
-        acting, *acting_later = plan.acting
-        for moved, column in zip(later, acting_later, strict=True):
-            along[1 + k + motion.STOP] = residual[1 + motion.STOP] + (moved - acted) / _STEP_S
-            rest[1 + k + motion.STOP] = (shown.rest[column] - shown.rest[acting]) / _STEP_S
+        acting, later = plan.acting
+        along[1 + k + motion.STOP] = residual[1 + motion.STOP] + (moved - acted) / _STEP_S
+        rest[1 + k + motion.STOP] = (shown.rest[later] - shown.rest[acting]) / _STEP_S
         along[0] -= at[place[k + _SCATTER]] * along[1 + k + _SCATTER]
         rest[0] = run.rest - shown.rest[acting]
         a, first = run.across, 1 + k + _LOCAL
@@ -539,35 +538,33 @@ class ShipRuns:
 
     def _beyond(self, j: int, hypothesis: Explanation) -> Int64:
         """Return places, behind the effects' unknowns, of those that a run has."""
-        forms = _FORMS * len(hypothesis.forms)
-        if hypothesis.smooth in ('', IN_SPEED):
-            return np.arange(forms)
-        return np.concatenate([np.arange(forms), forms + SMOOTH * j + np.arange(SMOOTH)])
+        forms, count = _FORMS * len(hypothesis.forms), SPLINES[hypothesis.smooth]
+        return np.concatenate([np.arange(forms), forms + count * j + np.arange(count)])
 
     def smooth(self, j: int, where: str, at: Float64) -> Float64:
         """
-        Return columns (6, n) of something smooth in a run, of unit relative size.
+        Return columns (k, n) of something smooth in a run, of unit relative size.
         """
         return self._smooth(j, where, self.runs[j].model.forces, at[self.places[j][_OF_MOTION]])
 
     def _smooth(self, j: int, where: str, forces: motion.Forces, own: Float64) -> Float64:
         run = self.runs[j]
-        rows, u_0 = run.model.rows, run.model.speed_m_s
-        if where in ('', IN_SPEED):
-            return np.zeros((0, len(rows.time_s)))
-        if where == IN_TIME:
-            return _force_in_time(run, forces, own)
-        found = np.zeros((SMOOTH, len(rows.time_s)))
+        rows, u_0, count = run.model.rows, run.model.speed_m_s, SPLINES[where]
+        found = np.zeros((count, len(rows.time_s)))
+        if count == 0:
+            return found
+        if where in (IN_TIME, QUICK_IN_TIME):
+            return _force_in_time(run, forces, own, count)
         if where == IN_LOG:
             by_log = rows.kind == LOG
-            found[:, by_log] = u_0 * bsplines(run.over_run, SMOOTH)[:, by_log]
+            found[:, by_log] = u_0 * bsplines(run.over_run, count)[:, by_log]
             return found
         ground, position = rows.kind == OVER_GROUND, rows.kind == POSITION
-        found[:, ground] = u_0 * bsplines(run.over_run, SMOOTH)[:, ground]
+        found[:, ground] = u_0 * bsplines(run.over_run, count)[:, ground]
         time = np.linspace(rows.time_s[0], rows.time_s[-1], 400)
-        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), SMOOTH)
+        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), count)
         way = np.cumsum(bumps, axis=1) * (time[1] - time[0])
-        for i in range(SMOOTH):
+        for i in range(count):
             found[i, position] = u_0 * np.interp(rows.time_s[position], time, way[i])
         return found
 
@@ -576,7 +573,7 @@ class _Places(NamedTuple):
     """
     Columns that a hypothesis needs of a run; steps of unknowns, by line and by how much.
 
-    `base` and `acting`, without effects and with them, are followed by those of a later stop.
+    `base` and `acting`, without effects and with them, are each of the stop and of a later one.
     """
 
     base: list[int]
@@ -600,7 +597,7 @@ def _with(forces: motion.Forces, action: Action, frame: Frame, run: RunSight) ->
     return forces._replace(known=forces.known + np.stack([r, slope]), inertia=more)
 
 
-def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64) -> Float64:
+def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64, count: int) -> Float64:
     """Return what forces of unit size, over r(u_0), do to the rows; one for each time."""
     rows = run.model.rows
     end = float(rows.time_s[-1])
@@ -617,16 +614,16 @@ def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64) -> Float6
     known, columns = motion.shapes_at(forces, u[:1])
     r_0 = float(known[0, 0] + own[:k] @ columns[0, :, 0])
     left = np.exp(-damping * step)
-    force = -r_0 * bsplines(time / end, SMOOTH) / inertia
+    force = -r_0 * bsplines(time / end, count) / inertia
     speed = np.zeros_like(force)
     for i in range(1, len(time)):
         speed[:, i] = left[i] * speed[:, i - 1] + 0.5 * step * (
             force[:, i] + left[i] * force[:, i - 1]
         )
     way = np.cumsum(speed, axis=1) * step
-    found = np.zeros((SMOOTH, len(rows.time_s)))
+    found = np.zeros((count, len(rows.time_s)))
     after, position = rows.time_s > 0.0, rows.kind == POSITION
-    for i in range(SMOOTH):
+    for i in range(count):
         moved = np.where(
             position, np.interp(rows.time_s, time, way[i]), np.interp(rows.time_s, time, speed[i])
         )

@@ -218,6 +218,8 @@ UNNAMED_ODDS = Declared(
 )
 SMOOTH_SIZES = (0.015, 0.05, 0.15, 0.5, 1.5)
 """Points of its size in time, relative to r or to the speed, all alike."""
+SMOOTH_TAUGHT = SMOOTH_SIZES[1:3]
+"""The same while noise is learnt."""
 SMALL_COMPONENTS = Declared(
     '-',
     'components of a weak current or wind over those of a usual one, which is as probable',

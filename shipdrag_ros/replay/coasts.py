@@ -112,7 +112,7 @@ def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
 
 def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | None:
     """
-    Read a coastdown with the parts about it in which something but the water acted.
+    Read a coastdown with the parts about it in which something but the water may have acted.
 
     Returns
     -------

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from numbers import Real
 
 import numpy as np
 
@@ -108,7 +109,7 @@ class ReplayResult:
     @property
     def whole_glides(self) -> tuple[WholeGlide, ...]:
         """
-        What she did without thrust where something but the water acted.
+        What she did without thrust where that is probably not one glide.
         """
         return tuple(event for event in self.events if isinstance(event, WholeGlide))
 
@@ -385,7 +386,7 @@ def told_ns(run: Run, stop: StopTime) -> int:
     BagError
         If it lies outside of the bag, is a date without a zone, or neither date nor number.
     """
-    if not isinstance(stop, datetime | float | int):
+    if not isinstance(stop, datetime | Real):
         raise BagError(f'stop is {stop!r}: expected seconds as a number, or a datetime')
     if isinstance(stop, datetime) and stop.tzinfo is None:  # would be of this computer
         raise BagError(f'stop at {stop.isoformat()}: expected a date with its zone')

@@ -151,6 +151,7 @@ BY_SPEED = ('R_T', 'R_V', 'R_F')
 COUNTED_IN = {
     'V^(2/3)': 'nabla**(2/3)',
     'sqrt(g L)': 'sqrt(g*L)',
+    'L': 'L',
     'draught': 'T_M',
     'weight of the ship': 'rho*g*nabla',
 }

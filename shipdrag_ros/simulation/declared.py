@@ -31,7 +31,14 @@ _STEP = 0.01  # of a speed, over which a power is looked at
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
 _SCALES: Mapping[str, Scale] = {
     scale.text: scale
-    for scale in (ABSOLUTE, effect.WEIGHTS, effect.AREAS, effect.SPEEDS, effect.DRAUGHTS)
+    for scale in (
+        ABSOLUTE,
+        effect.WEIGHTS,
+        effect.AREAS,
+        effect.SPEEDS,
+        effect.LENGTHS,
+        effect.DRAUGHTS,
+    )
 }
 _NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
 _ERRS_IN = {

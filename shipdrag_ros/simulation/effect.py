@@ -141,6 +141,10 @@ def _speed(ship: Ship) -> float:
     return float(ship.speed(1.0))
 
 
+def _length(ship: Ship) -> float:
+    return ship.length_m
+
+
 def _draught(ship: Ship) -> float:
     return ship.draught_m or math.nan
 
@@ -149,6 +153,7 @@ def _draught(ship: Ship) -> float:
 WEIGHTS = Scale('weight of the ship', _weight)
 AREAS = Scale('V^(2/3)', _area)
 SPEEDS = Scale('sqrt(g L)', _speed)
+LENGTHS = Scale('L', _length)
 DRAUGHTS = Scale('draught', _draught)
 
 

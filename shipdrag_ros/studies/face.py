@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.display import Section
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 
@@ -31,7 +31,7 @@ class Presentation:
     sections
         With their headings, without pictures.
     pictures
-        Draws the figures of sections, by heading, each with its caption; called for a page alone.
+        Heading of the section, figure and caption of each; drawn one by one, for a page alone.
     source, foot
         Of the page: where the data come from, and the formulas.
     """
@@ -39,7 +39,7 @@ class Presentation:
     title: str
     sentence: str
     sections: Sequence[Section]
-    pictures: Callable[[], Mapping[str, Sequence[tuple[Figure, str]]]]
+    pictures: Iterator[tuple[str, Figure, str]]
     source: str = ''
     foot: str = ''
 
@@ -59,11 +59,18 @@ def show(output: Output, shown: Presentation, report: Path | None) -> None:
             output.say(f'- {line}')
     if report is None:
         return
-    drawn = shown.pictures()
+    drawn = [(heading, picture(figure, caption)) for heading, figure, caption in shown.pictures]
     sections = [
-        replace(part, pictures=[picture(*each) for each in drawn.get(part.heading, ())])
+        replace(part, pictures=[each for heading, each in drawn if heading == part.heading])
         for part in shown.sections
     ]
     about = {'sentence': shown.sentence, 'source': shown.source, 'foot': shown.foot}
     write_page(report, shown.title, sections, **about)
     output.log(f'report in {report}')
+
+
+def by_columns(columns: Mapping[str, Iterable[str]]) -> Table:
+    """
+    Return a table from the cells of each column, by its head.
+    """
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))

@@ -23,7 +23,7 @@ from shipdrag_ros.samples import Float64
 
 RANK_TOLERANCE = 1e-12  # a singular value this small beside the largest is rounding
 # Small enough that BLAS never splits the work between threads, so that the last
-# bit does not depend on how many there are; at least twice the columns.
+# bit does not depend on how many there are.
 _BLOCK = 128
 
 
@@ -43,20 +43,14 @@ def triangle(rows: Float64) -> Float64:
 
     Notes
     -----
-    Householder on blocks of rows, then on the stacked factors.
+    Householder on one block of rows after the other, below the factor of those before.
     """
     k = rows.shape[1]
-    block = max(_BLOCK, 2 * k)
     householder: Any = np.linalg.qr  # numpy's types do not know that mode 'r' gives one array
-    while len(rows) > block:
-        blocks = -(-len(rows) // block)
-        padded = np.zeros((blocks * block, k))
-        padded[: len(rows)] = rows
-        rows = householder(padded.reshape(blocks, block, k), mode='r').reshape(-1, k)
-    if len(rows) < k:
-        rows = np.concatenate([rows, np.zeros((k - len(rows), k))])
-    factor: Float64 = householder(rows, mode='r')
-    return factor
+    factor: Float64 = rows[:0]
+    for first in range(0, len(rows), _BLOCK):
+        factor = householder(np.concatenate([factor, rows[first : first + _BLOCK]]), mode='r')
+    return np.concatenate([factor, np.zeros((k - len(factor), k))])
 
 
 def inverse(upper: Float64) -> Float64:

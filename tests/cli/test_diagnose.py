@@ -16,6 +16,8 @@ from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed
+from shipdrag_ros.diagnosis.earlier import read_earlier
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import coasts_of
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -59,16 +61,30 @@ def test_the_example_of_the_page_works_as_typed(tmp_path, monkeypatch, capsys) -
 
 
 def test_while_the_verdict_waits_no_figure_stands_beside_the_question(ship_file, tmp_path, capsys):
-    bag = simulated(tmp_path / 'knots.mcap', ship_file, '--effect', 'log_scale=0.944')
+    bag = simulated(tmp_path / 'miles.mcap', ship_file, '--effect', 'log_scale=0.15')
     capsys.readouterr()
     document = tmp_path / 'found.json'
     assert main(['diagnose', str(bag), '--json', str(document)]) == 0
     found, said = json.loads(document.read_text()), capsys.readouterr().out
     assert (found['verdict'], found['effects']) == ('one_of', [])
     assert 'is the unit of one of them wrong?' in said.splitlines()[0]
-    assert 'The verdict waits for the answer.' in said.splitlines()[0]
-    for words in ('over the clean hull', 'resistance', 'Examined', 'How probable'):
+    assert 'The verdict waits for the answer; if the unit is right: log ' in said.splitlines()[0]
+    likeliest = found['candidates'][0]
+    assert (likeliest['names'], likeliest['probability'] > 0.8) == (['log_scale'], True)
+    # as an earlier diagnosis it says nothing yet
+    with pytest.raises(DiagnosisError, match='waits for the answer'):
+        read_earlier(document)
+    for words in ('over the clean hull', 'resistance', 'disagree', 'How probable'):
         assert words not in said
+
+
+def test_a_speed_that_no_baseline_reaches_is_a_question_too(ship_file, tmp_path, capsys):
+    bag = simulated(tmp_path / 'knots.mcap', ship_file, '--effect', 'log_scale=0.944')
+    assert main(['diagnose', str(bag), '--json', str(tmp_path / 'found.json')]) == 0
+    found = json.loads((tmp_path / 'found.json').read_text())
+    assert (found['verdict'], found['candidates']) == ('one_of', [])
+    assert 'near knots over m/s' in found['question']
+    assert 'if the unit is right: speed_m_s is 15.5' in '; '.join(found['notes'])
 
 
 def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(ship_file, tmp_path, capsys):

@@ -80,6 +80,16 @@ def test_a_drag_for_a_while_without_a_turn_is_not_called_turning() -> None:
     assert found.where.channel == 'force'
 
 
+def test_a_log_that_swings_within_minutes_is_something_without_a_name() -> None:
+    still = run()
+    log = still.window.speed_through_water
+    phase = 2.0e-9 * np.pi * (log.time_ns - log.time_ns[0]) / 300.0
+    less = 1.0 - 0.02 * (1.0 - np.cos(phase))  # air under it, which comes and goes
+    window = replace(still.window, speed_through_water=replace(log, value=log.value * less))
+    found = diagnose([CoastRun('swings', window)], SHIP, PARAMETERS)
+    assert found.verdict is Verdict.UNKNOWN
+
+
 def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
     turning = 'turning=25,start_s=300,duration_s=200,rate_rad_s=0.001'
     runs = [run(turning), run(heading_rad=0.3 + 3.14159, seed=2)]

@@ -315,6 +315,14 @@ def test_a_size_without_sd_and_a_record_without_a_ship_are_read(tmp_path: Path) 
     assert math.isnan(found.candidates[0].effects['fouling']['friction_factor'].sd)
 
 
+def test_weather_of_a_day_is_read_whatever_its_sizes_were(tmp_path: Path) -> None:
+    # of a version in which all waves were half as long as the ship
+    waves = {'name': 'waves', 'parameters': {'force_n': {'value': 4e4, 'sd': 5e3}}}
+    beside = {'names': ['waves'], 'probability': 0.1, 'effects': [waves]}
+    document = {**DOCUMENT, 'candidates': [*DOCUMENT['candidates'][1:], beside]}
+    assert read_earlier(write(tmp_path, json.dumps(document))).probability('waves') == 0.1
+
+
 @pytest.mark.parametrize(
     ('text', 'said'),
     [

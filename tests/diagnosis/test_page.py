@@ -136,13 +136,11 @@ def test_a_record_without_coastdown_has_a_page_without_traces(words, written):
 
 
 def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(found, written):
-    asks = waiting(
-        'is the unit of one of them wrong?', baseline='stated', estimates=found.estimates
-    )
+    asks = waiting(found, 'is the unit of one of them wrong?')
     text = written(asks).text
     assert 'is the unit of one of them wrong?' in text
     assert 'over the clean hull' not in text
-    assert 'Examined' not in text
+    assert 'Model and data disagree' not in text
 
 
 def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:

@@ -165,6 +165,16 @@ def test_it_says_why_it_is_a_scale_and_not_a_current() -> None:
     assert found.where.channel == 'log'
 
 
+@pytest.mark.parametrize('scale', [0.1508, 0.9438])
+def test_a_log_in_another_unit_is_asked_about_and_a_scale_if_the_unit_is_right(
+    scale: float,
+) -> None:
+    found = found_in(Sailing(scale=scale, geodetic=True))
+    assert 'is the unit of one of them wrong?' in found.question
+    assert (found.verdict, found.effects) == (Verdict.ONE_OF, ())
+    assert found.candidates[0].names == ('log_scale',)
+
+
 def test_radar_may_be_wrong_where_the_positions_are_not_of_the_globe() -> None:
     found = found_in(replace(CASES['log_scale'][0], geodetic=False))
     assert found.verdict is Verdict.ONE_OF

@@ -20,7 +20,7 @@ WAVES = EffectEstimate(
     {
         'force_n': Parameter(51234.0, 3000.0),
         'from': Parameter(-1.0, 0.0),
-        'wave_length': Parameter(0.8, 0.1),
+        'wave_length_m': Parameter(80.0, 10.0),
     },
 )
 
@@ -63,8 +63,8 @@ def diagnosis(
         ),
         (
             diagnosis(Verdict.NAMED, (('waves',), 0.95), effects=(WAVES,)),
-            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern, wave length 0.80 ± '
-            '0.20); probability 95.0 %.',
+            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern, wave length (80 ± '
+            '20) m); probability 95.0 %.',
         ),
         (
             diagnosis(Verdict.ONE_OF, (('log_scale',), 0.6), (('radar_scale',), 0.4)),

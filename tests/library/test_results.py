@@ -182,6 +182,8 @@ def test_a_ship_may_be_given_by_its_file_and_a_stop_by_no_text(record, tmp_path)
             verb(record, ship=tmp_path / 'none.yaml')
         with pytest.raises(sd.ShipdragError, match="stop is '602': expected seconds"):
             verb(record, stop='602')
+    by_float, by_int = (sd.estimate(record, stop=stop) for stop in (602.0, np.int64(602)))
+    assert by_int.summary() == by_float.summary()
 
 
 def test_what_is_no_record_is_refused() -> None:

@@ -145,6 +145,13 @@ def test_the_whole_glide_goes_on_where_the_coastdown_ends(tmp_path: Path) -> Non
     assert glide.end_ns > coastdown.end_ns + 200 * 10**9
 
 
+def test_that_something_acted_is_not_said_of_a_coastdown_in_which_nothing_did(tmp_path) -> None:
+    found = diagnosed(tmp_path, ice_at_the_stop)
+    notes = ' '.join(found['notes'])
+    assert 'probably not in one glide' in notes
+    assert 'no instrument shows what' not in notes
+
+
 def crash_stop(time_s: float) -> float:
     """Brake her until she goes astern."""
     return -4.0 if 300.0 < time_s < 400.0 else 0.0

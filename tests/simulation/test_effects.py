@@ -138,7 +138,7 @@ def test_an_anemometer_feels_wind_and_motion():
 
 
 @pytest.mark.parametrize(('side', 'sign'), [('ahead', 1.0), ('astern', -1.0)])
-@pytest.mark.parametrize(('more', 'length_m'), [('', 75.0), (',wave_length=2', 300.0)])
+@pytest.mark.parametrize(('more', 'length_m'), [('', 75.0), (',wave_length_m=300', 300.0)])
 def test_waves_push_by_the_square_of_the_encounter(side, sign, more, length_m):
     truth = run(quadratic(), f'waves=3e4,from={side}{more}')
     omega = np.sqrt(2 * np.pi * 9.81 / length_m)

@@ -12,25 +12,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from math import pi
-from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.fields import (
-    Kind,
-    Problems,
-    declare,
-    keys_of,
-    named,
-    number,
-    parse,
-    read_keys,
-    section,
-    text,
-)
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.strict_yaml import load
 
 # powers of the change of speed u, sway v, yaw rate r and rudder d, as the names spell them
 FORM = (
@@ -40,45 +26,37 @@ FORM = (
     *('Nv', 'Nr', 'Nvvv', 'Nvvr', 'Nvu', 'Nru', 'Nd', 'Nddd', 'Nud', 'Nuud', 'Nvdd', 'Nvvd'),
     *('N0', 'N0u', 'N0uu'),
 )
-_PURE = number(-10.0, 10.0)
 
 
 @dataclass(frozen=True)
 class RudderMachine:
     """
-    How the rudder follows an order: with a lag, a largest rate, a limit.
+    How the rudder follows an order.
+
+    Attributes
+    ----------
+    limit_rad, rate_rad_s
+        Largest angle and rate.
+    lag_s
+        Time constant below that rate.
     """
 
-    limit_rad: float = declare(number(0.0, pi / 2.0, 'rad'), 'largest angle')
-    rate_rad_s: float = declare(number(1e-4, 10.0, 'rad/s'), 'largest rate')
-    lag_s: float = declare(number(0.1, 100.0, 's'), 'time constant below that rate')
+    limit_rad: float
+    rate_rad_s: float
+    lag_s: float
 
 
 @dataclass(frozen=True)
 class AddedMasses:
     """
-    The five inertial derivatives.
+    The five inertial derivatives: surge, sway force and yaw moment by accelerations.
     """
 
-    Xudot: float = declare(_PURE, 'surge force by surge acceleration')
-    Yvdot: float = declare(_PURE, 'sway force by sway acceleration')
-    Yrdot: float = declare(_PURE, 'sway force by yaw acceleration')
-    Nvdot: float = declare(_PURE, 'yaw moment by sway acceleration')
-    Nrdot: float = declare(_PURE, 'yaw moment by yaw acceleration')
-
-
-def _derivatives() -> Kind:
-    """Expect a value for each derivative of the form."""
-    values = named(_PURE)
-
-    def read(value: object, path: str, problems: Problems) -> Any:
-        found = values.read(value, path, problems)
-        if isinstance(found, dict) and set(found) != set(FORM):
-            wrong = ', '.join(sorted(set(found) ^ set(FORM)))
-            problems.append(f'{path}: {wrong} missing or unknown, expected {", ".join(FORM)}')
-        return found
-
-    return Kind(read, f'a value for each of {", ".join(FORM)}')
+    Xudot: float
+    Yvdot: float
+    Yrdot: float
+    Nvdot: float
+    Nrdot: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,46 +64,39 @@ class SteeredShip:
     """
     Abkowitz's whole-ship model in surge, sway and yaw.
 
-    All but length, speed and rudder machine are pure numbers of the prime
-    system.
+    Attributes
+    ----------
+    name, source
+        Of the ship, and where the values come from.
+    length_m
+    speed_m_s
+        That the derivatives are about.
+    mass, yaw_inertia
+    gravity_centre
+        Ahead of amidships.
+    rudder, inertial
+    viscous
+        Forces on the hull and the rudder, by the names of `FORM`.
+    multiples
+        Derivatives that are exact multiples of another.
 
     Notes
     -----
-    S3; Fossen (1994).
+    S3; Fossen (1994). All but length, speed and rudder machine are pure numbers of the prime
+    system.
     """
 
-    name: str = declare(text(), 'name of the ship')
-    source: str = declare(text(), 'where the values come from')
-    length_m: float = declare(number(0.5, 500.0, 'm'), 'length')
-    speed_m_s: float = declare(number(0.1, 40.0, 'm/s'), 'speed that the derivatives are about')
-    mass: float = declare(number(1e-5, 1.0), 'mass')
-    yaw_inertia: float = declare(number(1e-6, 1.0), 'moment of inertia in yaw')
-    gravity_centre: float = declare(number(-0.5, 0.5), 'centre of gravity, ahead of amidships')
-    rudder: RudderMachine = declare(section(RudderMachine), 'rudder machine')
-    inertial: AddedMasses = declare(section(AddedMasses), 'added masses')
-    viscous: Mapping[str, float] = declare(
-        _derivatives(), 'forces on the hull and the rudder', hashed=False
-    )
-    multiples: Mapping[str, str] = declare(
-        named(text()), 'derivatives that are exact multiples of another', hashed=False
-    )
-
-    @classmethod
-    def from_yaml(cls, content: str, *, subject: str) -> SteeredShip:
-        """
-        Read the text of a model file; `subject` names it in errors.
-
-        Raises
-        ------
-        ShipFileError
-            Naming every problem of the text at once.
-        """
-        problems: list[str] = []
-        data = parse(content, subject=subject, error=ShipFileError)
-        accepted = read_keys(keys_of(cls), data, '', problems)
-        if problems:
-            raise ShipFileError(subject, problems)
-        return cls(**accepted)
+    name: str
+    source: str
+    length_m: float
+    speed_m_s: float
+    mass: float
+    yaw_inertia: float
+    gravity_centre: float
+    rudder: RudderMachine
+    inertial: AddedMasses
+    viscous: Mapping[str, float]
+    multiples: Mapping[str, str]
 
     @property
     def values(self) -> Float64:
@@ -177,5 +148,7 @@ def mariner() -> SteeredShip:
     """
     Return the Mariner-class ship that comes with the package.
     """
-    content = files('shipdrag_ros').joinpath('data', 'mariner.yaml').read_text(encoding='utf-8')
-    return SteeredShip.from_yaml(content, subject='mariner.yaml')
+    file = files('shipdrag_ros').joinpath('data', 'mariner.yaml')
+    data = load(file.read_text(encoding='utf-8'))
+    rudder, inertial = RudderMachine(**data.pop('rudder')), AddedMasses(**data.pop('inertial'))
+    return SteeredShip(rudder=rudder, inertial=inertial, **data)

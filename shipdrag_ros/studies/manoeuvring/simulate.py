@@ -57,46 +57,22 @@ class Manoeuvre:
 
 
 @dataclass(frozen=True)
-class ManoeuvreMotion:
+class Motions:
     """
-    Motion of one ship through a manoeuvre.
+    Motions of k ships at the same times; without the axis k that of one.
 
     Attributes
     ----------
     time_s : (n,)
         From the first order on.
-    surge_m_s, sway_m_s : (n,)
-        Speed ahead and to starboard.
-    yaw_rate_rad_s, heading_rad : (n,)
-        To starboard positive.
-    position_m : (n, 2)
-        Ahead and to starboard of where the first order was given.
-    rudder_rad : (n,)
-        Positive where it turns the ship to starboard.
-    """
-
-    time_s: Float64
-    surge_m_s: Float64
-    sway_m_s: Float64
-    yaw_rate_rad_s: Float64
-    heading_rad: Float64
-    position_m: Float64
-    rudder_rad: Float64
-
-
-@dataclass(frozen=True)
-class Motions:
-    """
-    Motions of k ships at the same times.
-
-    Attributes
-    ----------
-    time_s : (n,)
     speeds : (k, n, 3)
-        Surge and sway [m/s], yaw rate [rad/s].
+        Speed ahead and to starboard [m/s], yaw rate [rad/s].
     position_m : (k, n, 2)
-    heading_rad, rudder_rad : (k, n)
-        All as in `ManoeuvreMotion`.
+        Ahead and to starboard of where the first order was given.
+    heading_rad : (k, n)
+        To starboard positive.
+    rudder_rad : (k, n)
+        Positive where it turns the ship to starboard.
     """
 
     time_s: Float64
@@ -108,17 +84,9 @@ class Motions:
     def __len__(self) -> int:
         return len(self.speeds)
 
-    def __getitem__(self, column: int) -> ManoeuvreMotion:
-        surge, sway, yaw = self.speeds[column].T
-        return ManoeuvreMotion(
-            time_s=self.time_s,
-            surge_m_s=surge,
-            sway_m_s=sway,
-            yaw_rate_rad_s=yaw,
-            heading_rad=self.heading_rad[column],
-            position_m=self.position_m[column],
-            rudder_rad=self.rudder_rad[column],
-        )
+    def __getitem__(self, column: int) -> Motions:
+        _, *columns = vars(self).values()
+        return Motions(self.time_s, *(each[column] for each in columns))
 
 
 def zigzag(angle_deg: float, *, first: Side = Side.STARBOARD) -> Manoeuvre:
@@ -157,7 +125,7 @@ def parse(text: str) -> Manoeuvre:
     return zigzag(angle) if kind == 'zigzag' else turn(angle)
 
 
-def overshoots_rad(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> Float64:
+def overshoots_rad(motion: Motions, manoeuvre: Manoeuvre) -> Float64:
     """
     Return by how much the heading exceeds that of the reversal, each time.
 
@@ -166,7 +134,7 @@ def overshoots_rad(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> Float64:
     (m,)
         First to the side of the first turn, then by turns.
     """
-    heading, rate = motion.heading_rad, motion.yaw_rate_rad_s
+    heading, rate = motion.heading_rad, motion.speeds[:, 2]
     ends = np.flatnonzero((rate[1:-1] * rate[2:] < 0.0) | (rate[1:-1] == 0.0)) + 1
     between = rate[ends] - rate[ends + 1]
     step = np.diff(motion.time_s)[ends]
@@ -184,31 +152,21 @@ def overshoots_rad(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> Float64:
 
 
 STATES = 7  # of a path: u, v, r, x, y, heading, rudder
-MotionState = tuple[float, float, float, float, float, float, float]
+# of each derivative: the force that it is of, and the motions that it is multiplied by
+_FORCES = np.array(['XYN'.index(name[0]) for name in FORM])
+_FACTORS = np.array(
+    [['uvrd0'.index(letter) for letter in name[1:].ljust(3, '0')] for name in FORM]
+)
 
 
 class HullModel(NamedTuple):
     """
-    What all columns share.
-
-    Attributes
-    ----------
-    length_m, speed_m_s
-    surge_inertia
-        m' - X'udot.
-    sway_by_y, sway_by_n, yaw_by_y, yaw_by_n
-        Inverse of the inertia in sway and yaw.
-    rate_rad_s, lag_s
-        Rudder machine.
+    What all columns share: inverse of the inertia, length, speed, rate and lag of the rudder.
     """
 
+    mobility: Float64
     length_m: float
     speed_m_s: float
-    surge_inertia: float
-    sway_by_y: float
-    sway_by_n: float
-    yaw_by_y: float
-    yaw_by_n: float
     rate_rad_s: float
     lag_s: float
 
@@ -242,43 +200,30 @@ class Helm(NamedTuple):
 
 
 @compiled
-def _accelerations(
-    hull: HullModel, c: Float64, du: float, v: float, r: float, d: float
-) -> tuple[float, float, float]:
+def _rates(hull: HullModel, c: Float64, state: Float64, rudder: float) -> Float64:
     """
-    Return du/dt, dv/dt, dr/dt in SI.
-
-    `du` is the change of speed; `c` the derivatives in the order of `FORM`.
+    Return the rates of the state in SI; `c` the derivatives (40,) in the order of `FORM`.
     """
-    square = (hull.speed_m_s + du) ** 2 + v * v
+    v, heading = state[1], state[5]
+    ahead = hull.speed_m_s + state[0]
+    square = ahead * ahead + v * v
     speed = np.sqrt(square)
-    u, v, r = du / speed, v / speed, r * hull.length_m / speed
-    vv, uu, dd = v * v, u * u, d * d
-    surge = (
-        u * (c[0] + u * (c[1] + u * c[2]))
-        + vv * c[3]
-        + r * (r * c[4] + v * c[7])
-        + dd * (c[5] + u * c[6])
-        + v * d * (c[8] + u * c[9])
-    )
-    sway = (
-        v * (c[10] + vv * c[12] + u * c[14])
-        + r * (c[11] + vv * c[13] + u * c[15])
-        + d * (c[16] + dd * c[17] + u * c[18] + uu * c[19] + v * d * c[20] + vv * c[21])
-        + (c[22] + u * c[23] + uu * c[24])
-    )
-    yaw = (
-        v * (c[25] + vv * c[27] + u * c[29])
-        + r * (c[26] + vv * c[28] + u * c[30])
-        + d * (c[31] + dd * c[32] + u * c[33] + uu * c[34] + v * d * c[35] + vv * c[36])
-        + (c[37] + u * c[38] + uu * c[39])
-    )
-    force = square / hull.length_m
-    return (
-        force * surge / hull.surge_inertia,
-        force * (hull.sway_by_y * sway + hull.sway_by_n * yaw),
-        force / hull.length_m * (hull.yaw_by_y * sway + hull.yaw_by_n * yaw),
-    )
+    of = np.array((state[0] / speed, v / speed, state[2] * hull.length_m / speed, rudder, 1.0))
+    forces = np.zeros(3)
+    for i in range(len(c)):
+        factors = of[_FACTORS[i, 0]] * of[_FACTORS[i, 1]] * of[_FACTORS[i, 2]]
+        forces[_FORCES[i]] += c[i] * factors
+    rates = np.zeros(STATES - 1)
+    for i in range(3):
+        for j in range(3):
+            rates[i] += hull.mobility[i, j] * forces[j]
+    rates[:3] *= square / hull.length_m
+    rates[2] /= hull.length_m
+    cos, sin = np.cos(heading), np.sin(heading)
+    rates[3] = ahead * cos - v * sin
+    rates[4] = ahead * sin + v * cos
+    rates[5] = state[2]
+    return rates
 
 
 @compiled
@@ -295,57 +240,32 @@ def _rudder(hull: HullModel, d: float, ordered: float, after_s: float) -> float:
 
 
 @compiled
-def _step(
-    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
-) -> MotionState:
+def _step(hull: HullModel, c: Float64, state: Float64, ordered: float, h: float) -> Float64:
     """Return the state a step later, in which the rudder moves smoothly."""
-    du, v, r, x, y, heading, d = state
-    e = 0.5 * h
-    middle_d, end_d = _rudder(hull, d, ordered, e), _rudder(hull, d, ordered, h)
-    du1, v1, r1 = _accelerations(hull, c, du, v, r, d)
-    du2, v2, r2 = _accelerations(hull, c, du + e * du1, v + e * v1, r + e * r1, middle_d)
-    du3, v3, r3 = _accelerations(hull, c, du + e * du2, v + e * v2, r + e * r2, middle_d)
-    du4, v4, r4 = _accelerations(hull, c, du + h * du3, v + h * v3, r + h * r3, end_d)
-    end_du = du + h * (du1 + 2.0 * (du2 + du3) + du4) / 6.0
-    end_v = v + h * (v1 + 2.0 * (v2 + v3) + v4) / 6.0
-    end_heading = heading + h * (r + h * (r1 + r2 + r3) / 6.0)
-    # no force depends on the place: Simpson's rule on the way
-    start = _over_ground(hull, du, v, heading)
-    middle = _over_ground(hull, du + e * du2, v + e * v2, heading + e * (r + 0.5 * e * r1))
-    end = _over_ground(hull, end_du, end_v, end_heading)
-    return (
-        end_du,
-        end_v,
-        r + h * (r1 + 2.0 * (r2 + r3) + r4) / 6.0,
-        x + h * (start[0] + 4.0 * middle[0] + end[0]) / 6.0,
-        y + h * (start[1] + 4.0 * middle[1] + end[1]) / 6.0,
-        end_heading,
-        end_d,
-    )
+    motion = state[:-1]
+    middle, end = _rudder(hull, state[6], ordered, 0.5 * h), _rudder(hull, state[6], ordered, h)
+    first = _rates(hull, c, motion, state[6])
+    second = _rates(hull, c, motion + 0.5 * h * first, middle)
+    third = _rates(hull, c, motion + 0.5 * h * second, middle)
+    fourth = _rates(hull, c, motion + h * third, end)
+    after = np.empty(STATES)
+    after[:-1] = motion + h / 6.0 * (first + 2.0 * (second + third) + fourth)
+    after[6] = end
+    return after
 
 
 @compiled
-def _over_ground(hull: HullModel, du: float, v: float, heading: float) -> tuple[float, float]:
-    cos, sin = np.cos(heading), np.sin(heading)
-    ahead = hull.speed_m_s + du
-    return ahead * cos - v * sin, ahead * sin + v * cos
-
-
-@compiled
-def _advance(
-    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
-) -> MotionState:
+def _advance(hull: HullModel, c: Float64, state: Float64, ordered: float, h: float) -> Float64:
     """Return the state a time later, in two steps where the rudder leaves its largest rate."""
     ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
     if 0.0 < ramp_s < h:
         state = _step(hull, c, state, ordered, ramp_s)
         h -= ramp_s
-    after: MotionState = _step(hull, c, state, ordered, h)
-    return after
+    return _step(hull, c, state, ordered, h)
 
 
 @compiled
-def _reached(before: MotionState, after: MotionState, heading: float, h: float) -> float:
+def _reached(before: Float64, after: Float64, heading: float, h: float) -> float:
     """Return the part of a step after which a heading is reached."""
     low, high = 0.0, 1.0
     gain = after[5] - before[5]
@@ -367,18 +287,20 @@ def _reached(before: MotionState, after: MotionState, heading: float, h: float) 
 def _follow(
     hull: HullModel, helm: Helm, c: Float64, steps: int, looks: int, path: Float64
 ) -> None:
-    """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
-    state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """
+    Follow one ship from steady sailing through a manoeuvre.
+
+    Fills the path (n, STATES), u the change of speed; so many looks of the helmsman between two
+    rows, so many steps of the integration between two looks. Runge-Kutta of fourth order, each
+    step between two kinks of the rudder.
+    """
+    state = np.zeros(STATES)
     for _ in range(helm.approach):
         state = _advance(hull, c, state, 0.0, helm.step_s)
-    # places count from the first order, headings from the course before
-    state = (state[0], state[1], state[2], 0.0, 0.0, state[5], state[6])
+    state[3:5] = 0.0  # places count from the first order, headings from the course before
     side = helm.first
-    for row in range(len(path)):
-        for i in range(STATES):
-            path[row, i] = state[i]
-        if row == len(path) - 1:
-            break
+    path[0] = state
+    for row in range(1, len(path)):
         for _ in range(looks):
             if side * state[5] >= helm.reverse_rad:
                 side = -side
@@ -386,40 +308,14 @@ def _follow(
                 # the derivatives count a rudder that turns the ship to port positive
                 after = _advance(hull, c, state, -side * helm.order_rad, helm.step_s)
                 if helm.attentive and side * after[5] >= helm.reverse_rad:
-                    p = _reached(state, after, side * helm.reverse_rad, helm.step_s)
-                    state = _advance(hull, c, state, -side * helm.order_rad, p * helm.step_s)
+                    part = _reached(state, after, side * helm.reverse_rad, helm.step_s)
+                    before_s = part * helm.step_s
+                    state = _advance(hull, c, state, -side * helm.order_rad, before_s)
                     side = -side
-                    after = _advance(
-                        hull, c, state, -side * helm.order_rad, (1.0 - p) * helm.step_s
-                    )
+                    left_s = helm.step_s - before_s
+                    after = _advance(hull, c, state, -side * helm.order_rad, left_s)
                 state = after
-
-
-@compiled
-def follow_columns(
-    hull: HullModel, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
-) -> None:
-    """
-    Follow ships from steady sailing through one manoeuvre.
-
-    Parameters
-    ----------
-    derivatives : (k, 40)
-        In the order of `FORM`.
-    steps
-        Of the integration between two looks of the helmsman.
-    looks
-        Of the helmsman between two rows of a path.
-    paths : (k, n, STATES)
-        Filled with u, v, r, x, y, heading and rudder angle, u the change of
-        speed; SI.
-
-    Notes
-    -----
-    Runge-Kutta of fourth order, each step between two kinks of the rudder.
-    """
-    for column in range(len(derivatives)):
-        _follow(hull, helm, derivatives[column], steps, looks, paths[column])
+        path[row] = state
 
 
 _STEP_S = 0.5  # of the integration; the rudder, quickest of all, is followed exactly
@@ -521,14 +417,9 @@ def steer(
         approach=round(approach_s * steps / look_s),
     )
     paths = np.empty((len(table), samples, STATES))
-    follow_columns(
-        _hull(ship),
-        helm,
-        np.ascontiguousarray(table, np.float64),
-        steps,
-        looks,
-        paths,
-    )
+    hull = _hull(ship)
+    for column, path in zip(np.asarray(table, np.float64), paths):
+        _follow(hull, helm, column, steps, looks, path)
     paths[..., 0] += ship.speed_m_s
     return Motions(
         sample_s * np.arange(samples, dtype=np.float64),
@@ -540,22 +431,12 @@ def steer(
 
 
 def _hull(ship: SteeredShip) -> HullModel:
-    added, machine = ship.inertial, ship.rudder
-    inertia = np.array(
-        [
-            [ship.mass - added.Yvdot, ship.mass * ship.gravity_centre - added.Yrdot],
-            [ship.mass * ship.gravity_centre - added.Nvdot, ship.yaw_inertia - added.Nrdot],
-        ]
-    )
-    (sway_by_y, sway_by_n), (yaw_by_y, yaw_by_n) = np.linalg.inv(inertia).tolist()
-    return HullModel(
-        length_m=ship.length_m,
-        speed_m_s=ship.speed_m_s,
-        surge_inertia=ship.mass - added.Xudot,
-        sway_by_y=sway_by_y,
-        sway_by_n=sway_by_n,
-        yaw_by_y=yaw_by_y,
-        yaw_by_n=yaw_by_n,
-        rate_rad_s=machine.rate_rad_s,
-        lag_s=machine.lag_s,
-    )
+    added, lever = ship.inertial, ship.mass * ship.gravity_centre
+    inertia = [
+        [ship.mass - added.Xudot, 0.0, 0.0],
+        [0.0, ship.mass - added.Yvdot, lever - added.Yrdot],
+        [0.0, lever - added.Nvdot, ship.yaw_inertia - added.Nrdot],
+    ]
+    mobility = np.asarray(np.linalg.inv(inertia), np.float64)
+    machine = ship.rudder
+    return HullModel(mobility, ship.length_m, ship.speed_m_s, machine.rate_rad_s, machine.lag_s)

@@ -56,30 +56,29 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     assert ship.draught_m is not None
     froude = np.linspace(fitted.hulls.Fr.min(), fitted.hulls.Fr.max(), _POINTS)
     found = fitted.predict(_hull(ship, ship.breadth_m, ship.draught_m, lcb).at(froude))
-    rows = _longest([each.inside for each in found])
+    # the longest stretch that the guard accepts
+    changes = np.flatnonzero(np.diff([each.inside for each in found])) + 1
+    stretches = [part for part in np.split(np.arange(_POINTS), changes) if found[part[0]].inside]
+    rows = max(stretches, key=len, default=np.arange(0))
     if len(rows) < 2:
         # of the Froude number that comes nearest to being accepted
         reasons = min((each.reasons for each in found), key=len)
         raise DataError(f'{ship.name or "ship"}: the fit may not be used for this hull', reasons)
     kept = [found[i] for i in rows]
     value = np.array([each.value for each in kept])
-    if value.max() > _LARGEST:
-        raise DataError(
-            ship.name or 'ship file',
-            [
-                f'wave_coefficient: {value.max():.3g}, expected at most {_LARGEST:g}; the target '
-                'must be c_R itself on the wetted surface, neither times 1000 nor a force'
-            ],
-        )
     relative = float(np.max([each.sd / each.value for each in kept]))
-    if relative > _VAGUE:
-        raise DataError(
-            ship.name or 'ship file',
-            [
-                f'wave_coefficient: the sd is up to {relative:.2g} times the value, expected at '
-                f'most {_VAGUE:g}; the data do not determine it'
-            ],
+    if value.max() > _LARGEST:
+        problems.append(
+            f'wave_coefficient: {value.max():.3g}, expected at most {_LARGEST:g}; the target '
+            'must be c_R itself on the wetted surface, neither times 1000 nor a force'
         )
+    elif relative > _VAGUE:
+        problems.append(
+            f'wave_coefficient: the sd is up to {relative:.2g} times the value, expected at '
+            f'most {_VAGUE:g}; the data do not determine it'
+        )
+    if problems:
+        raise DataError(ship.name or 'ship file', problems)
     low, high = froude[rows[0]], froude[rows[-1]]
     return replace(
         ship,
@@ -104,13 +103,3 @@ def _hull(ship: Ship, breadth_m: float, draught_m: float, lcb: float | None) -> 
         **({} if lcb is None else {'lcb': lcb}),
     }
     return Hulls.of(ship.name, tuple(ratios), np.array([list(ratios.values())]))
-
-
-def _longest(flags: list[bool]) -> range:
-    """Return the longest stretch that is true."""
-    best, start = range(0), 0
-    for i, flag in enumerate([*flags, False]):
-        if not flag:
-            best = max(best, range(start, i), key=len)
-            start = i + 1
-    return best

@@ -10,8 +10,9 @@ published forms of the coefficient stand first.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ class Hulls:
     C_B: Float64
     slenderness: Float64
     Fr: Float64
-    lcb: Float64 | None
+    lcb: Float64 | None = None
 
     @classmethod
     def of(cls, subject: str, names: tuple[str, ...], values: Float64) -> Hulls:
@@ -84,20 +85,12 @@ class Hulls:
         if problems:
             raise DataError(subject, problems)
         product = columns['L_B'] ** 2 * columns['B_T']
-        slenderness = columns.get('slenderness')
-        block = columns.get('C_B')
-        if slenderness is None:
-            slenderness = np.cbrt(product / columns['C_B'])
-        if block is None:
-            block = product / slenderness**3
-        return cls(
-            L_B=columns['L_B'],
-            B_T=columns['B_T'],
-            C_B=block,
-            slenderness=slenderness,
-            Fr=columns['Fr'],
-            lcb=columns.get('lcb'),
-        )
+        if 'slenderness' not in columns:
+            columns['slenderness'] = np.cbrt(product / columns['C_B'])
+        if 'C_B' not in columns:
+            columns['C_B'] = product / columns['slenderness'] ** 3
+        known = (*REQUIRED, *OPTIONAL)
+        return cls(**{name: column for name, column in columns.items() if name in known})
 
     def __len__(self) -> int:
         return len(self.Fr)
@@ -130,25 +123,13 @@ class Hulls:
         _, number = np.unique(np.column_stack(shapes), axis=0, return_inverse=True)
         return number.reshape(-1)
 
-    def longer(self, factor: float) -> Hulls:
+    def moved(self, factor: float, powers: Mapping[str, float]) -> Hulls:
         """
-        Multiply L/B at the same B/T, C_B and Fr.
+        Multiply ratios by powers of a factor.
         """
         return replace(
-            self, L_B=self.L_B * factor, slenderness=self.slenderness * factor ** (2.0 / 3.0)
+            self, **{name: getattr(self, name) * factor**power for name, power in powers.items()}
         )
-
-    def flatter(self, factor: float) -> Hulls:
-        """
-        Multiply B/T at the same slenderness, C_B and Fr.
-        """
-        return replace(self, B_T=self.B_T * factor, L_B=self.L_B * factor**-0.5)
-
-    def faster(self, factor: float) -> Hulls:
-        """
-        Multiply Fr.
-        """
-        return replace(self, Fr=self.Fr * factor)
 
 
 @dataclass(frozen=True)
@@ -160,10 +141,9 @@ class RegressionForm:
     ----------
     name
         Of the form.
-    columns
-        From n hulls to (n, p), one column a coefficient b0, b1, ..
     terms
-        What each column is; psi is the slenderness L / V^(1/3).
+        From n hulls to a column (n,) for each coefficient b0, b1, .., by what it is; psi is the
+        slenderness L / V^(1/3).
     variables
         Ratios of `Hulls` that separate its hulls, Fr included.
     froude_max
@@ -171,8 +151,7 @@ class RegressionForm:
     """
 
     name: str
-    columns: Callable[[Hulls], Float64]
-    terms: tuple[str, ...]
+    terms: Callable[[Hulls], Mapping[str, Float64]]
     variables: tuple[str, ...]
     froude_max: float = float('inf')
 
@@ -181,6 +160,12 @@ class RegressionForm:
         """It cannot be used without the centre of buoyancy."""
         return 'lcb' in self.variables
 
+    def columns(self, hulls: Hulls) -> Float64:
+        """
+        Return (n, p) values of the terms.
+        """
+        return np.column_stack(list(self.terms(hulls).values()))
+
     def place(self, hulls: Hulls) -> Float64:
         """
         Return (n, d) values of `variables`.
@@ -188,81 +173,48 @@ class RegressionForm:
         return np.column_stack([getattr(hulls, name) for name in self.variables])
 
 
-def _sakhnovsky(hulls: Hulls) -> Float64:
+def _sakhnovsky(hulls: Hulls) -> dict[str, Float64]:
     if hulls.lcb is None:
         raise DataError('sakhnovsky', ['lcb: missing, this form needs it'])
-    x1, x2, x3 = hulls.L_B, hulls.B_T, hulls.C_B
-    x4, x5, x6 = hulls.Fr, hulls.lcb, hulls.slenderness
-    terms = (
-        np.ones_like(x1),
-        x1,
-        x2 * x3,
-        x3,
-        x4,
-        x5,
-        x1**2,
-        (x2 * x3 * x5) ** 2,
-        (x3 * x6) ** 2,
-        x4**2,
-        x5**2,
-        x6,
-        x6**2,
-        x3 * x4,
-        (x2 * x6) ** 2,
-    )
-    return np.column_stack(terms)
+    return {
+        '1': np.ones_like(hulls.Fr),
+        'L/B': hulls.L_B,
+        '(B/T) C_B': hulls.B_T * hulls.C_B,
+        'C_B': hulls.C_B,
+        'Fr': hulls.Fr,
+        'lcb': hulls.lcb,
+        '(L/B)²': hulls.L_B**2,
+        '((B/T) C_B lcb)²': (hulls.B_T * hulls.C_B * hulls.lcb) ** 2,
+        '(C_B psi)²': (hulls.C_B * hulls.slenderness) ** 2,
+        'Fr²': hulls.Fr**2,
+        'lcb²': hulls.lcb**2,
+        'psi': hulls.slenderness,
+        'psi²': hulls.slenderness**2,
+        'C_B Fr': hulls.C_B * hulls.Fr,
+        '((B/T) psi)²': (hulls.B_T * hulls.slenderness) ** 2,
+    }
 
 
-def _sirotina(hulls: Hulls) -> Float64:
-    x1 = hulls.Fr * np.sqrt(hulls.slenderness)  # Fr_V = v / sqrt(g V^(1/3))
-    x2 = hulls.L_B - 7.88
-    x3 = 2.0 * (hulls.B_T - 4.21)
-    x4 = 10.0 * (hulls.C_B - 0.819)
-    terms = (
-        np.ones_like(x1),
-        x1,
-        x2,
-        x3,
-        x4,
-        x1**2,
-        x1 * x2,
-        x1 * x3,
-        x1 * x4,
-        x2**2,
-        x2 * x3,
-        x2 * x4,
-        x3**2,
-        x3 * x4,
-        x4**2,
-    )
-    return np.column_stack(terms)
+def _sirotina(hulls: Hulls) -> dict[str, Float64]:
+    linear = {
+        'Fr_V': hulls.Fr * np.sqrt(hulls.slenderness),  # v / sqrt(g V^(1/3))
+        # about the middle of the series
+        '(L/B - 7.88)': hulls.L_B - 7.88,
+        '(2 B/T - 8.42)': 2.0 * (hulls.B_T - 4.21),
+        '(10 C_B - 8.19)': 10.0 * (hulls.C_B - 0.819),
+    }
+    squares = {
+        f'{one}²' if one == other else f'{one} {other}': linear[one] * linear[other]
+        for one, other in combinations_with_replacement(linear, 2)
+    }
+    return {'1': np.ones_like(hulls.Fr), **linear, **squares}
 
-
-_SAKHNOVSKY_TERMS = (
-    *('1', 'L/B', '(B/T) C_B', 'C_B', 'Fr', 'lcb', '(L/B)²', '((B/T) C_B lcb)²', '(C_B psi)²'),
-    *('Fr²', 'lcb²', 'psi', 'psi²', 'C_B Fr', '((B/T) psi)²'),
-)
-# Fr_V = v / sqrt(g V^(1/3)); the others about the middle of the series
-_SIROTINA = ('Fr_V', '(L/B - 7.88)', '(2 B/T - 8.42)', '(10 C_B - 8.19)')
-_SIROTINA_TERMS = (
-    '1',
-    *_SIROTINA,
-    *(
-        f'{one}²' if one == other else f'{one} {other}'
-        for i, one in enumerate(_SIROTINA)
-        for other in _SIROTINA[i:]
-    ),
-)
 
 # S4 (1) and (2)
 SAKHNOVSKY = RegressionForm(
-    'sakhnovsky',
-    _sakhnovsky,
-    _SAKHNOVSKY_TERMS,
-    ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'),
-    froude_max=0.14,
+    'sakhnovsky', _sakhnovsky, ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'), froude_max=0.14
 )
-SIROTINA = RegressionForm('sirotina', _sirotina, _SIROTINA_TERMS, ('L_B', 'B_T', 'C_B', 'Fr'))
+SIROTINA = RegressionForm('sirotina', _sirotina, ('L_B', 'B_T', 'C_B', 'Fr'))
 FORMS = {form.name: form for form in (SAKHNOVSKY, SIROTINA)}
 
 
@@ -283,8 +235,8 @@ class Expectation:
     ----------
     text
         What is expected, to be stated where it is not met.
-    move
-        Multiplies a ratio of hulls, the ratios tied to it along.
+    powers
+        Of the factor by which a ratio is multiplied, for it and the ratios tied to it.
     sign
         +1 where resistance rises with the ratio, -1 where it falls.
     froude_max
@@ -298,15 +250,18 @@ class Expectation:
     """
 
     text: str
-    move: Callable[[Hulls, float], Hulls]
+    powers: Mapping[str, float]
     sign: int
     froude_max: float = float('inf')
 
 
+FASTER = {'Fr': 1.0}
+LONGER = {'L_B': 1.0, 'slenderness': 2.0 / 3.0}
+FLATTER = {'B_T': 1.0, 'L_B': -0.5}
 EXPECTATIONS = (
-    Expectation(f'rises with Fr below {_HUMP:g}', Hulls.faster, 1, _HUMP),
-    Expectation('falls with L/B at the same B/T and C_B', Hulls.longer, -1),
-    Expectation('rises with B/T at the same slenderness and C_B', Hulls.flatter, 1),
+    Expectation(f'rises with Fr below {_HUMP:g}', FASTER, 1, _HUMP),
+    Expectation('falls with L/B at the same B/T and C_B', LONGER, -1),
+    Expectation('rises with B/T at the same slenderness and C_B', FLATTER, 1),
 )
 
 
@@ -349,12 +304,12 @@ class ResidualFit:
         Return the document of the fit, as JSON has it.
         """
 
-        def named(values: Sequence[float]) -> dict[str, float]:
+        def named(values: Iterable[object]) -> dict[str, object]:
             return {f'b{i}': value for i, value in enumerate(values)}
 
         return {
             'form': self.form.name,
-            'terms': {f'b{i}': term for i, term in enumerate(self.form.terms)},
+            'terms': named(self.terms),
             'coefficients': named(self.fit.coefficients.tolist()),
             'coefficient_sd': named(self.coefficient_sd.tolist()),
             'F': self.criterion,
@@ -365,6 +320,11 @@ class ResidualFit:
             'domain': self.domain.ranges,
             'notes': self.notes,
         }
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """What each coefficient stands before."""
+        return tuple(self.form.terms(self.hulls))
 
     @property
     def coefficient_sd(self) -> Float64:
@@ -415,8 +375,10 @@ class ResidualFit:
 
     def _wrong_trends(self, hulls: Hulls) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         for expected in EXPECTATIONS:
-            up = self.form.columns(expected.move(hulls, 1.0 + _STEP))
-            down = self.form.columns(expected.move(hulls, 1.0 - _STEP))
+            up, down = (
+                self.form.columns(hulls.moved(1.0 + step, expected.powers))
+                for step in (_STEP, -_STEP)
+            )
             along = (up - down) / (2.0 * _STEP)
             slope = expected.sign * self.fit.predict(along)
             sd = self.spread * np.sqrt(self.fit.variance * self.fit.leverage(along))

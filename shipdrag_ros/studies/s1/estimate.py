@@ -74,8 +74,6 @@ class Solution:
     ----------
     fit
         The polynomial of the order chosen.
-    order
-        Number of its coefficients.
     trials
         The order table.
     noise_sd
@@ -87,11 +85,15 @@ class Solution:
     """
 
     fit: PolynomialMotion
-    order: int
     trials: tuple[OrderTrial, ...]
     noise_sd: dict[str, float]
     reorthogonalised: int
     notes: tuple[str, ...]
+
+    @property
+    def order(self) -> int:
+        """Number of the coefficients."""
+        return len(self.fit.coefficients)
 
 
 def solve_one(data: ScalarInput) -> Solution:
@@ -113,7 +115,6 @@ def solve_one(data: ScalarInput) -> Solution:
     speed, position = (unused, table.variance) if data.is_place else (table.variance, unused)
     return Solution(
         PolynomialMotion(data.scale, basis, coefficients[:order], root, int(data.is_place)),
-        order,
         _trials(table, speed, position),
         {data.name: math.sqrt(table.variance[row])},
         basis.reorthogonalised,
@@ -183,7 +184,6 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     root = unscaled if trusted else unscaled * math.sqrt(table.variance[row])
     return Solution(
         PolynomialMotion(scale, basis, coefficients, root, speed_at=1),
-        order,
         _trials(table, variances[1], variances[0]),
         {data.name: math.sqrt(variances[i, row]) for i, data in enumerate(inputs)},
         basis.reorthogonalised + sum(solution.reorthogonalised for solution in alone),
@@ -235,17 +235,17 @@ _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is ev
 class _Requirement:
     """What a problem needs."""
 
-    speed: bool
-    position: bool
+    inputs: tuple[str, ...]
     stamps: int  # of each input, at least
     order: int  # coefficients without which there is no deceleration
 
 
+_SPEED = 'speed_through_water'
 # joint: fewer stamps of an input do not show its noise, hence not its weight
 PROBLEMS = {
-    's1_speed': _Requirement(speed=True, position=False, stamps=4, order=2),
-    's1_position': _Requirement(speed=False, position=True, stamps=4, order=3),
-    's1_joint': _Requirement(speed=True, position=True, stamps=12, order=3),
+    's1_speed': _Requirement((_SPEED,), stamps=4, order=2),
+    's1_position': _Requirement(('position',), stamps=4, order=3),
+    's1_joint': _Requirement((_SPEED, 'position'), stamps=12, order=3),
 }
 
 
@@ -311,19 +311,18 @@ def _inputs(
 ) -> tuple[tuple[ScalarInput, ...], tuple[str, ...]]:
     """Return the inputs that are used, the speed first, and what is to be said of them."""
     problem = PROBLEMS[parameters.estimator]
-    speed = 'speed_through_water'
+    names = problem.inputs
     notes: tuple[str, ...] = ()
     enough = PROBLEMS['s1_speed'].stamps
-    if len(window.speed_through_water) < enough <= len(window.speed_over_ground):
-        speed = 'speed_over_ground'
-    names = [speed] * problem.speed + ['position'] * problem.position
-    for name in names:
-        _check(name, window.series(name), problem.stamps, parameters.estimator)
-    if 'speed_over_ground' in names:
+    over_ground = len(window.speed_through_water) < enough <= len(window.speed_over_ground)
+    if over_ground and _SPEED in names:
+        names = ('speed_over_ground', *names[1:])
         notes = (
             'speed over ground was used as the speed, there is none through water: '
             'a current is part of it',
         )
+    for name in names:
+        _check(name, window.series(name), problem.stamps, parameters.estimator)
     return tuple(_scalar(name, window.series(name), parameters) for name in names), notes
 
 

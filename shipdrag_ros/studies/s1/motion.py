@@ -8,12 +8,11 @@ does not fall r(v) has two values: only the branch on which it falls is kept.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import AtEnd
 from shipdrag_ros.estimation.result import ResistanceCurve
@@ -22,9 +21,6 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
 
 _MIN_POINTS = 3  # fewer are no curve
-
-
-_RESISTANCE, _SIGMA, _REPEATABLE, _SLOPE, _SLOPE_SIGMA = range(5)  # rows of `_of_motion`
 
 
 @dataclass(frozen=True)
@@ -49,8 +45,8 @@ class Motion:
     acceleration_error: Float64
     jerk_error: Float64
 
-    def __getitem__(self, part: slice) -> Motion:
-        return Motion(*(each[part] for each in vars(self).values()))
+    def __getitem__(self, part: slice | NDArray[np.intp]) -> Motion:
+        return Motion(*(np.ascontiguousarray(each[part]) for each in vars(self).values()))
 
 
 @dataclass(frozen=True)
@@ -115,69 +111,33 @@ def sigma(error: Float64) -> Float64:
     return result
 
 
-@compiled('f8[:, ::1](f8[:], f8[:], f8[:], f8[:, :], f8[:, :], f8[::1], f8)')
-def _of_motion(
-    speed: Float64,
-    acceleration: Float64,
-    jerk: Float64,
-    acceleration_error: Float64,
-    jerk_error: Float64,
-    n_r: Float64,
-    n_r_sd: float,
-) -> Float64:
+def _resistance(motion: Motion, ship: Ship) -> ResistanceCurve:
     """
-    Return r, its sigmas, dr/dv and its sigma, in the order of time.
-
-    With a = dv/dt: dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a); its error is of the motion alone.
-    """
-    found = np.empty((5, len(speed)))
-    for i in range(len(speed)):
-        v, a = abs(speed[i]), acceleration[i]
-        inertia, by_v = 0.0, 0.0
-        for c in n_r[::-1]:
-            by_v = inertia + by_v * v
-            inertia = c + inertia * v
-        inertia += 1.0
-        # at rest r has no slope
-        per_a = 1.0 / a if a != 0.0 else np.nan
-        by_a = by_v - inertia * jerk[i] * per_a * per_a
-        of_acceleration = of_slope = 0.0
-        for k in range(acceleration_error.shape[1]):
-            error = acceleration_error[i, k]
-            of_acceleration += error * error
-            error = inertia * per_a * jerk_error[i, k] + by_a * error
-            of_slope += error * error
-        repeatable = inertia * math.sqrt(of_acceleration)
-        found[_RESISTANCE, i] = 0.0 - inertia * a  # no negative zero
-        found[_SIGMA, i] = math.sqrt(repeatable**2 + (a * n_r_sd) ** 2)
-        found[_REPEATABLE, i] = repeatable
-        found[_SLOPE, i] = -(inertia * jerk[i] * per_a + by_v * a)
-        found[_SLOPE_SIGMA, i] = math.sqrt(of_slope)
-    return found
-
-
-def _resistance(motion: Motion, ship: Ship) -> Float64:
-    return _of_motion(
-        motion.speed,
-        motion.acceleration,
-        motion.jerk,
-        motion.acceleration_error,
-        motion.jerk_error,
-        ship.n_r_polynomial(),
-        ship.added_mass.sd,
-    )
-
-
-def specific_resistance(motion: Motion, ship: Ship) -> tuple[Float64, Float64, Float64]:
-    """
-    Return r, its sigma, and its sigma without the error of n_r.
+    Return r and its slope at the times of a motion.
 
     Notes
     -----
-    S1 (12, 13); the error of n_r is independent of that of the motion.
+    S1 (12, 13); the error of n_r is independent of that of the motion. With a = dv/dt:
+    dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a); its error is of the motion alone.
     """
-    found = _resistance(motion, ship)
-    return found[_RESISTANCE], found[_SIGMA], found[_REPEATABLE]
+    speed, a, jerk = motion.speed, motion.acceleration, motion.jerk
+    n_r = np.polynomial.Polynomial(ship.n_r_polynomial())
+    inertia, by_v = 1.0 + n_r(np.abs(speed)), n_r.deriv()(np.abs(speed))
+    per_a = 1.0 / np.where(a == 0.0, np.nan, a)  # at rest r has no slope
+    by_a = by_v - inertia * jerk * per_a**2
+    by_jerk = inertia * per_a
+    slope_error = by_jerk[:, None] * motion.jerk_error + by_a[:, None] * motion.acceleration_error
+    repeatable = inertia * sigma(motion.acceleration_error)
+    per_froude = float(ship.speed(1.0))
+    return ResistanceCurve(
+        speed,
+        0.0 - inertia * a,  # no negative zero
+        np.hypot(repeatable, a * ship.added_mass.sd),
+        repeatable,
+        ship.froude(speed),
+        -per_froude * (by_jerk * jerk + by_v * a),
+        per_froude * sigma(slope_error),
+    )
 
 
 def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> ResistanceCurve:
@@ -197,47 +157,20 @@ def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> Resist
     EstimationError
         If there is no such branch.
     """
-    froude = ship.froude(motion.speed)
-    first, end = _falling(motion.speed, motion.acceleration, froude, froude_min)
-    if end - first < _MIN_POINTS:
-        low, high = float(motion.speed.min()), float(motion.speed.max())
+    speed, froude = motion.speed, ship.froude(motion.speed)
+    usable = (motion.acceleration < 0.0) & (froude >= froude_min)
+    goes_on = usable[1:] & usable[:-1] & (np.diff(speed) < 0.0)
+    falls = np.split(np.arange(len(speed)), np.flatnonzero(~goes_on) + 1)
+    longest = max(falls, key=lambda times: speed[times[0]] - speed[times[-1]])
+    if len(longest) < _MIN_POINTS:
+        low, high = float(speed.min()), float(speed.max())
         raise EstimationError(
             f'the fitted speed, {low:.4g}..{high:.4g} m/s (Fr {ship.froude(low):.3g}..'
             f'{ship.froude(high):.3g}), does not fall steadily above froude_min {froude_min:g}: '
             'give a window that lies in a coastdown, or a smaller froude_min'
         )
-    branch = motion[first:end]
-    # from the lowest speed to the highest, in fresh arrays
-    found = _resistance(branch, ship)[:, ::-1].copy()
-    per_froude = float(ship.speed(1.0))
-    return ResistanceCurve(
-        branch.speed[::-1].copy(),
-        found[_RESISTANCE],
-        found[_SIGMA],
-        found[_REPEATABLE],
-        froude[first:end][::-1].copy(),
-        per_froude * found[_SLOPE],
-        per_froude * found[_SLOPE_SIGMA],
-    )
-
-
-@compiled('UniTuple(i8, 2)(f8[:], f8[:], f8[:], f8)')
-def _falling(
-    speed: Float64, acceleration: Float64, froude: Float64, froude_min: float
-) -> tuple[int, int]:
-    """Find the times of the longest fall, first and end."""
-    best_first = best_end = first = 0
-    longest = -np.inf
-    for i in range(len(speed)):
-        usable = acceleration[i] < 0.0 and froude[i] >= froude_min
-        if not usable:
-            first = i + 1
-        elif i == first or not speed[i] < speed[i - 1]:
-            first = i
-        elif speed[first] - speed[i] > longest:
-            best_first, best_end = first, i + 1
-            longest = speed[first] - speed[i]
-    return best_first, best_end
+    # from the lowest speed to the highest
+    return _resistance(motion[longest[::-1]], ship)
 
 
 def at_end(motion: Motion, ship: Ship) -> AtEnd:
@@ -245,6 +178,6 @@ def at_end(motion: Motion, ship: Ship) -> AtEnd:
     Return speed and r at the last time of a motion.
     """
     end = motion[-1:]
-    r, r_sigma, _ = specific_resistance(end, ship)
-    speed_sigma = sigma(end.speed_error)
-    return AtEnd(float(end.speed[0]), float(speed_sigma[0]), float(r[0]), float(r_sigma[0]))
+    r = _resistance(end, ship)
+    each = (end.speed, sigma(end.speed_error), r.resistance_m_s2, r.sigma_m_s2)
+    return AtEnd(*(float(one[0]) for one in each))

@@ -230,22 +230,6 @@ def vary(simulate: Simulator, names: Sequence[str], values: Float64, steps: Floa
     return Responses(tuple(names), steps, differences)
 
 
-def relative(names: Sequence[str], values: Float64, changes: Sequence[float] = CHANGES) -> Float64:
-    """
-    Return steps (p, c) that are fractions of the values.
-
-    Raises
-    ------
-    SensitivityError
-        Naming the values that are 0, of which a fraction changes nothing.
-    """
-    if zero := [name for name, value in zip(names, values) if value == 0.0]:
-        raise SensitivityError(
-            f'{", ".join(zero)}: 0, of which a fraction changes nothing; leave it out'
-        )
-    return np.multiply.outer(values, np.asarray(changes, np.float64))
-
-
 def partial_contribution(slopes: Float64) -> Float64:
     """
     Return the part of each response that is orthogonal to all others.

@@ -18,7 +18,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 from shipdrag_ros.studies.manoeuvring.simulate import (
     Manoeuvre,
-    ManoeuvreMotion,
+    Motions,
     overshoots_rad,
     steer,
     turn,
@@ -30,9 +30,7 @@ from shipdrag_ros.studies.sensitivity.loss import (
     Norm,
     Responses,
     Selection,
-    Simulator,
     partial_contribution,
-    relative,
     vary,
 )
 
@@ -90,8 +88,8 @@ class ReducedModelCheck:
     """
 
     manoeuvre: Manoeuvre
-    full: ManoeuvreMotion
-    reduced: ManoeuvreMotion
+    full: Motions
+    reduced: Motions
 
     @property
     def overshoots_rad(self) -> tuple[Float64, Float64]:
@@ -105,11 +103,11 @@ class ReducedModelCheck:
     def rms_difference(self) -> dict[str, float]:
         """Root mean square over the manoeuvre, by quantity; not finite where a model is lost."""
         names = ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad')
-        pairs = ((getattr(self.full, name), getattr(self.reduced, name)) for name in names)
-        return {
-            name: float(np.sqrt(np.mean((full - reduced) ** 2)))
-            for name, (full, reduced) in zip(names, pairs)
-        }
+        full, reduced = (
+            np.column_stack([motion.speeds, motion.heading_rad])
+            for motion in (self.full, self.reduced)
+        )
+        return dict(zip(names, np.sqrt(np.mean((full - reduced) ** 2, axis=0)).tolist()))
 
 
 @dataclass(frozen=True)
@@ -128,12 +126,11 @@ class SteeringStudy:
         By the root mean square.
     check
         Of the derivatives that are kept.
-    groups
-        Losses where derivatives that are one measurement change together.
-    group_selection
-        As many measurements as the kept derivatives hold.
+    group_derivatives
+        Those of as many measurements as the kept ones hold, chosen where derivatives that are
+        one measurement change together.
     group_check
-        Of all derivatives of these measurements.
+        Of these.
     """
 
     ship: SteeredShip
@@ -142,8 +139,7 @@ class SteeringStudy:
     mean_norms: Losses
     selection: Selection
     check: ReducedModelCheck
-    groups: Losses
-    group_selection: Selection
+    group_derivatives: tuple[str, ...]
     group_check: ReducedModelCheck
 
     def to_dict(self) -> dict[str, Any]:
@@ -170,11 +166,6 @@ class SteeringStudy:
     def independent(self) -> int:
         """How many measurements the kept derivatives hold."""
         return _independent(self.ship, self.selection.kept)
-
-    @property
-    def group_derivatives(self) -> tuple[str, ...]:
-        """All derivatives of the kept measurements."""
-        return _of_groups(self.ship, self.group_selection.kept)
 
     @property
     def norms_agree(self) -> bool:
@@ -223,56 +214,36 @@ class Experiment:
         return tuple(self.manoeuvres[i] for i in np.argmax(self.loss, axis=1))
 
 
-def simulator(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0) -> Simulator:
+def respond(
+    ship: SteeredShip,
+    manoeuvre: Manoeuvre,
+    *,
+    together: bool = False,
+    changes: Sequence[float] = CHANGES,
+    control_s: float = 0.0,
+) -> Responses:
     """
-    Return motions (k, n, 3) of a manoeuvre as a function of the derivatives.
+    Change each derivative by fractions of it; u, v and r are pure numbers.
 
     Parameters
     ----------
+    together
+        Whether derivatives that are one measurement change together, under the name of the first.
     control_s
         As in `steer`. A helmsman who looks now and then reverses a whole look
         earlier or later after the smallest change, which hides it; hence he
         reverses at the very moment by default.
     """
+    groups = ship.groups if together else tuple((name,) for name in FORM)
+    place = [next(i for i, group in enumerate(groups) if name in group) for name in FORM]
     scale = np.array([1.0, 1.0, 1.0 / ship.length_m]) * ship.speed_m_s
 
-    def simulate(derivatives: Float64) -> Float64:
+    def simulate(factors: Float64) -> Float64:
+        derivatives = ship.values * factors[:, place]
         return steer(ship, manoeuvre, derivatives, control_s=control_s).speeds / scale
 
-    return simulate
-
-
-def respond(
-    ship: SteeredShip,
-    manoeuvre: Manoeuvre,
-    *,
-    changes: Sequence[float] = CHANGES,
-    control_s: float = 0.0,
-) -> Responses:
-    """
-    Change each derivative by fractions of it; `control_s` as in `simulator`.
-    """
-    simulate = simulator(ship, manoeuvre, control_s=control_s)
-    return vary(simulate, FORM, ship.values, relative(FORM, ship.values, changes))
-
-
-def respond_by_groups(
-    ship: SteeredShip, manoeuvre: Manoeuvre, *, changes: Sequence[float] = CHANGES
-) -> Responses:
-    """
-    Change derivatives that are one measurement together.
-
-    Each group has the name of its first.
-    """
-    simulate = simulator(ship, manoeuvre)
-    names = [group[0] for group in ship.groups]
-    place = np.array([names.index(ship.multiples.get(name, name)) for name in FORM])
-    factors = np.ones(len(names))
-
-    def simulate_groups(sets: Float64) -> Float64:
-        return simulate(ship.values * sets[:, place])
-
-    return vary(simulate_groups, names, factors, relative(names, factors, changes))
+    names = [group[0] for group in groups]
+    return vary(simulate, names, np.ones(len(names)), np.tile(changes, (len(names), 1)))
 
 
 def check(
@@ -310,8 +281,9 @@ def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStud
     responses = respond(ship, manoeuvre)
     losses = responses.losses()
     selection = losses.select(keep)
-    groups = respond_by_groups(ship, manoeuvre).losses()
-    group_selection = groups.select(_independent(ship, selection.kept))
+    measured = respond(ship, manoeuvre, together=True).losses()
+    firsts = measured.select(_independent(ship, selection.kept)).kept
+    derivatives = tuple(name for group in ship.groups if group[0] in firsts for name in group)
     return SteeringStudy(
         ship=ship,
         manoeuvre=manoeuvre,
@@ -319,9 +291,8 @@ def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStud
         mean_norms=responses.losses(Norm.MEAN_NORM),
         selection=selection,
         check=check(ship, selection.kept),
-        groups=groups,
-        group_selection=group_selection,
-        group_check=check(ship, _of_groups(ship, group_selection.kept)),
+        group_derivatives=derivatives,
+        group_check=check(ship, derivatives),
     )
 
 
@@ -343,7 +314,3 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
 
 def _independent(ship: SteeredShip, kept: Sequence[str]) -> int:
     return len({ship.multiples.get(name, name) for name in kept})
-
-
-def _of_groups(ship: SteeredShip, kept: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for group in ship.groups if group[0] in kept for name in group)

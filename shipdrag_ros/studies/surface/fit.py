@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,37 +50,26 @@ def terms_up_to(degree: int, most: Sequence[int]) -> Powers:
     return np.array(sorted(found, key=sum), np.int64).reshape(-1, len(most))
 
 
-@compiled('f8[:, ::1](f8[:, ::1], i8[:, ::1], f8[::1], i8)')
-def _evaluate(points: Float64, steps: Powers, coefficients: Float64, slopes: int) -> Float64:
+@compiled('f8[::1](f8[:, ::1], i8[:, ::1], f8[::1])')
+def _evaluate(points: Float64, steps: Powers, coefficients: Float64) -> Float64:
     """
-    Evaluate at (d, m) scaled points, and the first `slopes` derivatives.
+    Evaluate at (d, m) scaled points.
 
     Row t of `steps`: the earlier term that term t is a multiple of, and by
     which variable.
     """
     count = points.shape[1]
-    terms = len(coefficients)
-    result = np.zeros((1 + slopes, count))
-    value = np.empty((terms, _BLOCK))
-    slope = np.zeros((slopes, terms, _BLOCK))
+    result = np.full(count, coefficients[0])
+    value = np.ones((len(coefficients), _BLOCK))
     # so many points at a time as stay in the fastest memory
     for first in range(0, count, _BLOCK):
         size = min(_BLOCK, count - first)
-        z = points[:, first : first + size]
-        out = result[:, first : first + size]
-        value[0] = 1.0
-        for i in range(size):
-            out[0, i] = coefficients[0]
-        for t in range(1, terms):
+        z, here = points[:, first : first + size], result[first : first + size]
+        for t in range(1, len(coefficients)):
             before, by, c = steps[t, 0], steps[t, 1], coefficients[t]
             for i in range(size):
                 value[t, i] = value[before, i] * z[by, i]
-                out[0, i] += c * value[t, i]
-            for j in range(slopes):
-                own = 1.0 if j == by else 0.0
-                for i in range(size):
-                    slope[j, t, i] = slope[j, before, i] * z[by, i] + own * value[before, i]
-                    out[1 + j, i] += c * slope[j, t, i]
+                here[i] += c * value[t, i]
     return result
 
 
@@ -109,14 +97,15 @@ class Polynomial:
         """
         Return the values at (m, d) points.
         """
-        values: Float64 = self._at(points, 0)[0]
-        return values
+        scaled = np.ascontiguousarray(((points - self.centre) / self.half).T)
+        return _evaluate(scaled, self._steps, self.coefficients)
 
     def gradient(self, points: Float64) -> Float64:
         """
         Return the derivatives by each variable at (m, d) points; (m, d).
         """
-        return self._at(points, len(self.centre))[1:].T / self.half
+        slopes = [self.derivative(variable)(points) for variable in range(len(self.centre))]
+        return np.column_stack(slopes)
 
     def derivative(self, variable: int) -> Polynomial:
         """
@@ -129,10 +118,6 @@ class Polynomial:
         factor = powers[:, variable] / self.half[variable]
         powers[:, variable] -= 1
         return replace(self, powers=powers, coefficients=self.coefficients[has] * factor)
-
-    def _at(self, points: Float64, slopes: int) -> Float64:
-        scaled = np.ascontiguousarray(((points - self.centre) / self.half).T)
-        return _evaluate(scaled, self._steps, self.coefficients, slopes)
 
     @cached_property
     def _steps(self) -> Powers:
@@ -160,19 +145,11 @@ class Polynomial:
         -----
         ((x - c) / h)^p = sum_k binomial(p, k) x^k (-c)^(p - k) / h^p.
         """
-        result = np.zeros((len(self.powers), len(self.powers)))
-        for column, high in enumerate(self.powers):
-            for row, low in enumerate(self.powers):
-                if np.all(low <= high):
-                    result[row, column] = np.prod(
-                        [
-                            comb(p, k) * (-c) ** (p - k) / h**p
-                            for p, k, c, h in zip(
-                                high.tolist(), low.tolist(), self.centre, self.half
-                            )
-                        ]
-                    )
-        return result
+        from scipy.special import comb  # slow to import
+
+        high, low = self.powers[None], self.powers[:, None]
+        shift = (-self.centre) ** np.maximum(high - low, 0)
+        return np.asarray(np.prod(comb(high, low) * shift / self.half**high, axis=2))
 
     def source(self, name: str, inputs: Sequence[str], note: str) -> str:
         """
@@ -274,14 +251,12 @@ class Domain:
     @cached_property
     def lower(self) -> Float64:
         """(d,) Least value of each variable."""
-        least: Float64 = self.points.min(axis=0)
-        return least
+        return np.asarray(self.points.min(axis=0))
 
     @cached_property
     def upper(self) -> Float64:
         """(d,) Largest value of each variable."""
-        largest: Float64 = self.points.max(axis=0)
-        return largest
+        return np.asarray(self.points.max(axis=0))
 
     @property
     def ranges(self) -> dict[str, list[float]]:
@@ -412,8 +387,7 @@ class Surface:
     def sd(self) -> Float64:
         """(terms,) Standard deviations of `coefficients`."""
         spread = np.einsum('ij,jk,ik->i', self._raw, self.fit.covariance, self._raw)
-        deviations: Float64 = np.sqrt(spread)
-        return deviations
+        return np.asarray(np.sqrt(spread))
 
     @cached_property
     def _raw(self) -> Float64:

@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The values that come with the package, and how they are read."""
+"""The values that come with the package."""
 
 from __future__ import annotations
 
 import csv
 import os
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip, mariner
-
-TEXT = files('shipdrag_ros').joinpath('data', 'mariner.yaml').read_text(encoding='utf-8')
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 
 
 def test_the_form_has_forty_derivatives_and_the_file_a_value_of_each():
@@ -49,19 +45,3 @@ def test_a_published_table_has_the_same_values():
     assert set(table) == set(stated)
     for name, value in table.items():
         assert stated[name] == pytest.approx(value, rel=1e-12), name
-
-
-@pytest.mark.parametrize(
-    ('old', 'new', 'message'),
-    [
-        ('  Xuu: -110.0e-5\n', '', 'Xuu missing or unknown'),
-        ('  Xuu:', '  Xu4:', 'Xu4, Xuu missing or unknown'),
-        ('mass: 798.0e-5', 'mass: 798', 'mass: 798, expected'),
-        ('lag_s: 1.0', 'lag_s: 0', 'rudder.lag_s: 0'),
-        ('  Xudd: Xdd', '  Xudd: 3', 'multiples.Xudd: 3'),
-    ],
-)
-def test_a_file_that_cannot_be_used_is_told_by_its_key(old, new, message):
-    assert old in TEXT
-    with pytest.raises(ShipFileError, match=message):
-        SteeredShip.from_yaml(TEXT.replace(old, new), subject='changed')

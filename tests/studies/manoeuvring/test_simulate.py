@@ -78,9 +78,9 @@ def integrated(manoeuvre, time_s):
 def test_agrees_with_an_independent_integration(manoeuvre):
     motion = steer(SHIP, manoeuvre, samples=301, control_s=0.0)[0]
     expected = integrated(manoeuvre, motion.time_s)
-    np.testing.assert_allclose(motion.surge_m_s - U, expected[:, 0], rtol=0, atol=2e-6)
-    np.testing.assert_allclose(motion.sway_m_s, expected[:, 1], rtol=0, atol=2e-6)
-    np.testing.assert_allclose(motion.yaw_rate_rad_s, expected[:, 2], rtol=0, atol=1e-7)
+    expected[:, 0] += U
+    np.testing.assert_allclose(motion.speeds[:, :2], expected[:, :2], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(motion.speeds[:, 2], expected[:, 2], rtol=0, atol=1e-7)
     np.testing.assert_allclose(motion.position_m, expected[:, 3:5], rtol=0, atol=2e-3)
     np.testing.assert_allclose(motion.heading_rad, expected[:, 5], rtol=0, atol=1e-6)
     np.testing.assert_allclose(motion.rudder_rad, -expected[:, 6], rtol=0, atol=1e-6)
@@ -125,8 +125,8 @@ def test_without_the_propeller_sides_are_alike(angle, seed, kind):
     starboard, port = (
         steer(SHIP, kind(angle, first=side), values, control_s=0.0)[0] for side in Side
     )
-    mirrored = {'surge_m_s': 1.0, 'position_m': np.array([1.0, -1.0])}
-    for name in ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad', 'position_m'):
+    mirrored = {'speeds': np.array([1.0, -1.0, -1.0]), 'position_m': np.array([1.0, -1.0])}
+    for name in ('speeds', 'heading_rad', 'position_m'):
         np.testing.assert_allclose(
             getattr(port, name),
             mirrored.get(name, -1.0) * getattr(starboard, name),

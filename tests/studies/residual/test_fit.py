@@ -17,7 +17,10 @@ from scipy import stats
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import (
+    FASTER,
+    FLATTER,
     FORMS,
+    LONGER,
     Hulls,
     RegressionForm,
     fit_form,
@@ -53,7 +56,7 @@ def test_nine_hulls_leave_the_form_open(form, rank, fleet, resistance):
     assert 'How far a new hull is off is not known' in found.notes[1]
     # the hulls themselves may be asked for, all others not
     assert all(each.inside for each in found.predict(hulls))
-    between = found.predict(hulls.take(np.array([0, 9])).longer(1.01))
+    between = found.predict(hulls.take(np.array([0, 9])).moved(1.01, LONGER))
     for each in between:
         assert f'the data determine {rank} of 15' in ' '.join(each.reasons)
         assert each.sd == np.inf
@@ -71,9 +74,9 @@ def test_outside_is_refused_with_the_reason(fleet: Fleet, resistance: Resistance
     assert inside.inside
     assert abs(inside.value - resistance(middle)[0]) < 3.0 * inside.sd
     for moved, told in (
-        (middle.longer(1.4), 'L_B 10.92 is outside'),
-        (middle.flatter(2.0), 'B_T 8.2 is outside'),
-        (middle.faster(2.0), 'Fr 0.28 is outside'),
+        (middle.moved(1.4, LONGER), 'L_B 10.92 is outside'),
+        (middle.moved(2.0, FLATTER), 'B_T 8.2 is outside'),
+        (middle.moved(2.0, FASTER), 'Fr 0.28 is outside'),
         (replace(middle, C_B=np.array([0.7])), 'C_B 0.7 is outside'),
     ):
         (each,) = found.predict(moved)
@@ -248,7 +251,7 @@ def test_terms_in_words_are_the_columns(form: RegressionForm) -> None:
         text = term.replace('L/B', 'L_B').replace('B/T', 'B_T').replace(' - ', '-')
         return float(eval(text.replace(' ', '*').replace('²', '**2'), {}, known))
 
-    np.testing.assert_allclose([worth(term) for term in form.terms], form.columns(hulls)[0])
+    np.testing.assert_allclose([worth(term) for term in form.terms(hulls)], form.columns(hulls)[0])
 
 
 ROW = np.array([[8.18, 4.0, 0.851, 0.15]])
@@ -274,14 +277,14 @@ def test_contradictions_are_counted() -> None:
 @given(st.floats(5.0, 10.0), st.floats(2.0, 8.0), st.floats(0.5, 0.9), st.floats(0.8, 1.25))
 def test_moves_keep_the_ratios_consistent(l_b: float, b_t: float, c_b: float, by: float) -> None:
     hulls = Hulls.of('one', NAMES, np.array([[l_b, b_t, c_b, 0.15]]))
-    for moved in (hulls.longer(by), hulls.flatter(by), hulls.faster(by)):
+    for moved in (hulls.moved(by, LONGER), hulls.moved(by, FLATTER), hulls.moved(by, FASTER)):
         volume_ratio = moved.L_B**2 * moved.B_T / moved.C_B
         np.testing.assert_allclose(moved.slenderness**3, volume_ratio, rtol=1e-12)
         np.testing.assert_array_equal(moved.C_B, hulls.C_B)
-    assert hulls.longer(by).B_T == hulls.B_T
-    assert hulls.flatter(by).slenderness == hulls.slenderness
-    np.testing.assert_allclose(hulls.flatter(by).B_T, b_t * by)
-    np.testing.assert_allclose(hulls.faster(by).Fr, 0.15 * by)
+    assert hulls.moved(by, LONGER).B_T == hulls.B_T
+    assert hulls.moved(by, FLATTER).slenderness == hulls.slenderness
+    np.testing.assert_allclose(hulls.moved(by, FLATTER).B_T, b_t * by)
+    np.testing.assert_allclose(hulls.moved(by, FASTER).Fr, 0.15 * by)
     np.testing.assert_array_equal(hulls.at(np.array([0.1, 0.2])).L_B, [l_b, l_b])
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from shipdrag_ros.studies.manoeuvring.ship import mariner
 from shipdrag_ros.studies.manoeuvring.simulate import zigzag
-from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from shipdrag_ros.studies.sensitivity.coasting import coast_from, study_coast
 from shipdrag_ros.studies.sensitivity.steering import study
 from tests.runs import CARGO
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which values of a ship file must be known well."""
+"""A coastdown as its instruments read it; which values of a ship file must be known well."""
 
 from __future__ import annotations
 
@@ -9,17 +9,163 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros.errors import SensitivityError, ShipdragError
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
-from shipdrag_ros.simulation import simulate
+from shipdrag_ros.ship import ConstantAddedMass, Propulsion, Ship, StatedEffect, TableBaseline
+from shipdrag_ros.simulation import Action, simulate
 from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.studies.sensitivity.coast import coast_from
-from shipdrag_ros.studies.sensitivity.coasting import WORST, study_coast
+from shipdrag_ros.studies.sensitivity.coasting import (
+    LOG_SD_M_S,
+    WORST,
+    coast_from,
+    parse_coast,
+    particulars,
+    study_coast,
+)
 from shipdrag_ros.studies.sensitivity.face import coasting as words
 from tests.runs import CARGO
 from tests.runs import CARGO as SHIP
 
 CONFIG = Path(__file__).resolve().parents[3] / 'config'
+
+
+def test_the_coastdown_ends_where_the_ship_has_slowed_to_a_third():
+    own = coast_from(CARGO, 8.0)
+    truth = simulate(CARGO, own.scenario)
+    assert truth.speed_through_water_m_s[-1] == pytest.approx(0.35 * 8.0, rel=0.05)
+    assert own.name == 'coastdown:8'
+    reading = own.read(CARGO, [Action(), Action(log_factor=0.1)])
+    np.testing.assert_allclose(reading[1, :, 0], 1.1 * reading[0, :, 0])
+    np.testing.assert_allclose(reading[0, 0, 0], 8.0 / LOG_SD_M_S)
+    slower = own.read(CARGO, [Action()], speed_m_s=7.0)
+    np.testing.assert_allclose(slower[0, 0, 0], 7.0 / LOG_SD_M_S)
+
+
+def test_names_of_coastdowns():
+    assert parse_coast(CARGO, 'coastdown:7.5').scenario.speed_m_s == 7.5
+    top = CARGO.baseline_range_m_s[1]
+    assert parse_coast(CARGO, 'coastdown').scenario.speed_m_s == pytest.approx(0.7 * top)
+    for text in ('zigzag:15', 'coastdown:', 'coastdown:fast', 'coast'):
+        with pytest.raises(SensitivityError, match='expected coastdown or coastdown:SPEED'):
+            parse_coast(CARGO, text)
+    for text in ('coastdown:20', 'coastdown:1', 'coastdown:nan', 'coastdown:-3'):
+        with pytest.raises(SensitivityError, match=r'expected 2\.131\.\.9\.974 m/s'):
+            parse_coast(CARGO, text)
+    with pytest.raises(ShipdragError, match='no baseline'):
+        parse_coast(replace(CARGO, baseline=None), 'coastdown')
+
+
+def test_a_coastdown_stays_above_the_lowest_speed_of_a_table():
+    table = TableBaseline((4.0, 6.0, 9.0), (7e4, 1.7e5, 4.2e5), 0.02)
+    ship = replace(CARGO, baseline=table)
+    own = coast_from(ship)
+    assert np.all(np.isfinite(own.read(ship, [Action()])))
+    assert simulate(ship, own.scenario).speed_through_water_m_s[-1] > 4.0
+    with pytest.raises(SensitivityError, match=r'begins at 4\.5 m/s, expected 4\.889\.\.9'):
+        coast_from(ship, 4.5)
+
+
+SPEED = 7.0
+
+
+def listed(ship: Ship):
+    return {one.key: one for one in particulars(ship, speed_m_s=SPEED)}
+
+
+def test_a_ship_file_has_these_values_with_their_stated_sd():
+    found = listed(CARGO)
+    assert list(found) == [
+        'length_m',
+        'displaced_volume_m3',
+        'wetted_surface_m2',
+        'water.density_kg_m3',
+        'water.kinematic_viscosity_m2_s',
+        'added_mass',
+        'air.frontal_area_m2',
+        'air.drag_coefficient',
+        'propulsion.run_down_s',
+        'baseline.form_factor',
+        'baseline.correlation_allowance',
+        'baseline.C_V',
+        'baseline.wave_coefficient',
+    ]
+    known = {key: one.sd for key, one in found.items() if np.isfinite(one.sd)}
+    assert known == pytest.approx(
+        {
+            'added_mass': 0.02 / float(CARGO.n_r(SPEED)),
+            'propulsion.run_down_s': 0.25,
+            'baseline.C_V': 0.02,
+            'baseline.wave_coefficient': 0.1,
+        }
+    )
+    assert found['water.density_kg_m3'].value == 1025.0
+
+
+def test_each_is_changed_alone():
+    for key, one in listed(CARGO).items():
+        changed = listed(one.scaled(CARGO, 1.2))
+        moved = {
+            other
+            for other, value in changed.items()
+            if value.value != pytest.approx(listed(CARGO)[other].value, nan_ok=True, rel=1e-9)
+        }
+        also = {
+            # n_r follows from both
+            'length_m': {'added_mass'},
+            'displaced_volume_m3': {'added_mass'},
+            'baseline.C_V': {'baseline.form_factor', 'baseline.correlation_allowance'},
+        }.get(key, set())
+        own = set() if np.isnan(one.value) else {key}
+        assert moved == own | also, key
+
+
+@pytest.mark.parametrize(
+    ('key', 'part'), [('baseline.C_V', 'viscous'), ('baseline.wave_coefficient', 'wave')]
+)
+def test_a_coefficient_as_a_whole_is_a_factor(key, part):
+    changed = listed(CARGO)[key].scaled(CARGO, 1.3).baseline
+    at = np.array([1e8, 1e9]) if part == 'viscous' else np.array([0.1, 0.2])
+    np.testing.assert_allclose(
+        getattr(changed, part)(at), 1.3 * getattr(CARGO.baseline, part)(at), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize('model', [CARGO.added_mass, ConstantAddedMass(value=0.08)])
+def test_added_mass_of_any_model_is_a_factor_of_n_r(model):
+    ship = replace(CARGO, added_mass=model)
+    changed = listed(ship)['added_mass'].scaled(ship, 0.5)
+    np.testing.assert_allclose(changed.n_r([1.0, 8.0]), 0.5 * ship.n_r([1.0, 8.0]), rtol=1e-12)
+
+
+def test_a_table_has_one_value_and_effects_have_theirs():
+    table = TableBaseline((0.0, 5.0, 9.0), (0.0, 1e5, 4e5), 0.03)
+    effects = (
+        StatedEffect('fouling', {'friction_factor': Parameter(0.2, 0.05)}),
+        StatedEffect('current', {'along_track_m_s': Parameter(0.0, 0.1)}),
+    )
+    ship = replace(CARGO, baseline=table, effects=effects, air=None, propulsion=None)
+    found = listed(ship)
+    assert list(found)[-2:] == ['baseline.resistance_n', 'effects.fouling.friction_factor']
+    assert found['baseline.resistance_n'].sd == 0.03
+    assert found['effects.fouling.friction_factor'].sd == pytest.approx(0.25)
+    np.testing.assert_allclose(
+        found['baseline.resistance_n'].scaled(ship, 1.1).resistance_n(6.0),
+        1.1 * ship.resistance_n(6.0),
+    )
+    changed = found['effects.fouling.friction_factor'].scaled(ship, 2.0)
+    assert changed.effects[0].parameters['friction_factor'] == Parameter(0.4, 0.05)
+    assert changed.effects[1] == effects[1]
+
+
+def test_what_is_not_stated_is_no_sd_and_what_is_zero_is_left_out():
+    learnt = replace(CARGO.baseline, relative_sd_of='retardation', correlation_allowance=0.0)
+    ship = replace(CARGO, baseline=learnt, propulsion=Propulsion(5.0))
+    found = listed(ship)
+    # the retardation is known whatever n_r is
+    assert np.isnan(found['added_mass'].sd)
+    assert np.isnan(found['propulsion.run_down_s'].sd)
+    assert 'baseline.correlation_allowance' not in found
+    assert 'propulsion.run_down_s' not in listed(replace(CARGO, propulsion=Propulsion(0.0)))
 
 
 def of(coasted, name):
@@ -76,17 +222,17 @@ def test_the_check_is_a_slower_run_with_all_that_was_dropped_wrong(coasted):
 
 
 def test_wrong_values_look_like_effects_of_the_hull_not_of_the_instruments(coasted):
-    alike = {mimic.effect.name: mimic for mimic in coasted.mimics}
+    alike = {mimic.effect: mimic for mimic in coasted.mimics}
     for name in ('fouling', 'displacement', 'added_mass', 'towed_cable', 'shallow_water'):
         assert alike[name].left < 0.05
     # 12 % more mass and 10.7 % less resistance are the same but for air and thrust
-    assert alike['displacement'].error == pytest.approx(1.0 / 1.12 - 1.0, abs=0.03)
+    assert alike['displacement'].wrong_by == pytest.approx(1.0 / 1.12 - 1.0, abs=0.03)
     for name in ('log_scale', 'log_offset', 'current_change'):
         assert alike[name].left > 0.9
     lefts = [mimic.left for mimic in coasted.mimics]
     assert lefts == sorted(lefts)
     assert all(
-        0.0 <= left <= 1.0 and abs(m.error) <= 0.5 for left, m in zip(lefts, coasted.mimics)
+        0.0 <= left <= 1.0 and abs(m.wrong_by) <= 0.5 for left, m in zip(lefts, coasted.mimics)
     )
 
 
@@ -95,8 +241,8 @@ def test_an_effect_that_is_stated_is_a_value_and_no_longer_missing():
     ship = replace(CARGO, effects=(stated,))
     coasted = study_coast(ship, coast_from(ship))
     assert 'effects.fouling.friction_factor' in coasted.losses.names
-    assert 'fouling' not in {mimic.effect.name for mimic in coasted.mimics}
-    assert {mimic.effect.name for mimic in coasted.mimics} < set(LIBRARY)
+    assert 'fouling' not in {mimic.effect for mimic in coasted.mimics}
+    assert {mimic.effect for mimic in coasted.mimics} < set(LIBRARY)
 
 
 def test_too_large_a_change_is_left_out_and_so_is_its_share_of_all_means():
@@ -116,7 +262,7 @@ def test_a_table_of_resistance_and_a_ship_without_sd():
 
 
 def mimics_of(ship: Ship):
-    return {mimic.effect.name: mimic for mimic in study_coast(ship, coast_from(ship)).mimics}
+    return {mimic.effect: mimic for mimic in study_coast(ship, coast_from(ship)).mimics}
 
 
 def test_more_friction_is_fouling_where_nothing_else_is_viscous():
@@ -126,17 +272,17 @@ def test_more_friction_is_fouling_where_nothing_else_is_viscous():
     signs = {'baseline.C_V': 1.0, 'wetted_surface_m2': 1.0, 'displaced_volume_m3': -1.0}
     assert fouling.size == 0.25
     # linear about 0, where 25 per cent is large
-    assert signs[fouling.particular.key] * fouling.error == pytest.approx(0.21, abs=0.05)
+    assert signs[fouling.value] * fouling.wrong_by == pytest.approx(0.21, abs=0.05)
     assert fouling.left < 0.02
 
 
 def test_a_speed_that_is_not_known_explains_nothing_twice_and_errors_stay_in_what_may_be(coasted):
     # a log that is off and a place that is off leave what the rest of the record shows
-    found = {mimic.effect.name: mimic for mimic in coasted.mimics}
-    assert found['log_offset'].distance > 1.0
+    found = {mimic.effect: mimic for mimic in coasted.mimics}
+    assert found['log_offset'].distance_sd > 1.0
     assert found['log_offset'].left > 0.9
-    assert max(abs(mimic.error) for mimic in found.values()) == WORST
-    assert abs(found['locked_propeller'].error) == WORST
+    assert max(abs(mimic.wrong_by) for mimic in found.values()) == WORST
+    assert abs(found['locked_propeller'].wrong_by) == WORST
 
 
 def test_effects_that_cannot_act_or_move_nothing_are_left_out():
@@ -146,7 +292,7 @@ def test_effects_that_cannot_act_or_move_nothing_are_left_out():
     assert 'log_dead_band' in LIBRARY
     assert 'log_dead_band' not in found
     for mimic in found.values():
-        assert np.isfinite([mimic.distance, mimic.error, mimic.left]).all()
+        assert np.isfinite([mimic.distance_sd, mimic.wrong_by, mimic.left]).all()
 
 
 @pytest.fixture(scope='module')
@@ -178,7 +324,7 @@ def test_a_row_a_value_with_dashes_where_nothing_is_known(found):
 
 def test_a_row_an_effect(found):
     table = words.mimic_table(found)
-    assert [row[0] for row in table.rows] == [mimic.effect.name for mimic in found.mimics]
+    assert [row[0] for row in table.rows] == [mimic.effect for mimic in found.mimics]
     row = next(row for row in table.rows if row[0] == 'locked_propeller')
     assert row[4] == 'at least -50%'
     assert next(row for row in table.rows if row[0] == 'current')[1] == '0.4 m/s'

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +43,7 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_error,
     tangent_range,
 )
-from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.face import Presentation, by_columns, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -200,16 +200,14 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
         Relative error that a line may have.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         lines = (
             'The drag and two lines in place of it, and by how much these err; shaded: where the '
             f'tangent errs by {100.0 * tolerance:.3g} % at most.'
         )
+        yield _LINES, tangent_picture(tangent, tolerance), lines
         measured = 'Drag coefficient of cylinders along the flow, where it was measured.'
-        return {
-            _LINES: [(tangent_picture(tangent, tolerance), lines)],
-            _COEFFICIENT: [(coefficient_picture(cable), measured)],
-        }
+        yield _COEFFICIENT, coefficient_picture(cable), measured
 
     tables = (
         ('Figures of the cable', facts(cable, tangent, tolerance)),
@@ -225,7 +223,7 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
             Section('Before it is used', lines=(*notes(cable), on_a_ship)),
             Section(_COEFFICIENT),
         ],
-        pictures,
+        pictures(),
         foot=_FORMULAS,
     )
 
@@ -284,16 +282,15 @@ def errors(tangent: Tangent, tolerance: float) -> Table:
     """
     Show what the lines err at speeds about V0.
     """
-    rows = tuple(
-        (
-            f'{u:.4f}',
-            f'{u * tangent.speed_m_s:.3f}',
-            f'{100.0 * naive:+.1f}',
-            f'{100.0 * touching:.1f}',
-        )
-        for u, naive, touching in compare_errors(tangent.speed_m_s, tolerance)
+    u, naive, touching = compare_errors(tangent.speed_m_s, tolerance).T
+    return by_columns(
+        {
+            'u = V/V0': (f'{each:.4f}' for each in u),
+            'V [m/s]': (f'{each:.3f}' for each in u * tangent.speed_m_s),
+            'C V: error [%]': (f'{each:+.1f}' for each in 100.0 * naive),
+            'tangent: error [%]': (f'{each:.1f}' for each in 100.0 * touching),
+        }
     )
-    return Table(('u = V/V0', 'V [m/s]', 'C V: error [%]', 'tangent: error [%]'), rows)
 
 
 def notes(cable: Cable) -> tuple[str, ...]:

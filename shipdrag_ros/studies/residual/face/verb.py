@@ -29,7 +29,7 @@ DATA.csv
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +42,7 @@ from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.table import read_numbers
-from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.surface.face import verb
@@ -133,14 +133,12 @@ def shown(
         What was measured, and where the data come from.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
-        drawn = [
-            (
-                verb.residual_picture(values - found.fit.residuals, values, target),
-                'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
-                'the line everywhere; a bow or a slope shows a term that the form lacks.',
-            )
-        ]
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
+        left = (
+            'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
+            'the line everywhere; a bow or a slope shows a term that the form lacks.'
+        )
+        yield _FIT, verb.residual_picture(values - found.fit.residuals, values, target), left
         error, _, leverage = fit.leave_hulls_out(found.form, found.hulls, values)
         if np.any(np.isfinite(error)):
             caption = (
@@ -148,8 +146,7 @@ def shown(
                 'right of 1 a hull is more unusual (leverage) than any of the others: there the '
                 'form goes beyond its data, and its predictions are marked as not to be used.'
             )
-            drawn.append((verb.left_out_picture(error, leverage, target), caption))
-        return {_FIT: drawn}
+            yield _FIT, verb.left_out_picture(error, leverage, target), caption
 
     asked = [('Predictions', verb.predictions_table(predictions))] if predictions else []
     tables = (
@@ -167,7 +164,7 @@ def shown(
             ),
             Section(_FIT, tables=tables),
         ],
-        pictures,
+        pictures(),
         source=source,
     )
 
@@ -222,14 +219,13 @@ def coefficients(found: fit.ResidualFit) -> Table:
     """
     Show the coefficients of the form, by the terms that they stand before.
     """
-    return Table(
-        ('term', 'coefficient', 'sd'),
-        tuple(
-            (term, f'{value:.5g}', f'{sd:.2g}' if np.isfinite(sd) else 'open')
-            for term, value, sd in zip(
-                found.form.terms, found.fit.coefficients, found.coefficient_sd, strict=True
-            )
-        ),
+    deviations = found.coefficient_sd
+    return by_columns(
+        {
+            'term': found.terms,
+            'coefficient': (f'{value:.5g}' for value in found.fit.coefficients),
+            'sd': (f'{sd:.2g}' if np.isfinite(sd) else 'open' for sd in deviations),
+        }
     )
 
 
@@ -237,10 +233,10 @@ def domain(found: fit.ResidualFit) -> Table:
     """
     Show the ranges of the data.
     """
-    return Table(
-        ('', 'from', 'to'),
-        tuple(
-            (name, f'{low:.4g}', f'{high:.4g}')
-            for name, (low, high) in found.domain.ranges.items()
-        ),
+    return by_columns(
+        {
+            '': found.domain.names,
+            'from': (f'{low:.4g}' for low in found.domain.lower),
+            'to': (f'{high:.4g}' for high in found.domain.upper),
+        }
     )

@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, one_axis
-from shipdrag_ros.studies.face import Presentation
-from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
-from shipdrag_ros.studies.sensitivity.coasting import WORST, CoastStudy
+from shipdrag_ros.simulation.effects import effects_of
+from shipdrag_ros.studies.face import Presentation, by_columns
+from shipdrag_ros.studies.sensitivity.coasting import LOG_SD_M_S, POSITION_SD_M, WORST, CoastStudy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,9 +58,9 @@ def mimic_picture(found: CoastStudy) -> Figure:
         left = [mimic.left for mimic in found.mimics]
         axis.barh(places, left, color=BLUE, height=0.65)
         for place, mimic in zip(places, found.mimics):
-            text = f'{mimic.particular.key} {mimic.error:+.0%}'
+            text = f'{mimic.value} {mimic.wrong_by:+.0%}'
             axis.text(mimic.left + 0.01, place, text, va='center', fontsize=7)
-        axis.set_yticks(places, [mimic.effect.name for mimic in found.mimics])
+        axis.set_yticks(places, [mimic.effect for mimic in found.mimics])
         axis.set_xlim(0.0, 1.5)
         axis.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])
         axis.set_xlabel('part of the effect that is left [1]')
@@ -88,20 +88,18 @@ def shown(found: CoastStudy) -> Presentation:
     Return what is printed, and shown on a page.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         known = (
             'How far the record moves when a value of the ship file is wrong by 10 per cent, and '
             'by its stated standard deviation. The longest bars are to be measured well.'
         )
+        yield _KNOWN, particulars_picture(found), known
         mistaken = (
             'What is left of each effect when the value beside its bar is blamed for it. A short '
             'bar: a ship file that is so far wrong is taken for the effect, and no record '
             'separates the two; a long bar: the effect looks like nothing else.'
         )
-        return {
-            _KNOWN: [(particulars_picture(found), known)],
-            _MISTAKEN: [(mimic_picture(found), mistaken)],
-        }
+        yield _MISTAKEN, mimic_picture(found), mistaken
 
     return Presentation(
         'Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
@@ -111,7 +109,7 @@ def shown(found: CoastStudy) -> Presentation:
             Section(_KNOWN, tables=((LOSSES, loss_table(found)),)),
             Section(_MISTAKEN, tables=((MIMICS, mimic_table(found)),)),
         ],
-        pictures,
+        pictures(),
         source=found.ship.summary(),
     )
 
@@ -134,9 +132,7 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
     """
     scenario, check = found.coast.scenario, found.check
     near = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
-    alike = '; '.join(
-        f'{mimic.effect.name} like {mimic.particular.key} {mimic.error:+.0%}' for mimic in near
-    )
+    alike = '; '.join(f'{mimic.effect} like {mimic.value} {mimic.wrong_by:+.0%}' for mimic in near)
     said = [
         f'A coastdown of {scenario.duration_s:.0f} s from {scenario.speed_m_s:.2f} m/s, one '
         f'value changed at a time; noise of a sample: log {LOG_SD_M_S:g} m/s, position '
@@ -171,63 +167,45 @@ def loss_table(found: CoastStudy) -> Table:
     """
     Show what each value does, the most important first.
     """
-    names = found.losses.names
     order = [*found.selection.kept, *found.selection.dropped]
-    rows = []
-    for name in order:
-        i = names.index(name)
-        one = found.importance[i]
-        sd = one.particular.sd
-        rows.append(
-            (
-                name,
-                '-' if math.isnan(one.particular.value) else f'{one.particular.value:.4g}',
-                '-' if math.isnan(sd) else f'{sd:.1%}',
-                *(_number(value) for value in found.losses.table[i, :5]),
-                f'{one.estimated:.2%}',
-                f'{one.stated:.2%}',
-                _tolerable(one.tolerable),
-                'yes' if name in found.selection.kept else 'no',
-            )
-        )
-    heads = (
-        '',
-        'value',
-        'sd',
-        '+10 %',
-        '-10 %',
-        '+50 %',
-        '-50 %',
-        '+1 sd',
-        'estimated r',
-        'stated r',
-        'know within',
-        'kept',
+    places = [found.losses.names.index(name) for name in order]
+    changed = found.losses.table[places]
+    ranked = [found.importance[place] for place in places]
+    stated = [one.particular for one in ranked]
+    heads = ('+10 %', '-10 %', '+50 %', '-50 %', '+1 sd')
+    return by_columns(
+        {
+            '': order,
+            'value': ('-' if math.isnan(one.value) else f'{one.value:.4g}' for one in stated),
+            'sd': ('-' if math.isnan(one.sd) else f'{one.sd:.1%}' for one in stated),
+            **{head: map(_number, column) for head, column in zip(heads, changed.T)},
+            'estimated r': (f'{one.estimated:.2%}' for one in ranked),
+            'stated r': (f'{one.stated:.2%}' for one in ranked),
+            'know within': (_tolerable(one.tolerable) for one in ranked),
+            'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
+        }
     )
-    return Table(heads, tuple(rows))
 
 
 def mimic_table(found: CoastStudy) -> Table:
     """
     Show which wrong value looks like which effect.
     """
-    rows = []
-    for mimic in found.mimics:
-        quantity = mimic.effect.parameters[0]
-        # at the limit the value would have to be wrong by more than is thought of
-        bound = 'at least ' if abs(mimic.error) >= WORST else ''
-        rows.append(
-            (
-                mimic.effect.name,
-                f'{mimic.size:.3g} {quantity.unit}'.rstrip(),
-                f'{mimic.distance:.2f}',
-                mimic.particular.key,
-                f'{bound}{mimic.error:+.0%}',
-                f'{mimic.left:.1%}',
-            )
-        )
-    heads = ('effect', 'size', 'distance [sd]', 'looks like', 'wrong by', 'left')
-    return Table(heads, tuple(rows))
+    mimics = found.mimics
+    library = effects_of(found.ship)
+    units = [library[mimic.effect].parameters[0].unit for mimic in mimics]
+    # at the limit the value would have to be wrong by more than is thought of
+    bounds = ['at least ' if abs(mimic.wrong_by) >= WORST else '' for mimic in mimics]
+    return by_columns(
+        {
+            'effect': (mimic.effect for mimic in mimics),
+            'size': (f'{one.size:.3g} {unit}'.rstrip() for one, unit in zip(mimics, units)),
+            'distance [sd]': (f'{mimic.distance_sd:.2f}' for mimic in mimics),
+            'looks like': (mimic.value for mimic in mimics),
+            'wrong by': (f'{bound}{one.wrong_by:+.0%}' for one, bound in zip(mimics, bounds)),
+            'left': (f'{mimic.left:.1%}' for mimic in mimics),
+        }
+    )
 
 
 def _number(value: float) -> str:

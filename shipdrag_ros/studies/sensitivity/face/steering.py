@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
-from shipdrag_ros.studies.face import Presentation
+from shipdrag_ros.studies.face import Presentation, by_columns
 from shipdrag_ros.studies.manoeuvring.ship import meaning
-from shipdrag_ros.studies.manoeuvring.simulate import ManoeuvreMotion
+from shipdrag_ros.studies.manoeuvring.simulate import Motions
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     CONTROL_S,
@@ -67,7 +67,7 @@ def check_picture(found: SteeringStudy) -> Figure:
     """
     full, kept = found.check.full, found.check.reduced
     by_group = found.group_check.reduced
-    lines: Sequence[tuple[ManoeuvreMotion, str, str, str]] = (
+    lines: Sequence[tuple[Motions, str, str, str]] = (
         (full, 'full', '#444444', '-'),
         (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
         (by_group, f'{found.independent} measurements kept', BLUE, ':'),
@@ -76,11 +76,12 @@ def check_picture(found: SteeringStudy) -> Figure:
         figure = new_figure(9.0, 5.2)
         axes = figure.subplots(2, 2, sharex=True)
         for motion, label, color, style in lines:
+            surge, sway, yaw = motion.speeds.T
             for axis, name, values in (
                 (axes[0, 0], 'heading [deg]', np.degrees(motion.heading_rad)),
-                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(motion.yaw_rate_rad_s)),
-                (axes[1, 0], 'speed ahead u [m/s]', motion.surge_m_s),
-                (axes[1, 1], 'sway v [m/s]', motion.sway_m_s),
+                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(yaw)),
+                (axes[1, 0], 'speed ahead u [m/s]', surge),
+                (axes[1, 1], 'sway v [m/s]', sway),
             ):
                 axis.plot(motion.time_s, values, color=color, linestyle=style, label=label)
                 axis.set_ylabel(name)
@@ -151,24 +152,22 @@ def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
         Of several manoeuvres.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
         ranking = (
             'How much the motion changes when a derivative is wrong: the longer the bar, the '
             'better it must be known. Pale bars, short of the line, may be left out of the model.'
         )
+        yield _RANKING, ranking_picture(found), ranking
         checked = (
             f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
             'on each other show that what was left out is not missed.'
         )
+        yield _CHECKED, check_picture(found), checked
         design = (
             'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better it '
             'is seen. Dot: the manoeuvre that shows it best.'
         )
-        return {
-            _RANKING: [(ranking_picture(found), ranking)],
-            _CHECKED: [(check_picture(found), checked)],
-            _SAILED: [(design_picture(sailed), design)],
-        }
+        yield _SAILED, design_picture(sailed), design
 
     return Presentation(
         f'Which derivatives matter: {found.ship.name}',
@@ -180,7 +179,7 @@ def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
             Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
             Section('What the names mean', tables=((MEANINGS, meaning_table(found)),)),
         ],
-        pictures,
+        pictures(),
         source=found.ship.source,
     )
 
@@ -229,21 +228,21 @@ def loss_table(found: SteeringStudy) -> Table:
     """
     Show the losses, the most important derivative first.
     """
-    names = found.losses.names
-    rows = []
-    for name in found.losses.ranking:
-        i = names.index(name)
-        values = (*found.losses.table[i], found.losses.mean[i], found.mean_norms.mean[i])
-        rows.append(
-            (
-                name,
-                *(f'{1e3 * value:.3f}' for value in values),
-                'yes' if name in found.selection.kept else 'no',
-                found.ship.multiples.get(name, '-'),
-            )
-        )
-    heads = ('', '+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm', 'kept', 'multiple of')
-    return Table(heads, tuple(rows))
+    order = found.losses.ranking
+    table = np.column_stack([found.losses.table, found.losses.mean, found.mean_norms.mean])
+    ranked = table[[found.losses.names.index(name) for name in order]]
+    heads = ('+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm')
+    return by_columns(
+        {
+            '': order,
+            **{
+                head: [f'{1e3 * value:.3f}' for value in column]
+                for head, column in zip(heads, ranked.T)
+            },
+            'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
+            'multiple of': (found.ship.multiples.get(name, '-') for name in order),
+        }
+    )
 
 
 def check_table(found: SteeringStudy) -> Table:
@@ -294,33 +293,24 @@ def design_table(shown: Experiment) -> Table:
     """
     Show which manoeuvre makes which derivative visible.
     """
-    rows = []
-    for i, name in enumerate(shown.names):
-        best = int(np.argmax(shown.loss[i]))
-        rows.append(
-            (
-                name,
-                *(f'{1e3 * value:.2f}' for value in shown.loss[i]),
-                shown.best[i].name,
-                f'{shown.partial_contribution[i, best]:.1%}',
-                f'{shown.partial_contribution_together[i]:.1%}',
-            )
-        )
-    heads = (
-        '',
-        *(manoeuvre.name for manoeuvre in shown.manoeuvres),
-        'shown most by',
-        'partial contribution there',
-        'in all together',
+    there = shown.partial_contribution[np.arange(len(shown.names)), np.argmax(shown.loss, axis=1)]
+    return by_columns(
+        {
+            '': shown.names,
+            **{
+                manoeuvre.name: [f'{1e3 * value:.2f}' for value in column]
+                for manoeuvre, column in zip(shown.manoeuvres, shown.loss.T)
+            },
+            'shown most by': (manoeuvre.name for manoeuvre in shown.best),
+            'partial contribution there': (f'{value:.1%}' for value in there),
+            'in all together': (f'{value:.1%}' for value in shown.partial_contribution_together),
+        }
     )
-    return Table(heads, tuple(rows))
 
 
 def meaning_table(found: SteeringStudy) -> Table:
     """
     Show what each derivative is, the most important first.
     """
-    return Table(
-        ('derivative', 'what it is'),
-        tuple((name, meaning(name)) for name in found.losses.ranking),
-    )
+    order = found.losses.ranking
+    return by_columns({'derivative': order, 'what it is': map(meaning, order)})

@@ -13,9 +13,9 @@ Options
 --ship FILE
     ship file with a baseline, in its place
 --manoeuvre NAME
-    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {coast.KIND} or
-    {coast.KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {coast.KIND} from
-    {coast.SPEED_FRACTION:g} of the highest speed of the baseline)
+    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {KIND} or
+    {KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {KIND} from
+    {_FRACTION:g} of the highest speed of the baseline)
 --keep N
     how many to keep (default: {_KEEP} derivatives; with --ship those values of which 10 per cent
     move the record beyond its noise)
@@ -33,13 +33,17 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.manoeuvring.ship import mariner
 from shipdrag_ros.studies.manoeuvring.simulate import parse
-from shipdrag_ros.studies.sensitivity import coast
-from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from shipdrag_ros.studies.sensitivity.coasting import (
+    KIND,
+    SPEED_FRACTION,
+    parse_coast,
+    study_coast,
+)
 from shipdrag_ros.studies.sensitivity.face import coasting, steering
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
 
 _MODELS = {'mariner': mariner}
-_MODEL, _MANOEUVRE, _KEEP = 'mariner', 'zigzag:15', 24
+_MODEL, _MANOEUVRE, _KEEP, _FRACTION = 'mariner', 'zigzag:15', 24, SPEED_FRACTION
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,6 +81,6 @@ def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]
 
 def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = Ship.load(options.ship)
-    asked = coast.KIND if options.manoeuvre is None else options.manoeuvre
-    found = study_coast(ship, coast.parse_coast(ship, asked), keep=options.keep)
+    asked = KIND if options.manoeuvre is None else options.manoeuvre
+    found = study_coast(ship, parse_coast(ship, asked), keep=options.keep)
     return coasting.shown(found), found.to_dict()

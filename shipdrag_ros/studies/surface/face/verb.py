@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 import keyword
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +37,7 @@ from shipdrag_ros.errors import DataError
 from shipdrag_ros.report.drawing import BLUE, VERMILION, one_axis
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.table import read_numbers
-from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
 
 if TYPE_CHECKING:
@@ -172,17 +172,14 @@ def document(found: Surface) -> dict[str, Any]:
     Return the document of a surface.
     """
     table = found.table
+    columns = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
     return {
         'degree': found.degree,
         'table': [
-            {'degree': degree, 'terms': terms, 'sse': sse, 'rmse': rmse, 'f': f, 'p': p}
-            for degree, terms, sse, rmse, f, p in zip(
+            dict(zip(('degree', 'terms', 'sse', 'rmse', 'f', 'p'), row))
+            for row in zip(
                 found.degrees,
-                table.coefficients.tolist(),
-                table.sse.tolist(),
-                np.sqrt(table.variance).tolist(),
-                table.f.tolist(),
-                table.p.tolist(),
+                *(each.tolist() for each in columns),
             )
         ],
         'coefficients': [
@@ -236,23 +233,17 @@ def shown(
         What was measured, and where the data come from.
     """
 
-    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
-        drawn = [
-            (
-                degree_picture(surface),
-                'Residual standard deviation against the degree; the lowest degree on the plateau '
-                'is chosen.',
-            ),
-            (
-                residual_picture(surface.polynomial(points), values, target),
-                'What the surface leaves of the data.',
-            ),
-        ]
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
+        degrees = (
+            'Residual standard deviation against the degree; the lowest degree on the plateau '
+            'is chosen.'
+        )
+        yield _FIT, degree_picture(surface), degrees
+        rest = residual_picture(surface.polynomial(points), values, target)
+        yield _FIT, rest, 'What the surface leaves of the data.'
         if len(surface.inputs) == 2:
-            drawn.append(
-                (contour_picture(surface, points, target), 'The surface; dots are the data.')
-            )
-        return {_FIT: drawn}
+            drawn = contour_picture(surface, points, target)
+            yield _FIT, drawn, 'The surface; dots are the data.'
 
     asked = [('Predictions', predictions_table(predictions))] if predictions else []
     tables = (
@@ -265,7 +256,7 @@ def shown(
         f'Surface of {target} over {", ".join(surface.inputs)}',
         surface.summary(target)[0],
         [Section(notes, lines=surface.notes), Section(_FIT, tables=tables)],
-        pictures,
+        pictures(),
         source=source,
     )
 
@@ -294,35 +285,29 @@ def degrees_table(surface: Surface) -> Table:
     Show all degrees tried, as the table of S5 with the test beside it.
     """
     table = surface.table
-    rows = []
-    for row, degree in enumerate(surface.degrees):
-        first = np.isnan(table.f[row])
-        rows.append(
-            (
-                f'{degree}',
-                f'{table.coefficients[row]}',
-                f'{table.sse[row]:.4g}',
-                f'{np.sqrt(table.variance[row]):.4g}',
-                '-' if first else f'{table.f[row]:.3g}',
-                '-' if first else f'{table.p[row]:.2g}',
-                'chosen' if degree == surface.degree else '',
-            )
-        )
-    return Table(('degree', 'terms', 'SSE', 'RMSE', 'F', 'p', ''), tuple(rows))
+    return by_columns(
+        {
+            'degree': map(str, surface.degrees),
+            'terms': map(str, table.coefficients),
+            'SSE': (f'{sse:.4g}' for sse in table.sse),
+            'RMSE': (f'{rmse:.4g}' for rmse in np.sqrt(table.variance)),
+            'F': ('-' if np.isnan(f) else f'{f:.3g}' for f in table.f),
+            'p': ('-' if np.isnan(p) else f'{p:.2g}' for p in table.p),
+            '': ('chosen' if degree == surface.degree else '' for degree in surface.degrees),
+        }
+    )
 
 
 def coefficients_table(surface: Surface) -> Table:
     """
     Show the coefficients of raw powers of the inputs.
     """
-    return Table(
-        ('term', 'coefficient', 'sd'),
-        tuple(
-            (_term(surface.inputs, powers), f'{value:.6g}', f'{sd:.2g}')
-            for powers, value, sd in zip(
-                surface.polynomial.powers.tolist(), surface.coefficients, surface.sd
-            )
-        ),
+    return by_columns(
+        {
+            'term': (_term(surface.inputs, each) for each in surface.polynomial.powers.tolist()),
+            'coefficient': (f'{value:.6g}' for value in surface.coefficients),
+            'sd': (f'{sd:.2g}' for sd in surface.sd),
+        }
     )
 
 
@@ -330,17 +315,13 @@ def predictions_table(found: Sequence[Prediction]) -> Table:
     """
     Show predictions and why some may not be used.
     """
-    return Table(
-        ('row', 'value', 'sd', 'use'),
-        tuple(
-            (
-                f'{number}',
-                f'{each.value:.6g}',
-                f'{each.sd:.2g}' if np.isfinite(each.sd) else 'open',
-                'yes' if each.inside else 'NO: ' + '; '.join(each.reasons),
-            )
-            for number, each in enumerate(found, start=1)
-        ),
+    return by_columns(
+        {
+            'row': (f'{number}' for number in range(1, 1 + len(found))),
+            'value': (f'{each.value:.6g}' for each in found),
+            'sd': (f'{each.sd:.2g}' if np.isfinite(each.sd) else 'open' for each in found),
+            'use': ('yes' if each.inside else 'NO: ' + '; '.join(each.reasons) for each in found),
+        }
     )
 
 
