@@ -38,6 +38,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
+from shipdrag_ros.ship.facts import UNITS_CHECKED
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
 
@@ -122,10 +123,13 @@ def diagnose(
     """
     baseline = 'fitted_here' if ship.baseline is None else 'stated'
     seen, notes = observed(runs, ship, parameters, progress=progress)
-    questions = [
-        f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
-    ]
     stated = stated_in(runs, seen, ship, facts)
+    checked = {each.run for each in stated.stated if each.fact.name == UNITS_CHECKED}
+    questions = [
+        f'{run.name}: {ask}'
+        for j, run in enumerate(seen)
+        if not checked & {None, j} and (ask := asked(ratio_before_the_stop(run)))
+    ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
     )

@@ -38,6 +38,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fit, Fitted, WeighedFit
 from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.posterior.limits import percent_of_r, sizes_named
+from shipdrag_ros.ship.facts import UNITS_CHECKED
 
 _SHARE = 0.95  # of a size, below its limit
 _RIVALS = 40  # likeliest effects of which it is found from what size on they are named
@@ -216,7 +217,8 @@ def asked(ratio: float) -> str:
     return (
         f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
         'one of them wrong? Import it again with its unit, as in '
-        '--map speed_through_water=COLUMN:kn'
+        '--map speed_through_water=COLUMN:kn; if it is right, state the fact '
+        f'{UNITS_CHECKED!r}'
     )
 
 

@@ -19,6 +19,7 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.samples import Float64, Int64
 
 _FOLLOWS = 1e-14  # of a scaled diagonal
+_ROUNDING = 1e-6  # nats
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.
 SUMS = {'reassoc', 'contract', 'nsz'}
@@ -301,7 +302,7 @@ def solve(
     Returns
     -------
     log_evidence, step, variance : (s, f), (s, f, p), (s, f, count)
-        As `of_family`.
+        As `of_family`; -inf also where nothing is left of the digits of the products.
 
     Notes
     -----
@@ -330,6 +331,8 @@ def solve(
             continue
         for q in range(f):
             logs[k, q], step, mine, unscaled = of_family(left, mean[q][late], precision[q][late])
+            if logs[k, q] > _ROUNDING and precision[q].min() > 0.0:
+                logs[k, q] = -np.inf  # beyond what no residual at all would give: rounding
             if logs[k, q] == -np.inf:
                 continue
             for a in range(c - 1, -1, -1):

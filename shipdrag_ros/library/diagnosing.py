@@ -32,7 +32,7 @@ from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, told_beside
 from shipdrag_ros.replay.words import cut_lines, run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
-from shipdrag_ros.ship.facts import overriding
+from shipdrag_ros.ship.facts import UNITS_CHECKED, overriding
 
 
 def diagnose_runs(
@@ -88,7 +88,7 @@ def diagnose_runs(
         and not any(SHIP_FILE in run.attachments for run, _ in runs)
     ):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        sailing = _sailing(runs, None, f'No coastdown was found: {why}.', progress)
+        sailing = _sailing(runs, None, f'No coastdown was found: {why}.', facts, progress)
         return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress, stop)
     alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
@@ -125,8 +125,9 @@ def _of_coastdowns(
 ) -> DiagnosisResult:
     """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
-        log_track = _sailing(runs, seen.ship, seen.no_coastdown, progress)
-        return _unused(log_track, (*seen.ship.facts, *facts), earlier)
+        stated = (*seen.ship.facts, *facts)
+        log_track = _sailing(runs, seen.ship, seen.no_coastdown, stated, progress)
+        return _unused(log_track, stated, earlier)
     found = _of_force(runs, seen, facts, earlier, progress)
     return replace(found, estimates=seen.estimates)
 
@@ -144,14 +145,15 @@ def _of_force(
     )
     if seen.ship.baseline is not None:
         return diagnosed(earlier=earlier)
+    stated = (*seen.ship.facts, *facts)
     try:
         found = diagnosed()
     except (DiagnosisError, EstimationError) as error:
-        sailing = _sailing(runs, seen.ship, f'No coastdown could be diagnosed: {error}.', progress)
-        return _unused(sailing, (*seen.ship.facts, *facts), earlier)
+        why = f'No coastdown could be diagnosed: {error}.'
+        return _unused(_sailing(runs, seen.ship, why, stated, progress), stated, earlier)
     unused = _unused(found, (), earlier).earlier
     try:
-        found = with_log_track(found, _sailing(runs, seen.ship, '', progress))
+        found = with_log_track(found, _sailing(runs, seen.ship, '', stated, progress))
     except DiagnosisError as error:
         why = f'the log was not compared with the way over ground: {str(error).strip()}'
         found = replace(found, notes=(*found.notes, why))
@@ -164,13 +166,21 @@ def _unused(
     """Say of facts and of earlier diagnoses that they were given and not used."""
     return replace(
         found,
-        facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)),
+        facts=tuple(
+            WeighedFact(fact, '', None)
+            for fact in overriding(facts)
+            if fact.name != UNITS_CHECKED  # which counts here too
+        ),
         earlier=tuple(WeighedEarlier(each.name, each.runs, used=False) for each in earlier),
     )
 
 
 def _sailing(
-    runs: Sequence[WindowedRun], ship: Ship | None, no_coastdown: str, progress: Progress
+    runs: Sequence[WindowedRun],
+    ship: Ship | None,
+    no_coastdown: str,
+    facts: Sequence[Fact],
+    progress: Progress,
 ) -> DiagnosisResult:
     """Compare the logs with the ways over ground."""
     read = []
@@ -181,7 +191,12 @@ def _sailing(
     records = [SailingRecord(name, block) for name, block, _ in read]
     at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)
     try:
-        found = diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+        found = diagnose_sailing(
+            records,
+            read[0][2],
+            no_coastdown=no_coastdown,
+            units_checked=any(fact.name == UNITS_CHECKED for fact in facts),
+        )
         return replace(found, runs=at)
     except DiagnosisError as error:
         said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)

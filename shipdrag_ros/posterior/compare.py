@@ -40,6 +40,7 @@ from shipdrag_ros.posterior.hypotheses import (
     IN_LOG,
     IN_SPEED,
     IN_TIME,
+    QUICK_IN_LOG,
     QUICK_IN_TIME,
     Explanation,
     RunSight,
@@ -262,7 +263,7 @@ class Comparing:
         both = LOG in kinds and len(kinds) > 1
         # without a baseline the hull is something smooth in any case
         in_speed = (IN_SPEED,) if runs.runs[0].model.law.stated else ()
-        between = (IN_LOG, IN_GROUND) if both else ()
+        between = (IN_LOG, QUICK_IN_LOG, IN_GROUND) if both else ()
         self.smooth = (*in_speed, IN_TIME, QUICK_IN_TIME, *between)
         longest = max(float(run.model.rows.time_s[-1]) for run in runs.runs)
         self.ways: dict[str, list[EffectWay]] = {

@@ -208,10 +208,10 @@ def _starts(quantity: Parameter, longest_s: float, free: Sequence[Parameter]) ->
         return tuple(float(ndtri(part * each)) for each in _EVERYWHERE)
     if shape is Shape.HALF_NORMAL:
         return (_INSIDE,)
+    if len(free) == 1 and shape in (Shape.LOG_NORMAL, Shape.EITHER_SIGN):
+        return _SIZES
     if shape is not Shape.LOG_NORMAL:
         return (0.0,)
-    if len(free) == 1:
-        return _SIZES
     return _PLACES if quantity.unit == 'm/s' else _APART
 
 

@@ -31,10 +31,11 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame
 
 IN_SPEED, IN_TIME, QUICK_IN_TIME = 'u', 't', 't, quick'
-IN_LOG, IN_GROUND = 'log', 'ground'
+IN_LOG, QUICK_IN_LOG, IN_GROUND = 'log', 'log, quick', 'ground'
 """Where something smooth without a name may be."""
 _FORMS = 4  # splines over a run, of the error of a formula
-SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, QUICK_IN_TIME: 18, IN_LOG: 6, IN_GROUND: 6}
+SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, IN_LOG: 6, IN_GROUND: 6}
+SPLINES |= {QUICK_IN_TIME: 18, QUICK_IN_LOG: 18}
 """Of something smooth, over a run: a force may change quickly."""
 _STEP_Z = 0.02  # of differences
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
@@ -555,7 +556,7 @@ class ShipRuns:
             return found
         if where in (IN_TIME, QUICK_IN_TIME):
             return _force_in_time(run, forces, own, count)
-        if where == IN_LOG:
+        if where in (IN_LOG, QUICK_IN_LOG):
             by_log = rows.kind == LOG
             found[:, by_log] = u_0 * bsplines(run.over_run, count)[:, by_log]
             return found

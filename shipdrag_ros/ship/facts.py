@@ -19,6 +19,7 @@ from shipdrag_ros.fields import INVALID, Kind, Problems, number, show
 RATE = 0.02  # how often a fact that is stated is wrong, unless given
 LEAST_RATE, MOST_RATE = 1e-4, 0.5
 DATE = 'DATE'
+UNITS_CHECKED = 'units_checked'
 _RATE = number(LEAST_RATE, MOST_RATE)
 
 
@@ -79,6 +80,10 @@ KNOWN: Mapping[str, Known] = {
     'calm': Known('neither wind nor waves to speak of', 'ask whether it was calm'),
     'hull_cleaned': Known(
         'the hull was cleaned on', 'look up when the hull was cleaned last', (DATE,)
+    ),
+    UNITS_CHECKED: Known(
+        'log and way over ground are in the units that they were imported with',
+        'hold the figures of the record against the display of the instrument',
     ),
 }
 

@@ -76,6 +76,9 @@ def test_while_the_verdict_waits_no_figure_stands_beside_the_question(ship_file,
         read_earlier(document)
     for words in ('over the clean hull', 'resistance', 'disagree', 'How probable'):
         assert words not in said
+    # the answer may be that the unit is right
+    assert main(['diagnose', str(bag), '--fact', 'units_checked']) == 0
+    assert capsys.readouterr().out.startswith('Missing in the model: log scale (factor 0.1')
 
 
 def test_a_speed_that_no_baseline_reaches_is_a_question_too(ship_file, tmp_path, capsys):

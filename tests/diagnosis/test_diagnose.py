@@ -152,6 +152,22 @@ def test_runs_differ_where_one_hull_does_not_fit_both(sizes: tuple[float, float]
     assert second.startswith('These runs differ: no one state of the hull fits all')
 
 
+def test_an_error_of_the_log_that_swings_is_in_the_log(cargo: Ship) -> None:
+    scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
+    block = sense(simulate(cargo, scenario), standard_sensors(), seed=2)
+    after = np.maximum((block.stamp_ns - START_NS) * 1e-9 - 900.0, 0.0)
+    swing = 1.0 + 0.05 * np.sin(2.0 * np.pi * after / 200.0)
+    of_log = block.channel == FIRST
+    block = replace(block, value=np.where(of_log, swing, 1.0)[:, None] * block.value)
+    window = Window.from_block(
+        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
+    )
+    found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
+    assert (found.verdict, found.unnamed > 0.9) == (Verdict.UNKNOWN, True)
+    assert found.where is not None
+    assert found.where.channel == 'log'
+
+
 FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2
 
 
@@ -203,6 +219,8 @@ def answer(*effects: str, ship: Ship = SHIP) -> DiagnosisResult:
         ('time_offset=30', 'offset_s', 30.0),
         # a minute and a half late: what dates the stop is late too
         ('time_offset=90', 'offset_s', 90.0),
+        # no small change of what it is without
+        ('time_offset=150', 'offset_s', 150.0),
     ],
 )
 def test_what_is_hidden_is_named_with_its_size(text: str, parameter: str, size: float) -> None:

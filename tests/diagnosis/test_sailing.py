@@ -107,9 +107,10 @@ def degrees(place: Float64) -> Float64:
     return place[:, ::-1] / METRES_A_DEGREE
 
 
-def found_in(sailing: Sailing, seed: int = 1) -> DiagnosisResult:
+def found_in(sailing: Sailing, seed: int = 1, *, units_checked: bool = False) -> DiagnosisResult:
     """Diagnose one record."""
-    return diagnose_sailing([SailingRecord('sailing', sailing.block(seed))], PARAMETERS)
+    records = [SailingRecord('sailing', sailing.block(seed))]
+    return diagnose_sailing(records, PARAMETERS, units_checked=units_checked)
 
 
 CASES = {
@@ -173,6 +174,8 @@ def test_a_log_in_another_unit_is_asked_about_and_a_scale_if_the_unit_is_right(
     assert 'is the unit of one of them wrong?' in found.question
     assert (found.verdict, found.effects) == (Verdict.ONE_OF, ())
     assert found.candidates[0].names == ('log_scale',)
+    checked = found_in(Sailing(scale=scale, geodetic=True), units_checked=True)
+    assert (checked.verdict, checked.question) == (Verdict.NAMED, '')
 
 
 def test_radar_may_be_wrong_where_the_positions_are_not_of_the_globe() -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.linear import cholesky, products_of, substitute
+from shipdrag_ros.inference.linear import cholesky, products_of, solve, substitute
 
 
 @pytest.mark.parametrize('n', [1, 128, 129, 1000])
@@ -30,3 +30,16 @@ def test_a_factor_solves() -> None:
 def test_a_matrix_that_is_not_positive_is_refused(third: list[float]) -> None:
     matrix = np.array([[1.0, 0.0, 2.0], [0.0, 1.0, 0.0], third])
     assert not cholesky(matrix)[0]
+
+
+def test_rounding_of_a_huge_residual_is_no_evidence() -> None:
+    rng = np.random.default_rng(3)
+    beyond = []
+    for _ in range(50):
+        lines = rng.standard_normal((4, 200))
+        lines[0] = 1e10 * (lines[1] + lines[2] - lines[3])
+        products = np.array([lines @ lines.T])
+        mean, precision = np.zeros((1, 3)), np.full((1, 3), 1e-20)
+        beyond.append(solve(products, mean, precision, 0, 0)[0][0, 0])
+    assert max(beyond) <= 1e-6
+    assert min(beyond) == -np.inf
