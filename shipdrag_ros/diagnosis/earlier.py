@@ -578,7 +578,7 @@ def _sd(size: Parameter) -> float:
 
 def _about(vague: Prior, mean: float, sd: float) -> Prior:
     """Return the prior of a size about what was found; of no width where there is none."""
-    if vague.shape in (Shape.NORMAL, Shape.EITHER_SIGN):
+    if vague.shape is Shape.NORMAL:
         return normal(sd, mean=mean)
     if mean <= 0.0:
         return normal(0.0)

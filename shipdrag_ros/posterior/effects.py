@@ -28,6 +28,7 @@ from shipdrag_ros.simulation.effects import effects_of
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _APART = (-0.8, 0.8)  # z of parameters that are not found from one start
 _PLACES = (-1.5, -0.9, -0.3, 0.3, 0.9, 1.5)  # the same of a speed at which something changes
+_DELAYS = (0.0, -7.5, -4.5, -2.7, -1.5, 1.5, 2.7, 4.5, 7.5)  # z of a time: no small change
 _SIZES = tuple(np.linspace(-1.6, 1.6, 17).tolist())  # where an effect has nothing else
 _EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # shares of the longest run
 _MOST, _JUMP = 4.0, 0.8  # of z that is tried, and of z, from the linear response
@@ -120,10 +121,11 @@ class EffectWay:
             return self.start[0]
         if first.shape is Shape.HALF_NORMAL:
             amount = max(amount, 0.1)
+        far = first.shape is Shape.NORMAL and self.start[0] != 0.0
+        if far or (first.shape is Shape.LOG_NORMAL and len(self.unknowns) == 1):
+            return tried  # starts stand close
         if first.shape is not Shape.LOG_NORMAL:
             return tried * min(max(amount, -_MOST), _MOST)
-        if len(self.unknowns) == 1:  # starts stand close
-            return tried
         more = self.z_of(min(max(amount, 0.05), 20.0)) - tried
         return tried + min(max(more, -_JUMP), _JUMP)
 
@@ -208,10 +210,10 @@ def _starts(quantity: Parameter, longest_s: float, free: Sequence[Parameter]) ->
         return tuple(float(ndtri(part * each)) for each in _EVERYWHERE)
     if shape is Shape.HALF_NORMAL:
         return (_INSIDE,)
-    if len(free) == 1 and shape in (Shape.LOG_NORMAL, Shape.EITHER_SIGN):
-        return _SIZES
     if shape is not Shape.LOG_NORMAL:
-        return (0.0,)
+        return _DELAYS if quantity.unit == 's' else (0.0,)
+    if len(free) == 1:
+        return _SIZES
     return _PLACES if quantity.unit == 'm/s' else _APART
 
 

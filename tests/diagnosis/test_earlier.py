@@ -24,7 +24,7 @@ from shipdrag_ros.diagnosis.earlier import (
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.parameter import Parameter, Prior, Shape
+from shipdrag_ros.parameter import Parameter, Prior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
@@ -43,7 +43,6 @@ NO_SD = Parameter(0.35, math.nan)
 SIZES = {
     'fouling': {'friction_factor': Parameter(0.35, 0.04)},
     'log_scale': {'factor': Parameter(-0.1, 0.01)},
-    'time_offset': {'offset_s': Parameter(-40.0, 2.0)},
     'towed_cable': {'drag_area_m2': Parameter(3.0, 0.4)},
     'current': {'along_track_m_s': Parameter(0.4, 0.05), 'cross_track_m_s': Parameter(0.0, 0.1)},
 }
@@ -150,8 +149,6 @@ def test_a_size_that_stays_is_known_less_well_the_more_time_has_passed() -> None
     assert 0.1 < soon.second < 0.25 < late.second
     (scale,) = sizes(known(earlier(1.0, log_scale=0.9)), 'log_scale')
     assert (scale.first, scale.second) == pytest.approx((-0.1, 0.0174), abs=1e-3)
-    (late,) = sizes(known(earlier(1.0, time_offset=0.9)), 'time_offset')
-    assert (late.first, late.shape) == (-40.0, Shape.NORMAL)  # of either sign, before it was found
     # a size whose sd could not be found may be anything
     unknown = replace(
         earlier(1.0), candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': NO_SD}}),)
