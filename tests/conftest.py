@@ -32,10 +32,12 @@ from shipdrag_ros.estimation.result import (
     Track,
 )
 from shipdrag_ros.fleet.store import FROUDE, BagResult, Store, bag_schema, coastdown_schema
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.ship import Ship
+from tests.runs import seen
 
 # how long an example takes says how busy the machine is
 settings.register_profile(
@@ -221,8 +223,10 @@ def coastdown(estimate: Estimate) -> EndedCoastdown:
 @pytest.fixture(scope='module')
 def run(ship: Ship, coastdown: EndedCoastdown) -> RunResult:
     return RunResult(
-        bag='sea trial.mcap',
+        run=seen('sea trial.mcap'),
         ship=ship,
+        parameters=Parameters(),
+        events=(),
         coastdowns=(coastdown,),
         inputs={
             'speed_through_water': InputCounts(1503, 1500, {'nan': 2, 'late': 1, 'frozen': 0}),

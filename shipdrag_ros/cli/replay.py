@@ -141,7 +141,7 @@ def show_run(output: Output, run: RunResult) -> None:
 
 def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -> None:
     """Print one coastdown: knots and kN first, m/s and m/s² below."""
-    for line in words.cut_lines(coastdown, run.span_ns):
+    for line in words.cut_lines(coastdown, run.run.span_ns):
         output.say(line)
     lines = words.summary(coastdown, run.ship)
     for line in lines[:-1]:

@@ -47,7 +47,7 @@ class Bins(NamedTuple):
     Attributes
     ----------
     filling : (channels,) int64
-        The bin being filled; NEVER where none is.
+        The newest bin that holds anything, whether it was closed or not; NEVER where none does.
     samples : (channels,) int64
         How many are in it.
     sums : (channels, 3)
@@ -105,7 +105,7 @@ def smoothing(width: int) -> int:
 
 
 @compiled(inline=True, uncounted=True)
-def _span(bins: Bins, channel: int, last: int, width: int) -> tuple[int, int]:
+def span(bins: Bins, channel: int, last: int, width: int) -> tuple[int, int]:
     """
     Say whose totals differ by the bins last - width + 1 .. last, as far as these are kept.
 
@@ -126,7 +126,7 @@ def _mean(
     """Average as `mean_place`, from the integers `a` and `b` on, in seconds and integers."""
     places = bins.places[channel]
     mask = len(places) - 1
-    before, newest = _span(bins, channel, last, width)
+    before, newest = span(bins, channel, last, width)
     low, high = places[before & mask], places[newest & mask]
     count = high[COUNT] - low[COUNT]
     if count == 0:
@@ -204,7 +204,7 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
     speeds = bins.speeds[source]
     mask = len(speeds) - 1
     for reach in (width, 2 * width):
-        before, newest = _span(bins, source, last, reach)
+        before, newest = span(bins, source, last, reach)
         low, high = speeds[before & mask], speeds[newest & mask]
         count = high[COUNT] - low[COUNT]
         if count == 0:
@@ -248,16 +248,6 @@ def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     return turning, count
 
 
-@compiled(inline=True, uncounted=True)
-def newest_bin(bins: Bins, channel: int) -> int:
-    """
-    Return the number of the last bin that holds anything; NEVER if none does.
-
-    `filling` stays at the number of a bin that was closed.
-    """
-    return int(bins.filling[channel])
-
-
 @compiled(uncounted=True)
 def speeds_kept(bins: Bins, source: int, last: int, width: int, speeds: Float64) -> int:
     """
@@ -270,7 +260,7 @@ def speeds_kept(bins: Bins, source: int, last: int, width: int, speeds: Float64)
     """
     totals = bins.speeds[source]
     mask = len(totals) - 1
-    before, newest = _span(bins, source, last, width)
+    before, newest = span(bins, source, last, width)
     count = 0
     for number in range(before + 1, newest + 1):
         low, high = totals[(number - 1) & mask], totals[number & mask]
@@ -285,7 +275,7 @@ def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Flo
     Return times [s], from the beginning of bin `last`, and speeds [m/s].
     """
     totals = bins.speeds[source]
-    before, newest = _span(bins, source, last, last - first + 1)
+    before, newest = span(bins, source, last, last - first + 1)
     each = np.diff(totals[np.arange(before, newest + 1) & (len(totals) - 1)], axis=0)
     there = each[:, COUNT] != 0
     time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND

@@ -30,8 +30,6 @@ from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, KIND, SECOND_NS, Channel, Int64
 
-_GEODETIC = int(Channel.POSITION_GEODETIC)
-_HEADING = int(Channel.HEADING)
 _CIRCLE = 360 * 10**11
 _FARTHEST = 9e18  # beyond it there is no integer for a value
 _FASTEST = int(ABSURD_SPEED_M_S * PER_UNIT)
@@ -45,11 +43,11 @@ def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -
     if bins.samples[channel] == 0:
         bins.filling[channel] = number
         bins.first[channel] = b
-    if KIND[channel] == _GEODETIC:
+    if KIND[channel] == Channel.POSITION_GEODETIC:
         apart = b - bins.first[channel]
         if abs(apart) > 180.0:
             b -= 360.0 * np.round(apart / 360.0)
-    elif channel == _HEADING:
+    elif channel == Channel.HEADING:
         a, b = math.cos(a), math.sin(a)
     bins.samples[channel] += 1
     bins.sums[channel, 0] += (stamp - number * SECOND_NS) * 1e-9
@@ -81,7 +79,7 @@ def close(bins: Bins, channel: int, width: int) -> int:
         return int(number)
     places = bins.places[channel]
     mask = len(places) - 1
-    if KIND[channel] == _GEODETIC and before != NEVER:
+    if KIND[channel] == Channel.POSITION_GEODETIC and before != NEVER:
         # on the branch of the bin before
         turned = places[before & mask, B] - places[(before - 1) & mask, B] - b
         b += (turned + _CIRCLE // 2) // _CIRCLE * _CIRCLE

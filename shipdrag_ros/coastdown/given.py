@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.binned import shaft_revs
 from shipdrag_ros.coastdown.regimes.given import (
     BRAKES,
@@ -29,7 +29,6 @@ from shipdrag_ros.coastdown.regimes.given import (
     read,
 )
 from shipdrag_ros.coastdown.regimes.read_out import stretches
-from shipdrag_ros.coastdown.regimes.state import RATE, RUDDER, SHAFTS
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -55,11 +54,15 @@ class GivenPart:
     cuts
         What was cut and why, in order of time.
     failure
-        Why it is refused; None where it is not.
+        Why it is refused, or gives no estimate; None where neither is so.
     notes
         What acts in the part that is kept, a sentence each.
     stretch
         Times [ns] and mean speeds [m/s] of the whole of it, where something was cut.
+    estimate
+        From what is kept; None where there is none, or none was made.
+    refused
+        Whether nothing of it is a coastdown.
     """
 
     start_ns: int
@@ -68,23 +71,8 @@ class GivenPart:
     failure: str | None = None
     notes: tuple[str, ...] = ()
     stretch: tuple[tuple[int, float], ...] = ()
-
-
-class Examined(NamedTuple):
-    """
-    A judgement, and the estimate from what was kept.
-
-    `failure` says why there is none.
-    """
-
-    judged: GivenPart
-    estimate: Estimate | None
-    failure: str | None
-
-    @property
-    def refused(self) -> bool:
-        """Whether nothing of it is a coastdown."""
-        return self.judged.failure is not None
+    estimate: Estimate | None = None
+    refused: bool = False
 
 
 def estimate_given(
@@ -92,7 +80,7 @@ def estimate_given(
     ship: Ship,
     parameters: Parameters,
     estimator: Callable[[Window, Ship, Parameters], Estimate],
-) -> Examined:
+) -> GivenPart:
     """
     Cut a window to what is a coastdown and estimate r(v) from that.
 
@@ -108,14 +96,14 @@ def estimate_given(
         Raises `EstimationError` where no estimate is possible.
     """
     judged = judge(window, ship, parameters)
-    if judged.failure is not None:
-        return Examined(judged, None, judged.failure)
+    if judged.refused:
+        return judged
     part = window.part(judged.start_ns, judged.end_ns)
     part = replace(part, before=None, notes=(*judged.notes, *part.notes))
     try:
-        return Examined(judged, estimator(part, ship, parameters), None)
+        return replace(judged, estimate=estimator(part, ship, parameters))
     except EstimationError as error:
-        return Examined(judged, None, str(error))
+        return replace(judged, failure=str(error))
 
 
 def judge(window: Window, ship: Ship, parameters: Parameters) -> GivenPart:
@@ -169,7 +157,12 @@ class _Judge:
             why = '; '.join(dict.fromkeys(f'{cut.reason.value}: {cut.text}' for cut in cuts))
             failure = f'nothing of it is a coastdown: {why}; give another window'
             return GivenPart(
-                window.start_ns, window.end_ns, tuple(cuts), failure, (), self._shown()
+                window.start_ns,
+                window.end_ns,
+                tuple(cuts),
+                failure,
+                stretch=self._shown(),
+                refused=True,
             )
         first, last = reading.dates(kept, *which)
         first, last = self._stood(first, -1), self._stood(last, 1)
@@ -199,7 +192,7 @@ class _Judge:
             notes = (f'she turns {by}: the drag of drifting and turning is part of r',)
         shown = self._shown() if cuts else ()
         notes += self._turns_on(glide)
-        return GivenPart(start_ns, end_ns, tuple(cuts), None, notes, shown)
+        return GivenPart(start_ns, end_ns, tuple(cuts), notes=notes, stretch=shown)
 
     def _stood(self, place: float, drives: int) -> float:
         """
@@ -223,7 +216,7 @@ class _Judge:
     def _turns_on(self, kept: _SPAN) -> tuple[str, ...]:
         """Say that a shaft turns faster than water turns it, and is taken not to drive her."""
         late = slice(kept[0] + 2 * (kept[1] - kept[0]) // 3, kept[1])  # free revs have fallen
-        revs = np.abs(self._binned.said[late, SHAFTS : SHAFTS + 4])
+        revs = np.abs(self._binned.said[late, s.SHAFTS : s.SHAFTS + 4])
         part = np.abs(self._binned.speed[late, np.newaxis]) / self._binned.top
         with np.errstate(invalid='ignore', divide='ignore'):
             over = revs / np.abs(self._revs) > n.WINDMILL[2] * part + n.CREEPS
@@ -266,9 +259,9 @@ class _Judge:
         """Return the angle over which the heading swings in some bins [rad]."""
         bins = self._binned.said[span[0] : span[1]]
         # where nothing shows what the rudder turns her by
-        if not np.isfinite(bins[:, RATE]).mean() > 0.5:
-            return np.inf if np.isfinite(bins[:, RUDDER]).any() else 0.0
-        return float(np.ptp(np.cumsum(np.nan_to_num(bins[:, RATE]))) * self._binned.step_s)
+        if not np.isfinite(bins[:, s.RATE]).mean() > 0.5:
+            return np.inf if np.isfinite(bins[:, s.RUDDER]).any() else 0.0
+        return float(np.ptp(np.cumsum(np.nan_to_num(bins[:, s.RATE]))) * self._binned.step_s)
 
     def _worth(self, span: _SPAN) -> float:
         """Return the time that is kept, times the part of the speed that is lost in it."""
@@ -330,7 +323,7 @@ class _Judge:
         if regime == GLIDES and kept is None:
             return Dismissal.PLATEAU, 'nothing of it slows her for long enough'
         if regime == ENGINES:
-            turning = self._binned.said[first:last, SHAFTS : SHAFTS + 4]
+            turning = self._binned.said[first:last, s.SHAFTS : s.SHAFTS + 4]
             revs = np.nan_to_num(turning / np.maximum(np.abs(self._revs), 1e-9))
             if self._reversed(turning):
                 return Dismissal.ASTERN, 'the propeller is reversed'

@@ -15,12 +15,10 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     displacement,
     mean_place,
-    newest_bin,
 )
 from shipdrag_ros.coastdown.past import FIRST_TRACK
 from shipdrag_ros.samples import KIND, Channel
 
-_HEADING = int(Channel.HEADING)
 HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
 _SPAN_S = 20  # heading and course are means over so long
 _LOOKS = 4  # one after the other, all of which must say the same
@@ -34,7 +32,7 @@ def mean_heading(bins: Bins, last: int, width: int) -> float:
     """
     Return the circular mean of the heading as sent [rad]; NaN without any.
     """
-    _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
+    _, cosine, sine, count = mean_place(bins, Channel.HEADING, last, width)
     return math.atan2(sine, cosine) if count else math.nan
 
 
@@ -69,11 +67,11 @@ def heading_doubt(bins: Bins, convention: str) -> str:
     str
         '' where they agree, or where nothing can be said: no track, no way, a turn.
     """
-    newest = newest_bin(bins, _HEADING)
+    newest = bins.filling[Channel.HEADING]
     tracks = [
         track
         for track in SOURCES
-        if KIND[track] >= FIRST_TRACK and newest_bin(bins, track) > newest - 5
+        if KIND[track] >= FIRST_TRACK and bins.filling[track] > newest - 5
     ]
     if newest < 0 or not tracks:
         return ''
@@ -84,7 +82,7 @@ def heading_doubt(bins: Bins, convention: str) -> str:
         if not math.hypot(east, north) > _SPEED_M_S * span:  # NaN too
             return ''
         # the course is that of the time between the middles of its two spans
-        _, cosine, sine, count = mean_place(bins, _HEADING, last, 2 * _SPAN_S)
+        _, cosine, sine, count = mean_place(bins, Channel.HEADING, last, 2 * _SPAN_S)
         if not count or math.hypot(cosine, sine) < 0.9:
             return ''
         sent, course = math.atan2(sine, cosine), math.atan2(north, east)

@@ -22,10 +22,9 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     line,
     mean_turning,
-    newest_bin,
 )
 from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning, Watch
+from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.ring import REFUSED, append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
@@ -48,9 +47,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
 from shipdrag_ros.samples import KIND, SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
-_SHAFT, _PITCH = int(Channel.SHAFT), int(Channel.PITCH)
 _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
-_ACCEPTED, _OUTLIER = int(Reason.ACCEPTED), int(Reason.OUTLIER)
 
 
 class WalkEvent(IntEnum):
@@ -68,17 +65,8 @@ class WalkEvent(IntEnum):
     LOOK = 7  # log and track are to be compared
 
 
-_FULL = int(WalkEvent.FULL)
-_UPDATE = int(WalkEvent.UPDATE)
-_SILENCE = int(WalkEvent.SILENCE)
-_BIN = int(WalkEvent.BIN)
-_SLOPE = int(WalkEvent.SLOPE)
-_SHAFT_SLOWED = int(WalkEvent.SHAFT)
-_LOOK = int(WalkEvent.LOOK)
-
-
 @compiled(inline=True, uncounted=True)
-def _is_primary(bins: Bins, watch: Watch, tuning: Tuning, source: int, number: int) -> bool:
+def _is_primary(bins: Bins, watch: np.record, tuning: Tuning, source: int, number: int) -> bool:
     """Say whether no better source that is not doubted has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
     doubted, primary = watch.doubted[source] > number, True
@@ -86,13 +74,13 @@ def _is_primary(bins: Bins, watch: Watch, tuning: Tuning, source: int, number: i
         better = (
             RANK[other] < RANK[source] if (watch.doubted[other] > number) == doubted else doubted
         )
-        primary = primary and not (better and newest_bin(bins, other) >= oldest)
+        primary = primary and not (better and bins.filling[other] >= oldest)
     return bool(primary)
 
 
 @compiled(inline=True, uncounted=True)
 def _wakes(
-    bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
+    bins: Bins, steadiness: Steadiness, watch: np.record, tuning: Tuning, source: int, number: int
 ) -> bool:
     """Say whether a source beside the primary one falls faster than chance explains."""
     update_limits(steadiness, tuning.slopes, bins, source, number)
@@ -100,27 +88,27 @@ def _wakes(
     for scale in range(SCALES):
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         falls = falls or (slope < -steadiness.limit[source, scale] and level > tuning.speed_min)
-    return falls and watch.armed[0] != 0 and watch.doubted[source] <= number
+    return falls and watch.armed != 0 and watch.doubted[source] <= number
 
 
 @compiled(inline=True, uncounted=True)
 def _look_at_speed(
-    bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
+    bins: Bins, steadiness: Steadiness, watch: np.record, tuning: Tuning, source: int, number: int
 ) -> int:
     """Judge a closed bin of a speed source; return a `WalkEvent` code, 0 to go on."""
-    watched = watch.source[0]
+    watched = watch.source
     if watched == NEVER:
         if not _is_primary(bins, watch, tuning, source, number):
-            return _SLOPE if _wakes(bins, steadiness, watch, tuning, source, number) else 0
+            wakes = _wakes(bins, steadiness, watch, tuning, source, number)
+            return WalkEvent.SLOPE if wakes else 0
     elif watched != source:
-        update_limits(
-            steadiness, tuning.slopes, bins, source, number
-        )  # should the one watched fail
+        # should the one watched fail
+        update_limits(steadiness, tuning.slopes, bins, source, number)
         return 0
     update_limits(steadiness, tuning.slopes, bins, source, number)
-    before = watch.seen[0] if watch.seen_source[0] == source else NEVER
-    watch.seen_source[0] = source
-    watch.seen[0] = number
+    before = watch.seen if watch.seen_source == source else NEVER
+    watch.seen_source = source
+    watch.seen = number
     limits = steadiness.limit[source]
     steady, falls = True, False
     for scale in range(SCALES):
@@ -130,54 +118,55 @@ def _look_at_speed(
             continue
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         if scale == 0:
-            watch.level[0] = level
+            watch.level = level
         # comparisons with NaN are False: neither an unknown limit nor a slope of too few bins
         # says anything
         falls = falls or slope < -limits[scale]
         if slope < -0.5 * limits[scale]:
             steady = False
     if steady and number >> (SCALES - 1) != before >> (SCALES - 1):  # all were looked at
-        watch.armed[0] = 1
-    fast = watch.level[0] > tuning.speed_min
-    falls = falls and watch.armed[0] != 0 and fast
-    if watched != NEVER or falls or not fast or watch.armed[0] == 0:
-        watch.lead[0] = NEVER
+        watch.armed = 1
+    fast = watch.level > tuning.speed_min
+    falls = falls and watch.armed != 0 and fast
+    if watched != NEVER or falls or not fast or watch.armed == 0:
+        watch.steady_since = NEVER
     else:
-        if watch.lead[0] == NEVER:
-            watch.lead[0] = number
-        watch.lead[1] = max(watch.lead[1], number - watch.lead[0])
+        if watch.steady_since == NEVER:
+            watch.steady_since = number
+        watch.steady_most = max(watch.steady_most, number - watch.steady_since)
     if watched != NEVER:
-        return _BIN
-    return _SLOPE if falls else 0
+        return WalkEvent.BIN
+    return WalkEvent.SLOPE if falls else 0
 
 
 @compiled(inline=True, uncounted=True)
-def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, number: int) -> int:
+def _look_at_shaft(bins: Bins, watch: np.record, tuning: Tuning, channel: int, number: int) -> int:
     """Judge a closed bin of a shaft speed or a pitch; return a `WalkEvent` code, 0 to go on."""
     if (
-        watch.source[0] != NEVER
-        or watch.armed[0] == 0
-        or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
-        or not watch.level[0] > tuning.speed_min
+        watch.source != NEVER
+        or watch.armed == 0
+        or watch.seen < number - tuning.data_stop_ns // SECOND_NS
+        or not watch.level > tuning.speed_min
     ):
         return 0
     # half a window ago, so that a shaft that runs down slowly is not its own measure
     width = tuning.slopes.width
     steady, count = mean_turning(bins, channel, number - (width + 1) // 2, width)
-    if count < 3 or abs(steady) < (PITCH_LEAST if KIND[channel] == _PITCH else STANDS_RAD_S):
+    least = PITCH_LEAST if KIND[channel] == Channel.PITCH else STANDS_RAD_S
+    if count < 3 or abs(steady) < least:
         return 0
     if mean_turning(bins, channel, number, 1)[0] / steady < _SLOWED:
-        return _SHAFT_SLOWED
+        return WalkEvent.SHAFT
     return 0
 
 
 @compiled(inline=True, uncounted=True)
 def _count(tally: InputTally, channel: int, stamp: int, arrival: int) -> None:
     """Count an accepted sample."""
-    recent = tally.reasons[channel, _ACCEPTED] % RECENT
+    recent = tally.reasons[channel, Reason.ACCEPTED] % RECENT
     tally.stamp_ns[channel, recent] = stamp
     tally.arrival_ns[channel, recent] = arrival
-    tally.reasons[channel, _ACCEPTED] += 1
+    tally.reasons[channel, Reason.ACCEPTED] += 1
 
 
 @compiled(uncounted=True)
@@ -201,7 +190,7 @@ def _accept_refused(memory: Memory, width: int, channel: int) -> None:
                 close(bins, channel, width)
             add(bins, channel, number, stamp, reading.a, reading.b)
             remember(guard, channel, reading)
-            tally.reasons[channel, _OUTLIER] -= 1
+            tally.reasons[channel, Reason.OUTLIER] -= 1
             _count(tally, channel, stamp, store.receive_ns[i])
 
 
@@ -235,7 +224,8 @@ def walk(
     sample, stop
         The first sample not taken, and the `WalkEvent` code.
     """
-    guard, bins, steadiness, watch, tally, store = memory
+    guard, bins, steadiness, _, tally, store = memory
+    watch = memory.watch[0]
     i, stop = start, 0
     # accepted samples go into the ring a run at a time, from the first one not yet there
     kept, room = start, len(store.stamp_ns) - store.end[0]
@@ -247,30 +237,30 @@ def walk(
             stop = code
             break
         if i - kept == room:
-            stop = _FULL
+            stop = WalkEvent.FULL
             break
-        if code == _ACCEPTED:
+        if code == Reason.ACCEPTED:
             if proves(guard, tuning.limits, c, reading):
                 _accept_refused(memory, tuning.slopes.width, c)
                 continue
-            if stamp > watch.update_ns[0]:
-                stop = _UPDATE
+            if stamp > watch.update_ns:
+                stop = WalkEvent.UPDATE
                 break
             if (
-                watch.source[0] != NEVER
-                and stamp > alive_ns(guard, tuning.limits, watch.source[0]) + tuning.data_stop_ns
+                watch.source != NEVER
+                and stamp > alive_ns(guard, tuning.limits, watch.source) + tuning.data_stop_ns
             ):
-                stop = _SILENCE
+                stop = WalkEvent.SILENCE
                 break
             number = stamp // SECOND_NS
-            if number >= watch.look[0]:
-                stop = _LOOK
+            if number >= watch.look:
+                stop = WalkEvent.LOOK
                 break
             if bins.samples[c] > 0 and number > bins.filling[c]:
                 closed = close(bins, c, tuning.slopes.width)
                 if KIND[c] < KINDS:
                     stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
-                elif KIND[c] == _SHAFT or KIND[c] == _PITCH:
+                elif KIND[c] == Channel.SHAFT or KIND[c] == Channel.PITCH:
                     stop = _look_at_shaft(bins, watch, tuning, c, closed)
                 if stop != 0:
                     break
@@ -279,9 +269,9 @@ def walk(
             _count(tally, c, stamp, arrival)
         else:
             reject(guard, tuning.limits, code, c, reading)
-            last = i + (code == _OUTLIER)
+            last = i + (code == Reason.OUTLIER)
             append(store, channel, stamp_ns, receive_ns, value, variance, kept, last)
-            if code == _OUTLIER:  # it may turn out to be true
+            if code == Reason.OUTLIER:  # it may turn out to be true
                 store.channel[store.end[0] - 1] += REFUSED
             room -= last - kept
             kept = i + 1

@@ -11,69 +11,47 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.bins import Bins
 from shipdrag_ros.coastdown.past import CHANNELS, NEVER
-from shipdrag_ros.coastdown.ring import RingBuffer, first_store
+from shipdrag_ros.coastdown.ring import FIRST_CAPACITY, RingBuffer
 from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
 from shipdrag_ros.coastdown.validate import CheckMemory, Limits
-from shipdrag_ros.samples import Float64, Int64, Reason
+from shipdrag_ros.samples import Int64, Reason
 
 ALWAYS = 2**62  # a stamp after all stamps
 RECENT = 16  # samples of each channel that its rate and clock offset are taken from
 
 
-class Watch(NamedTuple):
+WATCH = np.dtype(
+    [
+        ('source', 'i8'),  # that the regimes follow; NEVER while they sleep
+        ('update_ns', 'i8'),  # when the next estimate is due; ALWAYS if none is
+        ('armed', 'i8'),  # 0 after the regimes were awake until the speed has been steady again
+        ('seen_source', 'i8'),  # speed source looked at last
+        ('seen', 'i8'),  # and number of its bin
+        ('level', 'f8'),  # speed there [m/s]
+        ('steady_since', 'i8'),  # bin; NEVER if she is not
+        ('steady_most', 'i8'),  # the longest that she was [bins]
+        ('look', 'i8'),  # bin at whose first sample log and track are compared next
+        ('doubted', 'i8', (CHANNELS,)),  # up to which each source is not used: another contradicts
+    ],
+    align=True,
+)
+"""What the walk looks out for, and what it saw."""
+
+
+def fresh_watch() -> NDArray[np.void]:
     """
-    What the walk looks out for, and what it saw; arrays of one but for those with a shape.
-
-    Attributes
-    ----------
-    source : int64
-        The speed source that the regimes follow; NEVER while they sleep.
-    update_ns : int64
-        When the next estimate is due; ALWAYS if none is.
-    armed : int64
-        0 after the regimes were awake until the speed has been steady again.
-    seen_source, seen : int64
-        Speed source and number of the bin looked at last.
-    level : float64
-        Speed there [m/s].
-    lead : (2,) int64
-        Since which bin the ship has been steady, NEVER if it is not; the longest that it was
-        [bins].
-    look : int64
-        The bin at whose first sample log and track are compared next.
-    doubted : (channels,) int64
-        Bin up to which each source is not used: another contradicts it.
+    Return the watch of a monitor that knows nothing.
     """
-
-    source: Int64
-    update_ns: Int64
-    armed: Int64
-    seen_source: Int64
-    seen: Int64
-    level: Float64
-    lead: Int64
-    look: Int64
-    doubted: Int64
-
-    @classmethod
-    def fresh(cls) -> Watch:
-        """
-        Return the watch of a monitor that knows nothing.
-        """
-        return cls(
-            np.full(1, NEVER),
-            np.full(1, ALWAYS),
-            np.ones(1, np.int64),
-            np.full(1, NEVER),
-            np.full(1, NEVER),
-            np.full(1, np.nan),
-            np.array([NEVER, 0]),
-            np.full(1, NEVER),
-            np.full(CHANNELS, NEVER),
-        )
+    watch = np.zeros(1, np.dtype((np.record, WATCH)))
+    made = watch[0]
+    made.source = made.seen_source = made.seen = made.steady_since = made.look = NEVER
+    made.doubted[:] = NEVER
+    made.update_ns, made.armed, made.level = ALWAYS, 1, np.nan
+    return watch
 
 
 class InputTally(NamedTuple):
@@ -110,7 +88,7 @@ class Memory(NamedTuple):
     guard: CheckMemory
     bins: Bins
     steadiness: Steadiness
-    watch: Watch
+    watch: NDArray[np.void]
     tally: InputTally
     store: RingBuffer
 
@@ -123,9 +101,9 @@ class Memory(NamedTuple):
             CheckMemory.fresh(),
             Bins.fresh(seconds),
             Steadiness.fresh(slopes),
-            Watch.fresh(),
+            fresh_watch(),
             tally,
-            first_store(),
+            RingBuffer.fresh(FIRST_CAPACITY),
         )
 
 

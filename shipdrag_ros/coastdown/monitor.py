@@ -125,18 +125,20 @@ class Monitor:
 
         An onset needs `slope_window_s` of it.
         """
-        lead = int(self._memory.watch.lead[1])
+        lead = int(self._watch.steady_most)
         # the first slope is that of what came before, two thirds of a window at least
         return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
 
     @property
     def progress(self) -> MonitorProgress:
         """How long the ship has been steady by now, and since when she coasts."""
-        watch = self._memory.watch
+        watch = self._watch
         used_s = self._parameters.steady_s
         steady_s = 0.0
-        if int(watch.lead[0]) != NEVER and self._running is None:
-            seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
+        if int(watch.steady_since) != NEVER and self._running is None:
+            seconds = (
+                int(watch.seen) - int(watch.steady_since) + 2 * self._tuning.slopes.width // 3
+            )
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
         probability = {} if self._regimes is None else self._regimes.probability
@@ -149,7 +151,7 @@ class Monitor:
             return State.COASTDOWN
         if self._regimes is not None and not self._regimes.even:
             return State.CANDIDATE
-        source = int(self._memory.watch.seen_source[0])
+        source = int(self._watch.seen_source)
         if source == NEVER or np.isnan(self._memory.steadiness.limit[source, 0]):
             return State.WAITING
         return State.STEADY
@@ -230,7 +232,7 @@ class Monitor:
                 self._wake(source, int(self._memory.bins.closed[source]))
             elif stop == WalkEvent.SHAFT:
                 number = int(self._memory.bins.filling[channel[at]])
-                self._wake(int(self._memory.watch.seen_source[0]), number)
+                self._wake(int(self._watch.seen_source), number)
             else:
                 arrival, guard = int(receive_ns[at]), self._memory.guard
                 why = clock_set(guard, stop, int(channel[at]), int(stamp_ns[at]), arrival)
@@ -270,11 +272,11 @@ class Monitor:
         str
             Why it is of no use; '' where it is weighed.
         """
-        source, tally = int(self._memory.watch.seen_source[0]), self._memory.tally
+        source, tally = int(self._watch.seen_source), self._memory.tally
         if source == NEVER:
             return 'no speed was read yet, so there is nothing to weigh the stop with'
         if self._regimes is None:
-            self._wake(source, int(self._memory.watch.seen[0]))
+            self._wake(source, int(self._watch.seen))
         assert self._regimes is not None
         last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
         clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
@@ -306,6 +308,11 @@ class Monitor:
         window = self._cut(start_ns, ended.end_ns, start_ns - before_ns)
         return replace(window, told_ns=ended.told_ns)
 
+    @property
+    def _watch(self) -> np.record:
+        watch: np.record = self._memory.watch[0]
+        return watch
+
     def _fresh(self, tally: InputTally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
 
@@ -313,19 +320,19 @@ class Monitor:
 
     def _vouch(self, now_ns: int) -> None:
         """Compare log and track, and go on with one that is sound."""
-        watch, number = self._memory.watch, now_ns // SECOND_NS
-        watched = int(watch.source[0])
+        watch, number = self._watch, now_ns // SECOND_NS
+        watched = int(watch.source)
         bins, width = self._memory.bins, self._tuning.slopes.width
         for source in self._vouching.look(bins, number, width, hold=watched != NEVER):
             forget_speeds(bins, source)
             self._memory.steadiness.forget(source)
-        watch.look[0] = (number // LOOK_S + 1) * LOOK_S
+        watch.look = (number // LOOK_S + 1) * LOOK_S
         newly = (self._vouching.until > number) & (watch.doubted <= number)
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
             self._fall_back(now_ns)
         if watched != NEVER and newly.any() and self._running is None:
-            self._wake(int(watch.source[0]), number)  # the record is judged without it
+            self._wake(int(watch.source), number)  # the record is judged without it
 
     def _make_room(self) -> None:
         store = make_room(
@@ -338,11 +345,10 @@ class Monitor:
 
     def _wake(self, source: int, number: int) -> None:
         """Let the regimes take the record, from some minutes before a second on."""
-        self._memory.watch.source[0] = source
+        self._watch.source = source
         width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
-        self._regimes = RegimeFilter.woken(
-            self._vouching.sound(self._memory.bins), self._ship, width, number
-        )
+        bins = self._vouching.sound(self._memory.bins)
+        self._regimes = RegimeFilter(self._ship, bins, width, number)
         if before is not None:
             self._regimes.tell(before.told_s)
 
@@ -350,7 +356,7 @@ class Monitor:
         """Let the regimes take all bins of the source watched that are whole."""
         if self._regimes is None:
             return []
-        number = int(self._memory.bins.filling[self._memory.watch.source[0]])
+        number = int(self._memory.bins.filling[self._watch.source])
         return self._judged(number, number)
 
     def _judged(self, until: int, number: int) -> list[Event]:
@@ -431,7 +437,7 @@ class Monitor:
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
         if self._estimator is not None:
-            self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
+            self._watch.update_ns = self._running.due_ns(onset.detected_ns)
         return onset
 
     def _end_glide(
@@ -454,12 +460,12 @@ class Monitor:
         """Say that the coastdown that runs was none."""
         assert self._running is not None
         start_ns = self._running.onset.start_ns
-        end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
+        end_ns = max(start_ns, int(self._watch.seen) * SECOND_NS)
         was = regimes.dismissal(start_ns / SECOND_NS)
         self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
-        self._memory.watch.update_ns[0] = ALWAYS
+        self._watch.update_ns = ALWAYS
         return events
 
     def _end(
@@ -479,7 +485,7 @@ class Monitor:
         # noise of the speed begins no other glide of a ship that was too slow
         if self._ended_by is EndedBy.SPEED:
             self._reported_s = max(dated.end_s, float(regimes.taken_s))
-        self._memory.watch.update_ns[0] = ALWAYS
+        self._watch.update_ns = ALWAYS
         return events
 
     def _rest(
@@ -513,7 +519,7 @@ class Monitor:
 
     def _anew(self, regimes: RegimeFilter, number: int) -> list[Event]:
         """Begin again with the last minutes: she may manoeuvre for days."""
-        source = int(self._memory.watch.source[0])
+        source = int(self._watch.source)
         events = self._rest(regimes, number)
         self._regimes = regimes  # what a person told it stays told
         self._wake(source, number)
@@ -522,14 +528,14 @@ class Monitor:
     def _fall_back(self, now_ns: int) -> bool:
         """Go on with another speed source where the one watched is silent, if there is one."""
         steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
-        failed = int(self._memory.watch.source[0])
+        failed = int(self._watch.source)
         for source in SOURCES.tolist():
             # by the rule that found the other silent: or both would be tried in turn for ever
             silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
-            doubted = self._memory.watch.doubted[source] > now_ns // SECOND_NS
+            doubted = self._watch.doubted[source] > now_ns // SECOND_NS
             if source == failed or silent or doubted or np.isnan(steadiness.limit[source, 0]):
                 continue
-            self._memory.watch.source[0] = source
+            self._watch.source = source
             return True
         return False
 
@@ -537,9 +543,9 @@ class Monitor:
         assert self._running is not None
         assert self._regimes is not None
         assert self._estimator is not None
-        watch = self._memory.watch
-        stamp_ns = int(watch.update_ns[0])
-        watch.update_ns[0] = self._running.due_ns(next_stamp_ns)
+        watch = self._watch
+        stamp_ns = int(watch.update_ns)
+        watch.update_ns = self._running.due_ns(next_stamp_ns)
         gliding = self._regimes.gliding > 0.5
         return self._running.update(stamp_ns, self._estimator, gliding=gliding)
 
@@ -566,7 +572,7 @@ class Monitor:
         """End what runs, if anything, at the last sample of its speed source."""
         if self._regimes is None:
             return []
-        end_ns = int(self._memory.guard.last_ns[self._memory.watch.source[0]])
+        end_ns = int(self._memory.guard.last_ns[self._watch.source])
         number = end_ns // SECOND_NS
         events = self._judged(number + 1, number)  # what came since the last bin that was judged
         regimes = self._regimes
@@ -579,10 +585,10 @@ class Monitor:
 
     def _stand_down(self) -> None:
         """Watch for an onset again, once the ship has been steady."""
-        watch = self._memory.watch
-        watch.source[0] = NEVER
-        watch.update_ns[0] = ALWAYS
-        watch.armed[0] = 0
+        watch = self._watch
+        watch.source = NEVER
+        watch.update_ns = ALWAYS
+        watch.armed = 0
         self._running = self._regimes = None
 
 

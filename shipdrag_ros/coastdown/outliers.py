@@ -21,7 +21,6 @@ import numpy as np
 
 from shipdrag_ros.coastdown.past import (
     AGREED,
-    CHANNELS,
     FIRST_TRACK,
     GEODETIC,
     KEPT,
@@ -70,16 +69,6 @@ def quickness(length_m: float) -> float:
     return _LOSES_M_S2 * min(froude_square, 1.0)
 
 
-@compiled(uncounted=True)
-def forget_past(past: Past) -> None:
-    """
-    Return to the state before the first reading.
-    """
-    past.heard_ns[:] = NEVER
-    for channel in range(CHANNELS):
-        learn_anew(past, channel)
-
-
 @compiled(inline=True, uncounted=True)
 def fits(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool:
     """
@@ -88,26 +77,13 @@ def fits(past: Past, quick: float, channel: int, reading: JudgedReading) -> bool
     Changes nothing.
     """
     last, a, b = (past.accepted[channel] - 1) % KEPT, reading.a, reading.b
+    off = abs(a - past.value[channel, last, 0])
     if KIND[channel] < FIRST_TRACK:
-        if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
-            return True
-    elif KIND[channel] < GEODETIC:
-        x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
-        if abs(x) + abs(y) <= past.gate[channel]:
-            return True
+        near = a != 0.0 and off <= past.gate[channel]
     else:
-        x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
-        if (abs(x) + abs(y)) * M_PER_DEGREE <= past.gate[channel]:
-            return True
-    return bool(_may_be(past, quick, channel, reading))
-
-
-@compiled(inline=True, uncounted=True)
-def sticks(past: Past, channel: int) -> bool:
-    """
-    Say whether the last reading, if it comes again, is that of a sensor that sticks.
-    """
-    return bool(past.stuck[channel])
+        off += abs(b - past.value[channel, last, 1])
+        near = off * (M_PER_DEGREE if KIND[channel] == GEODETIC else 1.0) <= past.gate[channel]
+    return bool(near or _may_be(past, quick, channel, reading))
 
 
 @compiled(uncounted=True)

@@ -19,7 +19,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Block, Float64, Int64, UInt8
 
 CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a second
-_FIRST_CAPACITY = 1 << 12
+FIRST_CAPACITY = 1 << 12
 REFUSED = 128  # added to the channel of a sample that was refused
 
 
@@ -101,24 +101,13 @@ def make_room(store: RingBuffer, *, keep_ns: int, late_ns: int, capacity: int) -
     newest = int(sound.max()) if len(sound) else 0
     begin = max(_before(store, newest - keep_ns, late_ns), end - capacity)
     room = len(store.stamp_ns)
+    grown = store
     if 2 * (end - begin) > room:
         grown = RingBuffer.fresh(min(2 * room, 2 * capacity))
-    else:
-        grown = store
-    grown.channel[: end - begin] = store.channel[begin:end]
-    grown.stamp_ns[: end - begin] = store.stamp_ns[begin:end]
-    grown.receive_ns[: end - begin] = store.receive_ns[begin:end]
-    grown.value[: end - begin] = store.value[begin:end]
-    grown.variance[: end - begin] = store.variance[begin:end]
+    for name in RingBuffer._fields[:-1]:
+        getattr(grown, name)[: end - begin] = getattr(store, name)[begin:end]
     grown.end[0] = end - begin
     return grown
-
-
-def first_store() -> RingBuffer:
-    """
-    Return the small buffer a monitor starts with.
-    """
-    return RingBuffer.fresh(_FIRST_CAPACITY)
 
 
 def since(store: RingBuffer, start_ns: int, *, late_ns: int, capacity: int) -> Block:

@@ -35,15 +35,13 @@ import numpy as np
 from shipdrag_ros.coastdown.outliers import (
     JudgedReading,
     fits,
-    forget_past,
     proves_refused,
     quickness,
     refuse,
     repeats_refused,
-    sticks,
     take,
 )
-from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER, Past
+from shipdrag_ros.coastdown.past import CHANNELS, NEVER, Past
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
@@ -66,22 +64,9 @@ from shipdrag_ros.samples import (
 STAMP_JUMPED_BACK = -1
 ARRIVAL_JUMPED_BACK = -2
 
-_ACCEPTED = int(Reason.ACCEPTED)
-_DUPLICATE = int(Reason.DUPLICATE)
-_OUT_OF_ORDER = int(Reason.OUT_OF_ORDER)
-_LATE = int(Reason.LATE)
-_FUTURE = int(Reason.FUTURE)
-_NAN = int(Reason.NAN)
-_INFINITE = int(Reason.INFINITE)
-_ABSURD = int(Reason.ABSURD)
-_FROZEN = int(Reason.FROZEN)
-_OUTLIER = int(Reason.OUTLIER)
-
-_SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this kind and those before it
-_POSITION = int(Channel.POSITION)
 # The motion of a ship at sea never repeats to the last bit; a stopped shaft, a rudder
 # amidships, a steady depth and a course held by a coarse compass do, and rightly.
-_MOTION = GEODETIC  # this kind and those before it
+_MOTION = Channel.POSITION_GEODETIC  # this kind and those before it
 _TWO_COLUMNS = np.array(
     [
         channel.kind in (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
@@ -189,43 +174,42 @@ def examine(
     if arrival < guard.arrival_ns[0] - BACKWARD_JUMP_NS:
         return ARRIVAL_JUMPED_BACK
     if stamp > arrival + FUTURE_NS:
-        return _FUTURE
+        return Reason.FUTURE
     last = guard.last_ns[channel]
     if stamp <= last:
         if stamp < last - BACKWARD_JUMP_NS:
             agree = guard.back[channel] >= SET_BACK - 1 and stamp > guard.back_ns[channel]
-            return STAMP_JUMPED_BACK if agree else _LATE
+            return STAMP_JUMPED_BACK if agree else Reason.LATE
         if stamp == last:
-            return _DUPLICATE
-        return _OUT_OF_ORDER
+            return Reason.DUPLICATE
+        return Reason.OUT_OF_ORDER
     if stamp < guard.newest_ns[0] - limits.late_ns:
-        return _LATE
+        return Reason.LATE
     two = _TWO_COLUMNS[channel]
     if np.isnan(a) or (two and np.isnan(b)):
-        return _NAN
+        return Reason.NAN
     if np.isinf(a) or (two and np.isinf(b)):
-        return _INFINITE
-    if KIND[channel] <= _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
-        return _ABSURD
+        return Reason.INFINITE
+    if KIND[channel] <= Channel.SPEED_OVER_GROUND and abs(a) > ABSURD_SPEED_M_S:
+        return Reason.ABSURD
     if KIND[channel] > _MOTION:
-        return _ACCEPTED
-    if KIND[channel] == GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
-        return _ABSURD
-    if KIND[channel] == _POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
-        return _ABSURD
+        return Reason.ACCEPTED
+    if KIND[channel] == Channel.POSITION_GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
+        return Reason.ABSURD
+    if KIND[channel] == Channel.POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
+        return Reason.ABSURD
+    stuck = guard.past.stuck[channel] != 0
     if (
         a == guard.held[channel, 0]
         and (not two or b == guard.held[channel, 1])
-        and (
-            stamp - guard.held_since_ns[channel] > limits.frozen_ns or sticks(guard.past, channel)
-        )
+        and (stuck or stamp - guard.held_since_ns[channel] > limits.frozen_ns)
     ):
-        return _FROZEN
+        return Reason.FROZEN
     if fits(guard.past, limits.quick, channel, reading):
-        return _ACCEPTED
+        return Reason.ACCEPTED
     if repeats_refused(guard.past, channel, reading, limits.frozen_ns):
-        return _FROZEN
-    return _OUTLIER
+        return Reason.FROZEN
+    return Reason.OUTLIER
 
 
 @compiled(inline=True, uncounted=True)
@@ -279,11 +263,11 @@ def reject(
     Take a sample that was rejected into the memory of the tests.
     """
     stamp = reading.stamp
-    if code == _LATE and stamp < guard.last_ns[channel] - BACKWARD_JUMP_NS:
+    if code == Reason.LATE and stamp < guard.last_ns[channel] - BACKWARD_JUMP_NS:
         ascends = stamp > guard.back_ns[channel]
         guard.back[channel] = guard.back[channel] + 1 if ascends else 1
         guard.back_ns[channel] = stamp
-    if code >= _FROZEN:
+    if code >= Reason.FROZEN:
         refuse(guard.past, limits.quick, channel, reading)
 
 
@@ -297,21 +281,6 @@ def alive_ns(guard: CheckMemory, limits: Limits, channel: int) -> int:
     """
     last = guard.last_ns[channel]
     return int(max(last, min(guard.past.heard_ns[channel], last + limits.frozen_ns)))
-
-
-@compiled(uncounted=True)
-def forget(guard: CheckMemory) -> None:
-    """
-    Return to the state before the first sample.
-    """
-    guard.last_ns[:] = NEVER
-    guard.newest_ns[:] = NEVER
-    guard.arrival_ns[:] = NEVER
-    guard.back_ns[:] = NEVER
-    guard.back[:] = 0
-    guard.held[:] = np.nan
-    guard.held_since_ns[:] = NEVER
-    forget_past(guard.past)
 
 
 def validate(block: Block, parameters: Parameters, length_m: float) -> UInt8:
@@ -337,21 +306,19 @@ def validate(block: Block, parameters: Parameters, length_m: float) -> UInt8:
     Where a clock was set the tests start afresh, as in `Monitor`.
     """
     reasons = np.empty(len(block), np.uint8)
-    _walk(
-        CheckMemory.fresh(),
-        Limits.of(parameters, length_m),
-        np.ascontiguousarray(block.channel),
-        np.ascontiguousarray(block.stamp_ns),
-        np.ascontiguousarray(block.receive_ns),
-        np.ascontiguousarray(block.value),
-        np.ascontiguousarray(block.variance),
-        reasons,
-    )
+    limits, at = Limits.of(parameters, length_m), 0
+    channel = np.ascontiguousarray(block.channel)
+    stamp_ns = np.ascontiguousarray(block.stamp_ns)
+    receive_ns = np.ascontiguousarray(block.receive_ns)
+    value, variance = block.value, block.variance
+    while at < len(block):
+        fresh = CheckMemory.fresh()
+        at = _walk(fresh, limits, channel, stamp_ns, receive_ns, value, variance, reasons, at)
     return reasons
 
 
 @compiled(
-    f'void(Memory, Limits, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, u1[::1])',
+    f'i8(Memory, Limits, {CHANNEL_CODES}, {STAMPS}, {STAMPS}, {VALUES}, {VALUES}, u1[::1], i8)',
     like={'Memory': CheckMemory.fresh(), 'Limits': Limits(0, 0, 1.0)},
     uncounted=True,
 )
@@ -364,23 +331,25 @@ def _walk(
     value: Float64,
     variance: Float64,
     reasons: UInt8,
-) -> None:
-    for i in range(len(channel)):
+    start: int,
+) -> int:
+    """Judge samples from `start` on until a clock was set; return the first one not judged."""
+    for i in range(start, len(channel)):
         c, arrival = int(channel[i]), receive_ns[i]
         reading = reading_of(stamp_ns, value, variance, i)
         code = examine(guard, limits, c, arrival, reading)
         if code < 0:
-            forget(guard)
-            code = examine(guard, limits, c, arrival, reading)
-        if code == _ACCEPTED and proves(guard, limits, c, reading):
+            return i
+        if code == Reason.ACCEPTED and proves(guard, limits, c, reading):
             _accept_refused(guard, c, i, channel, stamp_ns, value, variance, reasons)
             code = examine(guard, limits, c, arrival, reading)
-        if code == _ACCEPTED:
+        if code == Reason.ACCEPTED:
             remember(guard, c, reading)
         else:
             reject(guard, limits, code, c, reading)
         guard.arrival_ns[0] = arrival
         reasons[i] = code
+    return len(channel)
 
 
 @compiled(uncounted=True)
@@ -400,19 +369,19 @@ def _accept_refused(
     while begin > 0 and not (
         channels[begin - 1] == channel
         and (
-            reasons[begin - 1] == _ACCEPTED
-            or (reasons[begin - 1] == _OUTLIER and stamp_ns[begin - 1] < first)
+            reasons[begin - 1] == Reason.ACCEPTED
+            or (reasons[begin - 1] == Reason.OUTLIER and stamp_ns[begin - 1] < first)
         )
     ):
         begin -= 1
     for i in range(begin, end):
         if (
             channels[i] == channel
-            and reasons[i] == _OUTLIER
+            and reasons[i] == Reason.OUTLIER
             and stamp_ns[i] > guard.last_ns[channel]
         ):
             remember(guard, channel, reading_of(stamp_ns, value, variance, i))
-            reasons[i] = _ACCEPTED
+            reasons[i] = Reason.ACCEPTED
 
 
 def clock_set(memory: CheckMemory, code: int, channel: int, stamp_ns: int, receive_ns: int) -> str:

@@ -236,7 +236,7 @@ def forecast(runs: Sequence[RunResult], after_s: float | Sequence[float]) -> For
     made: list[GlideForecast] = []
     without: list[tuple[str, str]] = []
     for run in runs:
-        glides = [] if run.replayed is None else list(forecast_run(run.replayed, times_s))
+        glides = list(forecast_run(run, times_s))
         made += glides
         if not glides:
             dismissed = (f'{utc(one.start_ns)}: {one.text}.' for one in run.dismissed)
@@ -391,7 +391,7 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
     EstimationError
         If no speed was read at its end, or nothing is known of the hull.
     """
-    last = max(runs, key=lambda each: (each.span_ns or (0, 0))[1])
+    last = max(runs, key=lambda each: (each.run.span_ns or (0, 0))[1])
     usable = [
         (each.end_ns, each, run)
         for run in runs
@@ -408,7 +408,6 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
         assert coastdown.estimate is not None  # a mean lags behind a ship that slows
         speed, sd = coastdown.estimate.last_speed_m_s, coastdown.estimate.last_speed_sigma_m_s
         now_ns, measured = coastdown.estimate.end_ns, 'through water, estimated'
-    assert last.replayed is not None
     found = if_stopped(
         hull,
         last.ship,
@@ -416,7 +415,7 @@ def if_stopped_now(runs: Sequence[RunResult]) -> IfStopped:
         now_ns,
         speed_sd_m_s=sd,
         gliding=gliding,
-        speeds_m_s=last.replayed.parameters.forecast_speeds,
+        speeds_m_s=last.parameters.forecast_speeds,
     )
     return IfStopped(last.bag, last.ship, hull.source, measured, gliding, found)
 
@@ -446,8 +445,7 @@ def _hull(coastdown: EndedCoastdown) -> HullNow:
 
 def _recent(run: RunResult) -> tuple[Window, Series, str]:
     """Return the end of a run, the speed that it shows, and which it is."""
-    assert run.replayed is not None
-    block, _ = accepted_samples(run.replayed.run, run.replayed.ship)
+    block, _ = accepted_samples(run.run, run.ship)
     if len(block):
         end_ns = int(block.stamp_ns.max())
         window = Window.from_block(block, end_ns - round(_RECENT_S * SECOND_NS), end_ns)

@@ -26,7 +26,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.given_window import margin_around_ns, parts_of_one_clock
-from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed, recorded_parameters
+from shipdrag_ros.replay.playback import ReplayResult, feed, recorded_parameters
 from shipdrag_ros.samples import (
     ALL_MOTION,
     KIND,
@@ -53,14 +53,14 @@ def clocks_apart(result: ReplayResult) -> tuple[str, ...]:
 
     Most of their messages are rejected as late, or as from the future.
     """
+    off = {
+        name: counts.rejected.get('late', 0) + counts.rejected.get('future', 0)
+        for name, counts in result.inputs.items()
+    }
     return tuple(
-        name for name in ALL_MOTION if name in result.inputs and _most_are_off(result.inputs[name])
-    )
-
-
-def _most_are_off(counts: InputCounts) -> bool:
-    return counts.rejected.get('late', 0) + counts.rejected.get('future', 0) > (
-        _MOST * counts.messages
+        name
+        for name in ALL_MOTION
+        if name in off and off[name] > _MOST * result.inputs[name].messages
     )
 
 
@@ -85,14 +85,14 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     fast ones as well, coastdowns are looked for anew; those have no estimate.
     """
     coastdowns = result.coastdowns
-    apart = bool(clocks_apart(result))
-    if apart and not any(each.ended_by is EndedBy.GIVEN for each in coastdowns):
+    given = any(each.ended_by is EndedBy.GIVEN for each in coastdowns)
+    if clocks_apart(result) and not given:
         coastdowns = _look_anew(result) or coastdowns
     found = []
     for coastdown in coastdowns:
         if not coastdown.withdrawn:
             start_ns, steady = begins(coastdown)
-            window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
+            window = window_between(result, start_ns, coastdown.end_ns, steady=steady)
             found.append((coastdown, replace(window, told_ns=coastdown.told_ns)))
     return found
 
@@ -134,8 +134,7 @@ def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | No
         return None
     first_ns = min(start_ns, *(first for first, _ in parts))
     last_ns = max(coastdown.end_ns, *(last for _, last in parts))
-    apart = bool(clocks_apart(result))
-    window = window_between(result, first_ns, last_ns, steady=steady, apart=apart)
+    window = window_between(result, first_ns, last_ns, steady=steady)
     return replace(window, told_ns=coastdown.told_ns)
 
 
@@ -143,9 +142,8 @@ def dismissed_glides(result: ReplayResult) -> list[Window]:
     """
     Read what she did without thrust where no coastdown was found in it.
     """
-    apart = bool(clocks_apart(result))
     return [
-        window_between(result, glide.start_ns, glide.end_ns, steady=True, apart=apart)
+        window_between(result, glide.start_ns, glide.end_ns, steady=True)
         for glide in result.whole_glides
         if all(each.withdrawn for each in result.coastdowns)
     ]
@@ -178,9 +176,7 @@ def _arrived_later(block: Block) -> Block:
     return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * SECOND_NS))
 
 
-def window_between(
-    result: ReplayResult, start_ns: int, end_ns: int, *, steady: bool, apart: bool = False
-) -> Window:
+def window_between(result: ReplayResult, start_ns: int, end_ns: int, *, steady: bool) -> Window:
     """
     Read the samples of a part of a replay again.
 
@@ -192,8 +188,6 @@ def window_between(
         Stamps [ns].
     steady
         The record before may be steady sailing, and is read too.
-    apart
-        The clocks of the inputs are apart.
 
     Returns
     -------
@@ -207,7 +201,8 @@ def window_between(
     inputs = result.run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])
     length_m = result.ship.length_m
-    reasons = validate(_arrived_later(block) if apart else block, parameters, length_m)
+    heard = _arrived_later(block) if clocks_apart(result) else block
+    reasons = validate(heard, parameters, length_m)
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
     # a clock that was set tells some times twice
     shown = [

@@ -27,7 +27,7 @@ from shipdrag_ros.samples import Float64
 COMPARED = (SPEED, RESISTANCE, RESISTANCE_CURVE, FORECAST, FORECAST_PATH)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Recorded:
     """
     The bag's own outputs against the replayed ones.
@@ -50,9 +50,9 @@ class Recorded:
         Version of this package that recorded the bag; None if that is not known.
     """
 
-    compared: int
-    identical: int
-    first_difference: str | None
+    compared: int = 0
+    identical: int = 0
+    first_difference: str | None = None
     largest_difference: float = 0.0
     largest_difference_sigma: float = 0.0
     by: str | None = None
@@ -79,13 +79,9 @@ class Comparison:
 
     def __init__(self, recorded: Iterator[OutputMessage], *, by: str | None = None) -> None:
         self._recorded = recorded
-        self._by = by
+        self._found = Recorded(by=by)
         self._queues: dict[str, deque[OutputMessage]] = {topic.name: deque() for topic in COMPARED}
         self._begun: set[str] = set()
-        self._compared = 0
-        self._identical = 0
-        self._first_difference: str | None = None
-        self._largest_difference = self._largest_sigma = 0.0
 
     def add(self, replayed: OutputMessage) -> None:
         """
@@ -119,14 +115,7 @@ class Comparison:
             for message in queue:
                 self._differ(message, None)
             queue.clear()
-        return Recorded(
-            self._compared,
-            self._identical,
-            self._first_difference,
-            self._largest_difference,
-            self._largest_sigma,
-            self._by,
-        )
+        return self._found
 
     def _read_one(self) -> bool:
         """Put one more recorded message into its queue; False behind the last."""
@@ -141,18 +130,18 @@ class Comparison:
         if recorded.payload != replayed.payload:
             self._differ(recorded, replayed)
         else:
-            self._compared += 1
-            self._identical += 1
+            self._found.compared += 1
+            self._found.identical += 1
 
     def _differ(self, recorded: OutputMessage | None, replayed: OutputMessage | None) -> None:
-        self._compared += 1
-        self._largest_difference = max(
-            self._largest_difference, _relative_difference(recorded, replayed)
-        )
-        self._largest_sigma = max(self._largest_sigma, _sigmas(recorded, replayed))
+        found = self._found
+        found.compared += 1
+        difference, sigmas = _relative_difference(recorded, replayed), _sigmas(recorded, replayed)
+        found.largest_difference = max(found.largest_difference, difference)
+        found.largest_difference_sigma = max(found.largest_difference_sigma, sigmas)
         message = recorded or replayed
-        if self._first_difference is None and message is not None:
-            self._first_difference = (
+        if found.first_difference is None and message is not None:
+            found.first_difference = (
                 f'{message.topic} at {message.stamp_ns} ns: recorded {_content(recorded)}, '
                 f'replayed {_content(replayed)}'
             )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.coastdown.given import Examined, GivenPart, estimate_given
+from shipdrag_ros.coastdown.given import GivenPart, estimate_given
 from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import Window, estimate_final
@@ -129,25 +129,24 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     parts = [part for part in parts_of_one_clock(accepted) if inside[part].any()]
     if len(parts) > 1:
         failure = _clock_set(accepted, parts, samples.begin_ns)
-        found = Examined(GivenPart(start_ns, end_ns, failure=failure), None, failure)
+        found = GivenPart(start_ns, end_ns, failure=failure, refused=True)
     else:
         accepted = accepted[parts[0]] if parts else accepted[:0]
         before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
         window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
         found = estimate_given(window, ship, parameters, estimate_final)
-    judged = found.judged
-    heading = _heading(accepted, judged.start_ns)
+    heading = _heading(accepted, found.start_ns)
     return EndedCoastdown(
-        judged.start_ns,
-        judged.end_ns,
+        found.start_ns,
+        found.end_ns,
         None,
         EndedBy.GIVEN,
         found.estimate,
         found.failure,
         None if heading is None else rep103_yaw(heading, parameters.heading_convention),
         withdrawn=found.refused,
-        cuts=judged.cuts,
-        stretch=judged.stretch,
+        cuts=found.cuts,
+        stretch=found.stretch,
     )
 
 

@@ -269,7 +269,7 @@ def _coastdown(
                 (estimate_tables.SPECIFIC, estimate_tables.curve_table(curve, truth=truth))
             )
     found.append(('How it was found', tables.facts(coastdown)))
-    cuts = cut_lines(coastdown, run.span_ns)
+    cuts = cut_lines(coastdown, run.run.span_ns)
     lines = words.summary(coastdown, run.ship)
     return Section(
         f'Coastdown {number}: {display.utc(coastdown.start_ns)}',
@@ -299,14 +299,14 @@ def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
     """Draw what there are data for."""
     if coastdown.stretch:
         yield picture(
-            cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
+            cut_picture(coastdown, run.run.span_ns, run.ship.mass_kg),
             'Speed over the whole stretch. Hatched: what was cut, and why; only the rest is '
             'taken for a coastdown.',
         )
     if coastdown.regimes is not None:
         hatched = ' Hatched: what was cut, and why.' if coastdown.cuts else ''
         yield picture(
-            cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
+            cut_picture(coastdown, run.run.span_ns, run.ship.mass_kg),
             f'Speed, and below it how probable each thing is that she may have done.{hatched}',
         )
     estimate = coastdown.estimate

@@ -45,8 +45,6 @@ WRONG_TYPE = 'type'
 StopTime = float | datetime
 """In s from the start of the bag, or as a time of day with its zone."""
 
-# done, of how many messages
-
 
 @dataclass(frozen=True)
 class InputCounts:
@@ -203,7 +201,8 @@ def settings_of(
     """
     if not any(topic.input for topic in run.topics):
         raise BagError(_no_input(run))
-    return checked(_ship(run, ship)), _parameters(run, parameters)
+    used = checked(_ship(run, ship))
+    return used, recorded_parameters(run) if parameters is None else parameters
 
 
 def _no_input(run: Run) -> str:
@@ -264,8 +263,9 @@ def _as_on_board(
         if progress is not None:
             progress(inputs.messages.total(), total)
     take(monitor.finish())
-    used = {name: health.used for name, health in monitor.health().items()}
-    rejected = {name: health.rejected for name, health in monitor.health().items()}
+    health = monitor.health()
+    used = {name: one.used for name, one in health.items()}
+    rejected = {name: one.rejected for name, one in health.items()}
     return ReplayResult(
         run,
         ship,
@@ -315,7 +315,7 @@ def _in_window(
         (coastdown,),
         (coastdown, *coastdown.cuts),
         _counts(run, samples.inputs, used, rejected),
-        Recorded(0, 0, None, by=_by(run)),
+        Recorded(by=_by(run)),
     )
 
 
@@ -346,12 +346,6 @@ def _ship(run: Run, given: Ship | None) -> Ship:
     return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
 
 
-def _parameters(run: Run, given: Parameters | None) -> Parameters:
-    if given is not None:
-        return given
-    return recorded_parameters(run)
-
-
 def recorded_parameters(run: Run) -> Parameters:
     """
     Return the parameters attached to a bag; what this version does not have is noted.
@@ -373,7 +367,7 @@ def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
         return False
     own_ship = SHIP_FILE not in run.attachments or _ship(run, None).to_yaml() == ship.to_yaml()
     return own_ship and (
-        PARAMETERS_FILE not in run.attachments or _parameters(run, None) == parameters
+        PARAMETERS_FILE not in run.attachments or recorded_parameters(run) == parameters
     )
 
 
@@ -438,13 +432,15 @@ def with_stop(items: Iterable[Block | Mark], at_ns: int | None) -> Iterator[Bloc
         Its time of arrival [ns].
     """
     for item in items:
-        if at_ns is None or not isinstance(item, Block) or not len(item):
+        if (
+            at_ns is None
+            or not isinstance(item, Block)
+            or not len(item)
+            or item.receive_ns[-1] < at_ns
+        ):
             yield item
             continue
-        first = int(np.argmax(item.receive_ns >= at_ns)) if item.receive_ns[-1] >= at_ns else -1
-        if first < 0:
-            yield item
-            continue
+        first = int(np.argmax(item.receive_ns >= at_ns))
         yield item[:first]
         yield StopMark(at_ns)
         yield item[first:]

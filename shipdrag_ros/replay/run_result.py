@@ -3,47 +3,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import NotCoastdown
 from shipdrag_ros.display import Table, short_repr
-from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
+from shipdrag_ros.replay import ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.replay.words import run_warnings
-from shipdrag_ros.ship import Ship
 
 _READ_AGAIN = 2_000_000  # messages: all their samples are held at once
 
 
 @dataclass(frozen=True)
-class RunResult:
+class RunResult(ReplayResult):
     """
-    Everything one run gave.
+    What a run gave, with what is said of it.
 
     Attributes
     ----------
-    bag
-        Name of the bag, as the user gave it.
-    ship
-        The ship that was used.
-    coastdowns
-        In the order of their start.
-    inputs
-        Messages counted, by input.
-    recorded
-        Comparison with the outputs in the bag.
     warnings
         What is wrong with the run, a sentence each.
     truth
         The true curve, where the record is simulated.
-    span_ns
-        First and last time of arrival in the bag [ns]; None where it is empty.
-    not_coastdowns
-        What was nearly a coastdown, and what was cut, with why.
-    steady_lead_s
-        The longest that the ship was steady; None where no coastdown was looked for.
     why_none
         What the speed did where nothing was even nearly a coastdown; '' where there is
         something.
@@ -51,18 +33,14 @@ class RunResult:
 
     __repr__ = short_repr
 
-    bag: str
-    ship: Ship
-    coastdowns: tuple[EndedCoastdown, ...]
-    inputs: Mapping[str, InputCounts]
-    recorded: Recorded
     warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
-    span_ns: tuple[int, int] | None = None
-    not_coastdowns: tuple[NotCoastdown, ...] = ()
-    steady_lead_s: float | None = None
     why_none: str = ''
-    replayed: ReplayResult | None = field(default=None, repr=False)
+
+    @property
+    def bag(self) -> str:
+        """Name of the bag, as the user gave it."""
+        return self.run.name
 
     @property
     def dismissed(self) -> tuple[NotCoastdown, ...]:
@@ -104,21 +82,12 @@ class RunResult:
         BagError
             If the truth in the bag cannot be read.
         """
-        run = result.run
-        text = run.attachments.get(ATTACHMENT)
+        text = result.run.attachments.get(ATTACHMENT)
         return cls(
-            bag=run.name,
-            ship=result.ship,
-            coastdowns=result.coastdowns,
-            inputs=result.inputs,
-            recorded=result.recorded,
+            **vars(result),
             warnings=run_warnings(result),
-            truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
-            span_ns=run.span_ns,
-            not_coastdowns=result.not_coastdowns,
-            steady_lead_s=result.steady_lead_s,
+            truth=None if text is None else TrueCurve.from_yaml(text, subject=result.run.name),
             why_none=_why_none(result),
-            replayed=result,
         )
 
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.events import Dismissal
-from shipdrag_ros.coastdown.given import Examined, estimate_given
+from shipdrag_ros.coastdown.given import GivenPart, estimate_given
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SHAFTS, Block, Channel, in_arrival_order
@@ -50,7 +50,7 @@ def examined(
     values: dict[Channel, NDArray[np.float64]],
     *,
     convention: str = 'rep103',
-) -> Examined:
+) -> GivenPart:
     """Examine a window of a record, as given by hand, and estimate."""
     stamps = np.round(time_s * 1e9).astype(np.int64)
     block = in_arrival_order([Block.of(channel, stamps, v) for channel, v in values.items()])
@@ -60,15 +60,15 @@ def examined(
     return estimate_given(window, ship, parameters, estimate_final)
 
 
-def kept_s(found: Examined) -> tuple[float, float]:
-    return found.judged.start_ns / 1e9, found.judged.end_ns / 1e9
+def kept_s(found: GivenPart) -> tuple[float, float]:
+    return found.start_ns / 1e9, found.end_ns / 1e9
 
 
-def reasons(found: Examined) -> set[Dismissal]:
-    return {cut.reason for cut in found.judged.cuts}
+def reasons(found: GivenPart) -> set[Dismissal]:
+    return {cut.reason for cut in found.cuts}
 
 
-def resistance(found: Examined, speed: float) -> tuple[float, float]:
+def resistance(found: GivenPart, speed: float) -> tuple[float, float]:
     """Return r and two standard deviations."""
     assert found.estimate is not None, found.failure
     curve = found.estimate.valid_curve
@@ -85,7 +85,7 @@ def test_a_car_accelerates_coasts_and_brakes(window_s: tuple[float, float]) -> N
     record = table('car/shotgoose_RR-Coastdown-1_whole_100hz.csv')
     values = {Channel.SPEED_OVER_GROUND: record['v_mps']}
     found = examined(Ship.load(SHIPS / 'car.yaml'), record['t_s'], window_s, values)
-    assert found.judged.cuts[-1].reason is Dismissal.BRAKE
+    assert found.cuts[-1].reason is Dismissal.BRAKE
     assert kept_s(found)[0] == pytest.approx(9.5, abs=0.3)
     # the brake is pressed in half a second, and a bin takes up to a third of one
     assert kept_s(found)[1] == pytest.approx(17.2, abs=0.4)
@@ -189,7 +189,7 @@ def test_a_propeller_that_turns_leaves_no_coastdown(name, window_s, reason):
 def test_a_tanker_that_turns_while_it_coasts() -> None:
     time_s, values = esso_osaka('2030s')
     found = examined(ESSO_OSAKA, time_s, (2050.0, 2093.0), values)
-    assert 'she turns' in found.judged.notes[0]
+    assert 'she turns' in found.notes[0]
     assert kept_s(found)[0] == pytest.approx(2067.0, abs=0.8)
     r, band = resistance(found, 0.17)
     assert abs(r - 0.0026) < np.hypot(0.0002, band)

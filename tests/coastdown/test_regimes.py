@@ -18,11 +18,9 @@ from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowe
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     AMID,
-    BEFORE,
     BRAKE,
     GLIDE,
     HELD,
-    KIND,
     LEVEL,
     LN_A,
     LN_U,
@@ -32,8 +30,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_LOG,
     N_WANDER,
     OPEN,
-    REGIME,
-    REVS,
     SAID,
     BankSetting,
     Histories,
@@ -233,14 +229,14 @@ def test_what_follows_a_manoeuvre_knows_her_speed_and_revs_in_it(ship) -> None:
     bank, setting = Histories.fresh(), BankSetting.of(HullPrior.of(ship), BIN_S, shafts=1)
     bank.used[0] = 1
     bank.mean[0, [LN_U, LN_A, OPEN]] = np.log(6.0), setting.hull.level, 0.01
-    bank.whole[0, REGIME], bank.number[0, REVS] = AMID, 0.6
+    bank.row['regime'][0], bank.row['revs'][0] = AMID, 0.6
     brakes(bank, 0, setting, 100.0, 0.1)
     glides(bank, 0, setting, 100.0, 0.1)
     after = slice(1, int(bank.used[0]))
-    assert np.allclose(bank.number[after, BEFORE], np.log(6.0))
-    held = (bank.whole[after, REGIME] == GLIDE) & (bank.whole[after, KIND] >= HELD)
+    assert np.allclose(bank.row['before'][after], np.log(6.0))
+    held = (bank.row['regime'][after] == GLIDE) & (bank.row['kind'][after] >= HELD)
     assert held.any()
-    assert np.all(bank.number[after, REVS][held] == 0.6)
+    assert np.all(bank.row['revs'][after][held] == 0.6)
 
 
 @pytest.mark.parametrize('seed', range(4))

@@ -17,6 +17,7 @@ from shipdrag_ros.replay.page import comparison_picture, cut_picture, write_repo
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import RankedHull, rank
 from tests.page import Page
+from tests.runs import seen
 
 
 @pytest.fixture(scope='module')
@@ -51,7 +52,7 @@ def test_the_page_says_all_of_it(page: Any) -> None:
 def test_names_from_outside_are_text_and_nothing_else(run: RunResult, tmp_path: Path) -> None:
     evil = '<script>alert(1)</script>'
     write_report(
-        tmp_path / 'report.html', [replace(run, bag=evil, ship=replace(run.ship, name=evil))]
+        tmp_path / 'report.html', [replace(run, run=seen(evil), ship=replace(run.ship, name=evil))]
     )
     assert '<script' not in (tmp_path / 'report.html').read_text(encoding='utf-8')
     assert evil in Page(tmp_path / 'report.html').text
@@ -59,7 +60,7 @@ def test_names_from_outside_are_text_and_nothing_else(run: RunResult, tmp_path: 
 
 def test_a_record_without_coastdown_is_a_result(run: RunResult, tmp_path: Path) -> None:
     dismissed = NotCoastdown(0, 60 * 10**9, Dismissal.TURN, 'the ship turned by 90 deg')
-    none = replace(run, coastdowns=(), not_coastdowns=(dismissed,), steady_lead_s=345.0)
+    none = replace(run, coastdowns=(), events=(dismissed,), steady_lead_s=345.0)
     write_report(tmp_path / 'report.html', [none])
     page = Page(tmp_path / 'report.html')
     assert 'No coastdown found: longest steady sailing 345 s; one stretch was looked' in page.text
@@ -93,7 +94,7 @@ def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
 
 
 def test_coastdowns_of_one_ship_are_shown_together(run: RunResult, tmp_path: Path) -> None:
-    write_report(tmp_path / 'report.html', [run, replace(run, bag='again.mcap')])
+    write_report(tmp_path / 'report.html', [run, replace(run, run=seen('again.mcap'))])
     page = Page(tmp_path / 'report.html')
     assert page.text.index('All coastdowns together') < page.text.index('sea trial.mcap')
     assert 'run to run' in page.text

@@ -14,6 +14,7 @@ from shipdrag_ros.replay import tables as cells
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.tables import write_curves
 from shipdrag_ros.replay.together import rank
+from tests.runs import seen
 
 
 def test_facts_leave_out_what_is_not_known(coastdown: EndedCoastdown) -> None:
@@ -41,7 +42,7 @@ def test_rejections_are_shown_with_their_reason_and_zeros_are_not(run: RunResult
 
 
 def test_a_ranking_starts_with_the_best(run: RunResult) -> None:
-    other = replace(run, bag='b.mcap')
+    other = replace(run, run=seen('b.mcap'))
     assert [row[0] for row in cells.ranking_table(rank([run, other])).rows] == [
         '1. test ship sea trial.mcap',
         '2. test ship b.mcap',
@@ -92,7 +93,7 @@ def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:
 
 
 def test_a_name_that_is_a_formula_is_text_and_numbers_are_numbers(run, tmp_path):
-    named = replace(run, bag='=HYPERLINK("http://x","y").mcap')
+    named = replace(run, run=seen('=HYPERLINK("http://x","y").mcap'))
     write_curves(tmp_path / 'curves.csv', [named])
     with (tmp_path / 'curves.csv').open(newline='') as file:
         rows = list(csv.DictReader(file))

@@ -13,6 +13,7 @@ from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import rank, together
+from tests.runs import seen
 
 DAY_NS = 86_400 * 1_000_000_000
 
@@ -33,7 +34,7 @@ def later(run: RunResult, *, days: float, factor: float, bag: str = 'later.mcap'
     )
     start, end = coastdown.start_ns + shift, coastdown.end_ns + shift
     there = replace(coastdown, start_ns=start, end_ns=end, estimate=moved)
-    return replace(run, bag=bag, coastdowns=(there,))
+    return replace(run, run=seen(bag), coastdowns=(there,))
 
 
 def test_months_later_more_resistance_is_another_state(run: RunResult) -> None:
@@ -102,7 +103,7 @@ def hull(run: RunResult, name: str, *found: tuple[float, FroudeMax]) -> RunResul
     assert part.estimate is not None
     return replace(
         run,
-        bag=f'{name}.mcap',
+        run=seen(f'{name}.mcap'),
         ship=replace(run.ship, name=name),
         coastdowns=tuple(
             replace(part, estimate=coasted(part.estimate, top, rule)) for top, rule in found
@@ -146,12 +147,12 @@ def test_a_bound_is_called_one(run: RunResult) -> None:
 
 
 def test_one_hull_is_not_a_comparison(run: RunResult) -> None:
-    nothing = replace(run, bag='nothing.mcap', coastdowns=())
+    nothing = replace(run, run=seen('nothing.mcap'), coastdowns=())
     with pytest.raises(EstimationError, match=r"1 of 2 .* at least 2 .*'nothing\.mcap'"):
         rank([run, nothing])
 
 
 def test_a_bag_without_an_estimate_is_named(run: RunResult) -> None:
-    nothing = replace(run, bag='nothing.mcap', coastdowns=())
-    ranking = rank([run, replace(run, bag='b.mcap'), nothing])
+    nothing = replace(run, run=seen('nothing.mcap'), coastdowns=())
+    ranking = rank([run, replace(run, run=seen('b.mcap')), nothing])
     assert any('nothing.mcap' in note for note in ranking.notes)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.births import (
     amid,
     bear,
@@ -22,52 +23,7 @@ from shipdrag_ros.coastdown.regimes.births import (
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import decay_of, predict, pushes, rest_speed, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
-from shipdrag_ros.coastdown.regimes.state import (
-    A0,
-    A_VAR,
-    ADVANCE,
-    AMID,
-    BRAKE,
-    COUNT,
-    CURRENT,
-    DRIVEN,
-    EXCESS,
-    FADING,
-    GLIDE,
-    GLIDED,
-    GONE,
-    GROUND,
-    HIGH,
-    KIND,
-    LAG,
-    LEVEL,
-    LIAR,
-    LN_A,
-    LN_U,
-    LOG,
-    LONGER,
-    LOW,
-    N_FIX,
-    P0,
-    P_VAR,
-    POWER,
-    RAMP_S,
-    RATE,
-    REGIME,
-    REVS,
-    RUDDER,
-    SAID,
-    SHAFTS,
-    SINCE,
-    STATES,
-    STAYS,
-    STAYS_WAY,
-    THE_LOG,
-    WAY,
-    WEIGHT,
-    BankSetting,
-    Histories,
-)  # fmt: skip
+from shipdrag_ros.coastdown.regimes.state import BankSetting, Histories
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
@@ -122,9 +78,9 @@ class Bank(NamedTuple):
             NoiseFilters.fresh(),
             np.zeros(4),
             np.array([0.0, 0.0, np.nan]),
-            np.full(SAID, np.nan),
+            np.full(s.SAID, np.nan),
             np.zeros(OUTS),
-            np.zeros((2, STATES)),
+            np.zeros((2, s.STATES)),
         )
 
 
@@ -135,49 +91,41 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     hull, claimed = setting.hull, setting.engine > 0.0
     both = not np.isnan(log) and not np.isnan(track)
     for liar in range(3 if both else 1):
-        by_log = log > 0.0 and liar != THE_LOG  # the logarithm of rest is of no use
+        # the logarithm of rest is of no use; but claimed, she may be at rest, or go astern
+        by_log = (log > 0.0 or (claimed and not np.isnan(log))) and liar != s.THE_LOG
         speed = log if by_log else track
-        if claimed:  # she may be at rest, or go astern
-            by_log = not np.isnan(log) and liar != THE_LOG
-            speed = log if by_log else track
-            if not np.isnan(speed):
-                speed = max(rest_speed(hull), abs(speed))
+        if claimed and not np.isnan(speed):
+            speed = max(rest_speed(hull), abs(speed))
         if not speed > 0.0:
             continue
         off = (math.log(speed) - hull.sails) / n.SAILS[1]
-        for regime in (DRIVEN, AMID):
-            if claimed and regime == DRIVEN:  # nobody knows
+        for regime in (s.DRIVEN, s.AMID):
+            if claimed and regime == s.DRIVEN:  # nobody knows
                 continue
-            chance = n.AMID[0] if regime == AMID else 1.0 - n.AMID[0]
+            chance = n.AMID[0] if regime == s.AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
             chance *= math.exp(-0.5 * off * off)
             j = all_.used[0]
             all_.used[0] = j + 1
-            x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
-            for k in range(STATES):
-                x[k] = 0.0
-                for m in range(STATES):
-                    p[k, m] = 0.0
-            for k in range(len(f)):
-                f[k] = 0.0
-            for k in range(len(w)):
-                w[k] = 0
-            x[LN_U] = math.log(speed)
-            p[LN_U, LN_U] = 0.1**2 if by_log else 0.3**2
-            x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
-            x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
-            x[WAY] = 0.5 * setting.step_s * speed
-            p[WAY, WAY] = bank.noise.used[N_FIX] ** 2
-            p[LAG, LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
-            p[LONGER, LONGER] = n.LOG_LAG_SD**2
-            p[CURRENT, CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
-            f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
-            f[WEIGHT] = math.log(chance)
-            f[REVS] = f[STAYS] = f[STAYS_WAY] = np.nan
-            w[REGIME], w[LIAR] = regime, liar
+            x, p, f = all_.mean[j], all_.spread[j], all_.row[j]
+            x[:], p[:], all_.words[j] = 0.0, 0.0, 0
+            x[s.LN_U] = math.log(speed)
+            p[s.LN_U, s.LN_U] = 0.1**2 if by_log else 0.3**2
+            x[s.LN_A], p[s.LN_A, s.LN_A] = hull.level, hull.level_var
+            x[s.POWER], p[s.POWER, s.POWER] = hull.exponent, hull.exponent_var
+            x[s.WAY] = 0.5 * setting.step_s * speed
+            p[s.WAY, s.WAY] = bank.noise.used[s.N_FIX] ** 2
+            p[s.LAG, s.LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
+            p[s.LONGER, s.LONGER] = n.LOG_LAG_SD**2
+            p[s.CURRENT, s.CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
+            f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
+            f.p0, f.p_var = x[s.POWER], p[s.POWER, s.POWER]
+            f.weight = math.log(chance)
+            f.revs = f.stays = f.stays_way = np.nan
+            f.regime, f.liar = regime, liar
             driven(all_, j, hull)
-            if regime == AMID:
+            if regime == s.AMID:
                 amid(all_, j, setting, 0 if claimed else 1)
             if claimed:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
@@ -191,31 +139,31 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
 def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
     """Put the fastest and the slowest shaft over their steady revs; learn those."""
     said, revs = bank.said, bank.revs
-    said[HIGH] = said[LOW] = np.nan
+    said[s.HIGH] = said[s.LOW] = np.nan
     known = bank.first[1] >= 6.0
     learns = even > 0.9 and bank.first[1] < 60.0 and speed > 0.0
     gain = 1.0 / (bank.first[1] + 1.0)
     learnt = False
     for k in range(4):
-        value = said[SHAFTS + k]
+        value = said[s.SHAFTS + k]
         if np.isnan(value):
             continue
         if known and abs(revs[k]) > _TURNING_RAD_S:
             nu = value / revs[k]
-            said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
-            said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
+            said[s.HIGH] = nu if np.isnan(said[s.HIGH]) else max(said[s.HIGH], nu)
+            said[s.LOW] = nu if np.isnan(said[s.LOW]) else min(said[s.LOW], nu)
         if learns:
             revs[k] += (gain if revs[k] != 0.0 else 1.0) * (value - revs[k])
             learnt = True
-    said[GONE] = np.nan
-    if np.isnan(said[HIGH]):
+    said[s.GONE] = np.nan
+    if np.isnan(said[s.HIGH]):
         bank.first[2] = np.nan
     elif speed > 0.0:
-        before, now = bank.first[2], said[HIGH] * math.exp(bank.first[0]) / speed
+        before, now = bank.first[2], said[s.HIGH] * math.exp(bank.first[0]) / speed
         gone = 1.0 / n.NO_THRUST_SEEN
         if before > gone >= now:
             part = (before - gone) / (before - now)
-            said[GONE] = (bank.histories.clock[0] - 1.5 + part) * step_s
+            said[s.GONE] = (bank.histories.clock[0] - 1.5 + part) * step_s
         bank.first[2] = now
     if learns and (learnt or not known):
         bank.first[0] += gain * (math.log(speed) - bank.first[0])
@@ -229,58 +177,57 @@ def _pushes_or_not(bank: Histories, i: int, setting: BankSetting, now_s: float) 
 
     Between both she glides, and the way to the level was a run-down.
     """
-    f, w = bank.number[i], bank.whole[i]
-    if w[REGIME] != LEVEL or w[COUNT] == 0:
+    f = bank.row[i]
+    if f.regime != s.LEVEL or f.count == 0:
         return
-    last = w[COUNT] - 1
-    pushed = bank.what[i, last] == LEVEL
+    last = bank.switched[i, f.count - 1]
+    pushed = last.what == s.LEVEL
     if pushed == pushes(bank, i, now_s):
         return
-    if pushed and bank.ramp[i, last] == 0.0:  # by the level as it is known now, not yet
-        w[COUNT] = last
-    elif pushed and now_s - f[SINCE] > n.ENGAGE_S * (
-        setting.pace if w[KIND] == FADING else f[RAMP_S] / n.LEVEL_RAMP_S[0]
+    if pushed and last.ramp == 0.0:  # by the level as it is known now, not yet
+        f.count -= 1
+    elif pushed and now_s - f.since > n.ENGAGE_S * (
+        setting.pace if f.kind == s.FADING else f.ramp_s / n.LEVEL_RAMP_S[0]
     ):
-        bank.what[i, last], bank.ramp[i, last] = GLIDE, now_s - f[SINCE]
-        w[GLIDED] = 1
+        last.what, last.ramp = s.GLIDE, now_s - f.since
+        f.glided = 1
     elif not pushed:
-        switch(bank, i, now_s, LEVEL, 0.0)
+        switch(bank, i, now_s, s.LEVEL, 0.0)
 
 
 @compiled(uncounted=True)
 def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
-    for k in range(OUTS):
-        out[k] = 0.0
+    out[:] = 0.0
     now_s = all_.clock[0] * setting.step_s
     for i in range(all_.used[0]):
-        share = math.exp(all_.number[i, WEIGHT])
-        f, w = all_.number[i], all_.whole[i]
-        regime = w[REGIME]
-        if regime == DRIVEN:
+        share = math.exp(all_.row[i].weight)
+        f = all_.row[i]
+        regime = f.regime
+        if regime == s.DRIVEN:
             out[P_DRIVEN] += share
             out[P_EVEN] += share
             out[P_STEADY] += share
-        elif regime == LEVEL:
+        elif regime == s.LEVEL:
             if not pushes(all_, i, now_s):  # a glide, until the water has slowed her to that level
                 out[P_GLIDING] += share
             else:
-                out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
-                if w[KIND] != FADING and now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                out[P_ENGAGED if f.glided == 1 else P_DRIVEN] += share
+                if f.kind != s.FADING and now_s - f.since > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
                     out[P_EVEN] += share
-        elif regime == GLIDE:
-            running = now_s - f[SINCE] < f[RAMP_S]
+        elif regime == s.GLIDE:
+            running = now_s - f.since < f.ramp_s
             out[P_RUN_DOWN if running else P_GLIDING] += share
-        elif regime == AMID:
+        elif regime == s.AMID:
             out[P_DRIVEN] += share
             out[P_EVEN] += share  # under power, and nothing to tell
-        elif regime == BRAKE:
+        elif regime == s.BRAKE:
             out[P_BRAKED] += share
         else:
             out[P_TURNING] += share
-        out[SPEED] += share * math.exp(all_.mean[i, LN_U])
-        out[FIT] += share * f[EXCESS]
+        out[SPEED] += share * math.exp(all_.mean[i, s.LN_U])
+        out[FIT] += share * f.excess
 
 
 _SETTING = BankSetting(
@@ -301,7 +248,7 @@ def step(bank: Bank, setting: BankSetting) -> float:
     Returns its log predictive density.
     """
     all_, said = bank.histories, bank.said
-    log, ground, way = said[LOG], said[GROUND], said[ADVANCE]
+    log, ground, way = said[s.LOG], said[s.GROUND], said[s.ADVANCE]
     by_log = not np.isnan(log)
     both = by_log and not (np.isnan(ground) and np.isnan(way))
     if all_.used[0] == 0:
@@ -315,14 +262,14 @@ def step(bank: Bank, setting: BankSetting) -> float:
     _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
     if all_.clock[0] > 1:
-        bear(all_, setting, both, not (np.isnan(said[RATE]) and np.isnan(said[RUDDER])))
+        bear(all_, setting, both, not (np.isnan(said[s.RATE]) and np.isnan(said[s.RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0
     decay = decay_of(setting, used)
     rests = abs(advance) < setting.step_s * rest_speed(setting.hull)
     for i in range(all_.used[0]):
         # an engine may drive her astern
-        astern = claimed and (rests or all_.whole[i, REGIME] == AMID)
+        astern = claimed and (rests or all_.row[i].regime == s.AMID)
         way = abs(advance) if astern else advance
         slowing = predict(all_, i, setting, used, decay, way)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)

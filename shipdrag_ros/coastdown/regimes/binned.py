@@ -11,21 +11,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.heading import rep103_yaw
 from shipdrag_ros.coastdown.regimes import numbers as n
-from shipdrag_ros.coastdown.regimes.state import (
-    ADVANCE,
-    GROUND,
-    LOG,
-    N_FIX,
-    N_GROUND,
-    N_LOG,
-    N_RATE,
-    N_WALK,
-    NOISES,
-    RATE,
-    RUDDER,
-    SAID,
-    SHAFTS,
-)
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
@@ -162,35 +148,35 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     zero_ns = window.start_ns - round(before * step_s * SECOND_NS)
     count = before + max(math.ceil(length_s / step_s), 1)
     bins = _Bins(zero_ns, step_s, count, parts)
-    said, noise = np.full((count, SAID), np.nan), np.zeros(NOISES)
+    said, noise = np.full((count, s.SAID), np.nan), np.zeros(s.NOISES)
     heading = _heading(bins)
     course = _track(bins, said, noise)
     yaw = np.array([rep103_yaw(each, parameters.heading_convention) for each in heading])
     with np.errstate(invalid='ignore'):
         opposed = (np.cos(course - yaw) < _OPPOSED) & (step_s > 1.5 * min(apart))
         sign = np.where(opposed, -1.0, 1.0)
-    said[:, LOG] = bins.speeds('speed_through_water')
-    said[:, GROUND] = sign * bins.speeds('speed_over_ground')
-    said[:, ADVANCE] *= sign
+    said[:, s.LOG] = bins.speeds('speed_through_water')
+    said[:, s.GROUND] = sign * bins.speeds('speed_over_ground')
+    said[:, s.ADVANCE] *= sign
     by_compass = bool(np.isfinite(heading).any())
     at = bins.of('heading')[0] if by_compass else np.empty(0)
     # the readings of a bin are not always in its middle
     apart_s = step_s * np.diff(bins.means(at, at)) if by_compass else step_s
-    said[1:, RATE] = _turned(heading if by_compass else course) / apart_s
-    said[:, RUDDER] = bins.means(*bins.of('rudder'))
+    said[1:, s.RATE] = _turned(heading if by_compass else course) / apart_s
+    said[:, s.RUDDER] = bins.means(*bins.of('rudder'))
     _shafts(bins, said)
-    speed = said[:, LOG]
-    for other in (said[:, GROUND], said[:, ADVANCE] / step_s):
+    speed = said[:, s.LOG]
+    for other in (said[:, s.GROUND], said[:, s.ADVANCE] / step_s):
         speed = np.where(np.isnan(speed), other, speed)
-    for k, column in ((N_LOG, LOG), (N_GROUND, GROUND)):
+    for k, column in ((s.N_LOG, s.LOG), (s.N_GROUND, s.GROUND)):
         noise[k] = _white(said[:, column])
-    known = np.diff(said[:, RATE])
-    noise[N_RATE] = _mad(known) / math.sqrt(2.0) + 1e-5
+    known = np.diff(said[:, s.RATE])
+    noise[s.N_RATE] = _mad(known) / math.sqrt(2.0) + 1e-5
     found = Binned(zero_ns, step_s, before, said, noise, speed)
     floor = n.WHITE_FLOOR * found.top
-    noise[N_LOG], noise[N_GROUND] = max(noise[N_LOG], floor), max(noise[N_GROUND], floor)
-    noise[N_FIX] = max(noise[N_FIX], floor * step_s)
-    noise[N_WALK] = noise[N_FIX] / math.sqrt(6.0 * step_s)
+    noise[s.N_LOG], noise[s.N_GROUND] = max(noise[s.N_LOG], floor), max(noise[s.N_GROUND], floor)
+    noise[s.N_FIX] = max(noise[s.N_FIX], floor * step_s)
+    noise[s.N_WALK] = noise[s.N_FIX] / math.sqrt(6.0 * step_s)
     return found
 
 
@@ -222,7 +208,7 @@ def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
     if not len(place):
         return np.full(bins.bins, np.nan)
     east, north = (bins.means(place, value[:, axis]) for axis in (0, 1))
-    noise[N_FIX] = 0.5 * math.hypot(_white(east), _white(north)) * math.sqrt(2.0)
+    noise[s.N_FIX] = 0.5 * math.hypot(_white(east), _white(north)) * math.sqrt(2.0)
     course = np.full(bins.bins, np.nan)
     for k in range(bins.bins):
         low, high = max(k - _COURSE, 0), min(k + _COURSE, bins.bins - 1)
@@ -233,14 +219,14 @@ def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
             course[k] = math.atan2(float(at @ y), float(at @ x))
     way = np.full(bins.bins, np.nan)
     way[1:] = np.diff(east) * np.cos(course[1:]) + np.diff(north) * np.sin(course[1:])
-    said[:, ADVANCE] = way
+    said[:, s.ADVANCE] = way
     return course
 
 
 def _shafts(bins: _Bins, said: Float64) -> None:
     """Put revs times pitch of each shaft into `said`."""
     for k in range(len(bins.parts[0].shafts)):
-        said[:, SHAFTS + k] = bins.means(*bins.of('shafts', k))
+        said[:, s.SHAFTS + k] = bins.means(*bins.of('shafts', k))
 
 
 def shaft_revs(parts: tuple[Window, ...], number: int) -> tuple[Int64, Float64]:

@@ -8,61 +8,10 @@ import math
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
-from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, balance, hull_law
-from shipdrag_ros.coastdown.regimes.state import (
-    A0,
-    A_VAR,
-    AMID,
-    BEFORE,
-    BEHIND,
-    BRAKE,
-    COUNT,
-    DRIVEN,
-    FADING,
-    FIRST_A,
-    FREE,
-    GLIDE,
-    GLIDE_KIND,
-    GLIDE_TURN,
-    GLIDED,
-    GOVERNED,
-    GUST,
-    GUST_A,
-    HELD,
-    KEPT,
-    KIND,
-    LEVEL,
-    LIAR,
-    LN_A,
-    LN_U,
-    LONGER,
-    NOBODY,
-    OPEN,
-    P0,
-    P_VAR,
-    POWER,
-    RAMP_FROM,
-    RAMP_S,
-    REGIME,
-    REVS,
-    ROOM,
-    SINCE,
-    STANDS,
-    STATES,
-    STAYS,
-    STAYS_WAY,
-    STUCK,
-    SWITCHES,
-    THE_LOG,
-    THE_TRACK,
-    THRUST,
-    TURN,
-    WEIGHT,
-    WINDMILLS,
-    BankSetting,
-    Histories,
-)  # fmt: skip
+from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, balance, free, hull_law, is_fade
+from shipdrag_ros.coastdown.regimes.state import BankSetting, Histories
 from shipdrag_ros.compiled import compiled
 
 _PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have children, in turn
@@ -77,30 +26,12 @@ _LOG_S = math.log(float(n.NO_THRUST))
 
 @compiled(uncounted=True)
 def _copy(bank: Histories, i: int, j: int) -> None:
-    for k in range(STATES):
+    for k in range(s.STATES):
         bank.mean[j, k] = bank.mean[i, k]
-        for m in range(STATES):
+        for m in range(s.STATES):
             bank.spread[j, k, m] = bank.spread[i, k, m]
-    for k in range(bank.number.shape[1]):
-        bank.number[j, k] = bank.number[i, k]
-    for k in range(bank.whole.shape[1]):
-        bank.whole[j, k] = bank.whole[i, k]
-    for k in range(SWITCHES):
-        bank.at[j, k] = bank.at[i, k]
-        bank.what[j, k] = bank.what[i, k]
-        bank.ramp[j, k] = bank.ramp[i, k]
-
-
-@compiled(uncounted=True)
-def free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
-    """
-    Give a state a prior of its own.
-    """
-    for k in range(STATES):
-        bank.spread[j, row, k] = 0.0
-        bank.spread[j, k, row] = 0.0
-    bank.mean[j, row] = mean
-    bank.spread[j, row, row] = var
+    for k in range(bank.words.shape[1]):
+        bank.words[j, k] = bank.words[i, k]
 
 
 @compiled(uncounted=True)
@@ -108,16 +39,14 @@ def switch(bank: Histories, i: int, now_s: float, regime: int, ramp_s: float) ->
     """
     Write down a switch.
     """
-    w = bank.whole[i]
-    if w[COUNT] == SWITCHES:  # the oldest is forgotten
-        for k in range(SWITCHES - 1):
-            bank.at[i, k] = bank.at[i, k + 1]
-            bank.what[i, k] = bank.what[i, k + 1]
-            bank.ramp[i, k] = bank.ramp[i, k + 1]
-        w[COUNT] -= 1
-    bank.at[i, w[COUNT]], bank.what[i, w[COUNT]] = now_s, regime
-    bank.ramp[i, w[COUNT]] = ramp_s
-    w[COUNT] += 1
+    f = bank.row[i]
+    if f.count == s.SWITCHES:  # the oldest is forgotten
+        for k in range(s.SWITCHES - 1):
+            bank.switched[i, k] = bank.switched[i, k + 1]
+        f.count -= 1
+    new = bank.switched[i, f.count]
+    new.at, new.what, new.ramp = now_s, regime, ramp_s
+    f.count += 1
 
 
 @compiled(uncounted=True)
@@ -132,16 +61,16 @@ def _born(
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
     j = bank.used[0]
     # one that is not likelier would be dropped at once
-    if j >= ROOM or not share > 0.0 or bank.number[i, BEHIND] + math.log(share) < -LOST:
+    if j >= s.ROOM or not share > 0.0 or bank.row[i].behind + math.log(share) < -LOST:
         return -1
     _copy(bank, i, j)
     bank.used[0] = j + 1
-    f, w = bank.number[j], bank.whole[j]
-    if w[REGIME] == AMID:  # what an engine gave is over
-        free(bank, j, GUST, 0.0, 0.0)
-    f[WEIGHT] += math.log(share)
-    f[SINCE], f[RAMP_S] = now_s, ramp_s
-    w[REGIME] = regime
+    f = bank.row[j]
+    if f.regime == s.AMID:  # what an engine gave is over
+        free(bank, j, s.GUST, 0.0, 0.0)
+    f.weight += math.log(share)
+    f.since, f.ramp_s = now_s, ramp_s
+    f.regime = regime
     switch(bank, j, now_s, regime, ramp_s)
     return int(j)
 
@@ -154,12 +83,12 @@ def _wind(setting: BankSetting) -> float:
 @compiled(uncounted=True)
 def _glide(bank: Histories, j: int, setting: BankSetting) -> None:
     """Begin a glide: wind is what is left open."""
-    law = hull_law(setting.hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
-    bank.number[j, FIRST_A], bank.number[j, THRUST] = math.exp(law), 1.0
-    bank.whole[j, GLIDED] = 1
-    free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+    law = hull_law(setting.hull, bank.mean[j, s.LN_U])[0] + bank.mean[j, s.LN_A]
+    bank.row[j].first_a, bank.row[j].thrust = math.exp(law), 1.0
+    bank.row[j].glided = 1
+    free(bank, j, s.OPEN, 0.0, _wind(setting) ** 2)
     if setting.engine > 0.0:  # what an engine gave is over
-        free(bank, j, GUST, 0.0, 0.0)
+        free(bank, j, s.GUST, 0.0, 0.0)
 
 
 @compiled(uncounted=True)
@@ -167,90 +96,85 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     """
     Let the thrust run down.
     """
-    if bank.whole[i, REGIME] not in (DRIVEN, LEVEL, AMID):
+    if bank.row[i].regime not in (s.DRIVEN, s.LEVEL, s.AMID):
         _is_let_go(bank, i, setting, now_s, chance)
         return
-    learnt, claimed = bank.whole[i, REGIME] == LEVEL, setting.engine > 0.0
-    last = bank.whole[i, COUNT] - 1
-    idles = learnt and bank.what[i, last] == GLIDE  # she glides already, as nothing pushes
-    already, any_ = idles or now_s < 0.0, bank.whole[i, REGIME] == AMID
+    learnt, claimed = bank.row[i].regime == s.LEVEL, setting.engine > 0.0
+    last = bank.switched[i, bank.row[i].count - 1]
+    idles = learnt and last.what == s.GLIDE  # she glides already, as nothing pushes
+    already, any_ = idles or now_s < 0.0, bank.row[i].regime == s.AMID
     downs = 1 if already else len(n.RUN_DOWN_S)
-    before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
+    before = balance(bank.mean[i], bank.row[i], now_s)[0]
     # later she is known
-    odds = len(n.ODD) if claimed and any_ and bank.whole[i, GLIDED] == 0 else 1
+    odds = len(n.ODD) if claimed and any_ and bank.row[i].glided == 0 else 1
     for each in range(downs * odds):
         k, odd = each % downs, each // downs
         ramp_s = _NO_RAMP_S if already else n.RUN_DOWN_S[k] * setting.pace
-        for kind in range(len(n.DRAGGED) if setting.shafts > 0 else STUCK):
+        for kind in range(len(n.DRAGGED) if setting.shafts > 0 else s.STUCK):
             part = chance * (1.0 if already else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             share = part * n.ODD_SHARE[odd] if odds > 1 else part
-            j = _born(bank, i, now_s, share, GLIDE, ramp_s)
+            j = _born(bank, i, now_s, share, s.GLIDE, ramp_s)
             if j < 0:
                 continue
             if idles:  # it is the same glide
-                bank.whole[j, COUNT] -= 1
+                bank.row[j].count -= 1
             x, p = bank.mean[j], bank.spread[j]
-            bank.number[j, BEFORE] = before
-            x[LN_A] += n.ODD[odd]
+            bank.row[j].before = before
+            x[s.LN_A] += n.ODD[odd]
             _glide(bank, j, setting)
-            bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = kind
+            bank.row[j].kind = bank.row[j].glide_kind = kind
             # the revs of an engine that is cut off may change as they like
-            held = kind == STUCK or (kind == HELD and not claimed)
-            revs = bank.number[i, REVS] if held else np.nan
+            held = kind == s.STUCK or (kind == s.HELD and not claimed)
+            revs = bank.row[i].revs if held else np.nan
             # of even power they are over those expected
-            bank.number[j, FREE] = np.nan if any_ or claimed else revs
-            bank.number[j, REVS] = revs if any_ or claimed else np.nan
-            x[LN_A] += n.DRAGGED[kind]
+            bank.row[j].free = np.nan if any_ or claimed else revs
+            bank.row[j].revs = revs if any_ or claimed else np.nan
+            x[s.LN_A] += n.DRAGGED[kind]
             tied, var = n.DRAGGED_EXPONENT[kind], n.DRAGGED_SD[kind] ** 2
-            x[POWER] += tied * n.DRAGGED[kind]
-            p[LN_A, LN_A] += var + (n.KEPT_SD**2 if learnt else 0.0)
-            p[LN_A, POWER] += tied * var
-            p[POWER, LN_A] = p[LN_A, POWER]
-            p[POWER, POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
+            x[s.POWER] += tied * n.DRAGGED[kind]
+            p[s.LN_A, s.LN_A] += var + (n.KEPT_SD**2 if learnt else 0.0)
+            p[s.LN_A, s.POWER] += tied * var
+            p[s.POWER, s.LN_A] = p[s.LN_A, s.POWER]
+            p[s.POWER, s.POWER] += tied * tied * var + n.DRAGGED_EXPONENT_SD**2
 
 
 @compiled(uncounted=True)
 def _is_let_go(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """End what slowed her beside the water: an engine astern runs down as one ahead does."""
     # what holds a body in a window that a person claims lets go at once
-    x, braked = bank.mean[i], bank.whole[i, REGIME] == BRAKE and setting.engine == 0.0
+    x, braked = bank.mean[i], bank.row[i].regime == s.BRAKE and setting.engine == 0.0
     thrust = 0.0
     if braked:
-        law = hull_law(setting.hull, x[LN_U])[0] + x[LN_A]
-        thrust = -bank.number[i, FIRST_A] * math.exp(min(x[OPEN] - law, 5.0))
+        law = hull_law(setting.hull, x[s.LN_U])[0] + x[s.LN_A]
+        thrust = -bank.row[i].first_a * math.exp(min(x[s.OPEN] - law, 5.0))
     for k in range(len(n.RUN_DOWN_S) if braked else 1):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace if braked else _NO_RAMP_S
         share = chance * setting.hull.run_down[k] if braked else chance
-        j = _born(bank, i, now_s, share, GLIDE, ramp_s)
+        j = _born(bank, i, now_s, share, s.GLIDE, ramp_s)
         if j >= 0:
-            bank.number[j, THRUST] = thrust
-            free(bank, j, OPEN, 0.0, _wind(setting) ** 2)
+            bank.row[j].thrust = thrust
+            free(bank, j, s.OPEN, 0.0, _wind(setting) ** 2)
 
 
 @compiled(inline=True, uncounted=True)
 def _engages(bank: Histories, j: int) -> None:
     """End what the screw dragged."""
-    kind = bank.whole[j, GLIDE_KIND]
-    bank.mean[j, LN_A] -= n.DRAGGED[kind]
-    bank.mean[j, POWER] -= n.DRAGGED_EXPONENT[kind] * n.DRAGGED[kind]
+    kind = bank.row[j].glide_kind
+    bank.mean[j, s.LN_A] -= n.DRAGGED[kind]
+    bank.mean[j, s.POWER] -= n.DRAGGED_EXPONENT[kind] * n.DRAGGED[kind]
 
 
 @compiled(uncounted=True)
 def _any_power(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let an engine act in any way."""
-    regime = bank.whole[i, REGIME]
+    regime = bank.row[i].regime
     for kind in range(len(n.ENGINE)):
-        if regime != AMID or bank.whole[i, KIND] != kind:
-            j = _born(bank, i, now_s, chance / len(n.ENGINE), AMID, 1.0)
+        if regime != s.AMID or bank.row[i].kind != kind:
+            j = _born(bank, i, now_s, chance / len(n.ENGINE), s.AMID, 1.0)
             if j >= 0:
-                if regime in (GLIDE, BRAKE, GLIDE_TURN):
+                if regime in (s.GLIDE, s.BRAKE, s.GLIDE_TURN):
                     _engages(bank, j)
                 amid(bank, j, setting, kind)
-
-
-@compiled(inline=True, uncounted=True)
-def _is_fade(bank: Histories, i: int) -> bool:
-    return bool(bank.whole[i, REGIME] == LEVEL and bank.whole[i, KIND] == FADING)
 
 
 @compiled(uncounted=True)
@@ -259,27 +183,28 @@ def _fades(
 ) -> None:
     """Let the engine give evenly less: the rate is what is left open."""
     for k in range(len(n.FADES)):
-        j = _born(bank, i, now_s, chance / len(n.FADES), LEVEL, 600.0 * setting.pace)
+        j = _born(bank, i, now_s, chance / len(n.FADES), s.LEVEL, 600.0 * setting.pace)
         if j >= 0:
-            bank.whole[j, KIND] = FADING
-            bank.number[j, RAMP_FROM], bank.number[j, REVS] = base, np.nan
-            free(bank, j, OPEN, math.log(n.FADES[k]), n.FADES_SD**2)
+            bank.row[j].kind = s.FADING
+            bank.row[j].ramp_from, bank.row[j].revs = base, np.nan
+            free(bank, j, s.OPEN, math.log(n.FADES[k]), n.FADES_SD**2)
 
 
 @compiled(uncounted=True)
 def _fade_ends(bank: Histories, i: int, now_s: float, chance: float) -> None:
     """Let an engine that gave less and less stay where it is."""
-    target, by_open = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)
-    j = _born(bank, i, now_s, chance, LEVEL, 1.0)
+    target, by_open = balance(bank.mean[i], bank.row[i], now_s)
+    j = _born(bank, i, now_s, chance, s.LEVEL, 1.0)
     if j >= 0:
-        bank.whole[j, KIND] = GOVERNED
-        if bank.what[j, bank.whole[j, COUNT] - 2] == GLIDE:  # nothing pushed: it is the same glide
-            bank.whole[j, COUNT] -= 1
-        bank.number[j, RAMP_FROM] = bank.mean[j, OPEN] = target
-        for k in range(STATES):
-            bank.spread[j, OPEN, k] *= by_open
-        for k in range(STATES):
-            bank.spread[j, k, OPEN] *= by_open
+        bank.row[j].kind = s.GOVERNED
+        before = bank.switched[j, bank.row[j].count - 2]
+        if before.what == s.GLIDE:  # nothing pushed: it is the same glide
+            bank.row[j].count -= 1
+        bank.row[j].ramp_from = bank.mean[j, s.OPEN] = target
+        for k in range(s.STATES):
+            bank.spread[j, s.OPEN, k] *= by_open
+        for k in range(s.STATES):
+            bank.spread[j, k, s.OPEN] *= by_open
 
 
 @compiled(uncounted=True)
@@ -287,21 +212,21 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     """
     Let the engine go to another level, or engage.
     """
-    f, regime = bank.number[i], bank.whole[i, REGIME]
-    engaged, claimed = regime in (DRIVEN, LEVEL, AMID), setting.engine > 0.0
+    f, regime = bank.row[i], bank.row[i].regime
+    engaged, claimed = regime in (s.DRIVEN, s.LEVEL, s.AMID), setting.engine > 0.0
     if claimed:
         # what the level was before, and is then, shafts alone show
-        even = engaged and (regime != AMID or bank.whole[i, KIND] == 0)
+        even = engaged and (regime != s.AMID or bank.row[i].kind == 0)
         level = 0.5 * chance if even and setting.shafts > 0 else 0.0
         _any_power(bank, i, setting, now_s, chance - level)
         engaged, chance = True, level
     else:  # or it varies, as often as a record begins so
         _any_power(bank, i, setting, now_s, chance * n.AMID[0])
         chance *= 1.0 - n.AMID[0]
-    base = f[BEFORE]
+    base = f.before
     if engaged:
-        base = balance(bank.mean[i], f, bank.whole[i], now_s)[0]
-        if not claimed and regime != AMID and not _is_fade(bank, i):
+        base = balance(bank.mean[i], f, now_s)[0]
+        if not claimed and regime != s.AMID and not is_fade(bank.row[i]):
             if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
                 _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
@@ -311,17 +236,17 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         for m in range(kinds * ramps):
             share = chance * n.LEVELS_SHARE[k] / (kinds * ramps)
             ramp_s = (n.LEVEL_RAMP_S[m // kinds] if engaged else n.ENGAGE_S) * setting.pace
-            j = _born(bank, i, now_s, share, LEVEL, ramp_s)
+            j = _born(bank, i, now_s, share, s.LEVEL, ramp_s)
             if j < 0:
                 continue
-            bank.whole[j, KIND] = m % kinds
-            bank.number[j, FREE] = n.WINDMILL[0]
-            if regime == GLIDE and bank.whole[i, KIND] == WINDMILLS:
-                revs = f[REVS]
-                bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
-            bank.number[j, REVS] = f[REVS] if claimed else np.nan
-            bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
-            free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
+            bank.row[j].kind = m % kinds
+            bank.row[j].free = n.WINDMILL[0]
+            if regime == s.GLIDE and bank.row[i].kind == s.WINDMILLS:
+                revs = f.revs
+                bank.row[j].free = n.WINDMILL[0] if np.isnan(revs) else revs
+            bank.row[j].revs = f.revs if claimed else np.nan
+            bank.row[j].ramp_from = base if engaged else bank.mean[i, s.LN_U] - _LOG_S
+            free(bank, j, s.OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD[k] ** 2)
             if not engaged:
                 _engages(bank, j)
 
@@ -331,37 +256,33 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     """
     Put a history amid a manoeuvre under power: an acceleration that drifts is what is left open.
     """
-    x, f = bank.mean[j], bank.number[j]
+    x, f = bank.mean[j], bank.row[j]
     engine = setting.engine
     if engine > 0.0:
-        free(bank, j, LONGER, 0.0, n.LOG_LAG_SD**2)
+        free(bank, j, s.LONGER, 0.0, n.LOG_LAG_SD**2)
     else:  # at full power it gives what the water takes
-        law = hull_law(setting.hull, max(x[LN_U], setting.hull.sails))[0] + x[LN_A]
+        law = hull_law(setting.hull, max(x[s.LN_U], setting.hull.sails))[0] + x[s.LN_A]
         engine = math.exp(law)
-    f[FIRST_A] = n.ENGINE_GUST[kind] * engine
-    free(bank, j, GUST, 0.0, f[FIRST_A] ** 2)
-    bank.whole[j, KIND], f[REVS] = kind, np.nan
-    free(bank, j, OPEN, 0.0, (n.ENGINE[kind] * engine) ** 2)
+    f.first_a = n.ENGINE_GUST[kind] * engine
+    free(bank, j, s.GUST, 0.0, f.first_a**2)
+    bank.row[j].kind, f.revs = kind, np.nan
+    free(bank, j, s.OPEN, 0.0, (n.ENGINE[kind] * engine) ** 2)
 
 
 @compiled(uncounted=True)
-def _turns(
-    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, regime: int
-) -> None:
+def _turns(bank: Histories, i: int, now_s: float, chance: float, regime: int) -> None:
     for k in range(len(n.TURNS)):
         j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
-            if regime == TURN:
-                f, x, p = bank.number[j], bank.mean[i], bank.spread[i]
-                f[BEFORE], f[REVS] = balance(x, f, bank.whole[i], now_s)[0], np.nan
+            if regime == s.TURN:
+                f, x, p = bank.row[j], bank.mean[i], bank.spread[i]
+                leaves_level = bank.row[i].regime == s.LEVEL
+                f.before = f.ramp_from if leaves_level else balance(x, bank.row[i], now_s)[0]
+                f.revs = np.nan
                 # what the level before it taught
-                f[A0], f[A_VAR], f[P0], f[P_VAR] = (
-                    x[LN_A],
-                    p[LN_A, LN_A],
-                    x[POWER],
-                    p[POWER, POWER],
-                )
-            free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
+                f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
+                f.p0, f.p_var = x[s.POWER], p[s.POWER, s.POWER]
+            free(bank, j, s.OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
 @compiled(uncounted=True)
@@ -371,36 +292,36 @@ def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     """
     sizes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
     for k in range(sizes):
-        j = _born(bank, i, now_s, chance / sizes, BRAKE, 1.0)
+        j = _born(bank, i, now_s, chance / sizes, s.BRAKE, 1.0)
         if j >= 0:
-            if bank.whole[i, REGIME] != GLIDE:
+            if bank.row[i].regime != s.GLIDE:
                 _glide(bank, j, setting)
-                before = balance(bank.mean[i], bank.number[i], bank.whole[i], now_s)[0]
-                bank.number[j, BEFORE], bank.number[j, REVS] = before, np.nan
-                bank.whole[j, KIND] = bank.whole[j, GLIDE_KIND] = STANDS
-                bank.mean[j, LN_A] += n.DRAGGED[STANDS]
-                bank.spread[j, LN_A, LN_A] += n.DRAGGED_SD[STANDS] ** 2
+                before = balance(bank.mean[i], bank.row[i], now_s)[0]
+                bank.row[j].before, bank.row[j].revs = before, np.nan
+                bank.row[j].kind = bank.row[j].glide_kind = s.STANDS
+                bank.mean[j, s.LN_A] += n.DRAGGED[s.STANDS]
+                bank.spread[j, s.LN_A, s.LN_A] += n.DRAGGED_SD[s.STANDS] ** 2
             size = n.BRAKES[k] if k < len(n.BRAKES) else n.STOPPERS[k - len(n.BRAKES)]
-            free(bank, j, OPEN, math.log(size), n.BRAKES_SD**2)
+            free(bank, j, s.OPEN, math.log(size), n.BRAKES_SD**2)
 
 
 @compiled(uncounted=True)
-def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+def _back(bank: Histories, i: int, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
-    j = _born(bank, i, now_s, chance, LEVEL, 1.0)
+    j = _born(bank, i, now_s, chance, s.LEVEL, 1.0)
     if j >= 0:
-        before = bank.number[i, BEFORE]
-        bank.number[j, RAMP_FROM], bank.number[j, REVS] = before, np.nan
-        bank.whole[j, KIND] = GOVERNED
-        free(bank, j, OPEN, before, 0.02**2)
+        before = bank.row[i].before
+        bank.row[j].ramp_from, bank.row[j].revs = before, np.nan
+        bank.row[j].kind = s.GOVERNED
+        free(bank, j, s.OPEN, before, 0.02**2)
 
 
 @compiled(uncounted=True)
 def _settles(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """End the manoeuvre that the record began in: she is in balance."""
-    j = _born(bank, i, now_s, chance, DRIVEN, 1.0)
+    j = _born(bank, i, now_s, chance, s.DRIVEN, 1.0)
     if j >= 0:
-        bank.whole[j, COUNT] = 0
+        bank.row[j].count = 0
         driven(bank, j, setting.hull)
 
 
@@ -409,25 +330,25 @@ def driven(bank: Histories, j: int, hull: HullPrior) -> None:
     """
     Put a history in balance at its speed, without a switch.
     """
-    x, p, f = bank.mean[j], bank.spread[j], bank.number[j]
-    f[SINCE], f[BEFORE], f[RAMP_S] = -1e9, x[LN_U], 1.0
-    f[FIRST_A] = f[GUST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
-    free(bank, j, OPEN, x[LN_U], p[LN_U, LN_U])
+    x, p, f = bank.mean[j], bank.spread[j], bank.row[j]
+    f.since, f.before, f.ramp_s = -1e9, x[s.LN_U], 1.0
+    f.first_a = f.gust_a = math.exp(hull_law(hull, x[s.LN_U])[0] + x[s.LN_A])
+    free(bank, j, s.OPEN, x[s.LN_U], p[s.LN_U, s.LN_U])
     # the same error: she is in balance
-    for k in range(STATES):
-        if k != OPEN:
-            p[k, OPEN] = p[OPEN, k] = 0.9 * p[LN_U, k]
+    for k in range(s.STATES):
+        if k != s.OPEN:
+            p[k, s.OPEN] = p[s.OPEN, k] = 0.9 * p[s.LN_U, k]
 
 
 @compiled(uncounted=True)
 def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
     j = bank.used[0]
-    if j < ROOM:
+    if j < s.ROOM:
         _copy(bank, i, j)
         bank.used[0] = j + 1
-        bank.number[j, WEIGHT] += math.log(chance)
-        bank.whole[j, LIAR] = liar
-        bank.number[j, STAYS] = bank.number[j, STAYS_WAY] = np.nan
+        bank.row[j].weight += math.log(chance)
+        bank.row[j].liar = liar
+        bank.row[j].stays = bank.row[j].stays_way = np.nan
 
 
 @compiled(uncounted=True)
@@ -446,13 +367,13 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
     parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
-        best = max(best, bank.number[i, WEIGHT])
+        best = max(best, bank.row[i].weight)
     for i in range(parents):
-        bank.number[i, BEHIND] = bank.number[i, WEIGHT] - best
+        bank.row[i].behind = bank.row[i].weight - best
     likelier = np.inf
     for least in _PARENTS:  # the likeliest first: there may be no room for the children of all
         for i in range(parents):
-            if least <= bank.number[i, BEHIND] < likelier:
+            if least <= bank.row[i].behind < likelier:
                 _children(bank, setting, i, now_s, both, steered)
         likelier = least
 
@@ -462,34 +383,34 @@ def _children(
     bank: Histories, setting: BankSetting, i: int, now_s: float, both: bool, steered: bool
 ) -> None:
     """Let a history switch to all that it may."""
-    f, w = bank.number[i], bank.whole[i]
+    f = bank.row[i]
     claimed = setting.engine > 0.0
     # a window is as long as a person finds it worth, and manoeuvres with it
     hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
-    regime = w[REGIME]
-    age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
-    if both and w[LIAR] == NOBODY:
-        _lies(bank, i, THE_LOG, n.LIES * hours)
-        _lies(bank, i, THE_TRACK, n.LIES * hours)
-    fades = _is_fade(bank, i)
-    if regime == LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
-        w[REGIME] = regime = DRIVEN
-        w[KIND] = GOVERNED
-        f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
-        f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+    regime = f.regime
+    age_s = now_s - f.since if f.count > 0 else np.inf
+    if both and f.liar == s.NOBODY:
+        _lies(bank, i, s.THE_LOG, n.LIES * hours)
+        _lies(bank, i, s.THE_TRACK, n.LIES * hours)
+    fades = is_fade(bank.row[i])
+    if regime == s.LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
+        f.regime = regime = s.DRIVEN
+        f.kind = s.GOVERNED
+        f.a0, f.a_var = bank.mean[i, s.LN_A], bank.spread[i, s.LN_A, s.LN_A]
+        f.p0, f.p_var = bank.mean[i, s.POWER], bank.spread[i, s.POWER, s.POWER]
     left = 0.0  # hazard of all that it may switch to
-    if regime in (DRIVEN, LEVEL) or (regime == AMID and (claimed or w[COUNT] > 0)):
-        if regime == LEVEL and not fades and age_s < f[RAMP_S]:  # on its way there
+    if regime in (s.DRIVEN, s.LEVEL) or (regime == s.AMID and (claimed or f.count > 0)):
+        if regime == s.LEVEL and not fades and age_s < f.ramp_s:  # on its way there
             return
         stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
         if claimed or age_s < n.MANOEUVRING_S * setting.pace:
-            after = w[GLIDED] == 1
+            after = f.glided == 1
             stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
             rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
             stop = n.MANOEUVRE * stops
             level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
-        if regime == AMID and not claimed:  # it ends at some level, and any turn is part of it
+        if regime == s.AMID and not claimed:  # it ends at some level, and any turn is part of it
             level, turn = float(n.AMID[2]), 0.0
         if not np.isnan(setting.told_s):
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
@@ -499,51 +420,51 @@ def _children(
         brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
         levels(bank, i, setting, now_s, level * hours)
         if not claimed:
-            _turns(bank, i, setting, now_s, turn * hours, TURN)
+            _turns(bank, i, now_s, turn * hours, s.TURN)
         left = stop + level + turn
         if fades:
             _fade_ends(bank, i, now_s, n.FADE_OUT * hours)
             left += n.FADE_OUT
-    elif regime == GLIDE:
+    elif regime == s.GLIDE:
         levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
         if steered:
-            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            _turns(bank, i, now_s, n.GLIDE_TURN * hours, s.GLIDE_TURN)
             left += n.GLIDE_TURN
         brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
-    elif regime == BRAKE:
+    elif regime == s.BRAKE:
         glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
         levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
-    elif regime == AMID:
+    elif regime == s.AMID:
         _settles(bank, i, setting, now_s, n.AMID[2] * hours)
         left = float(n.AMID[2])
     else:
-        if regime == TURN:
-            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
+        if regime == s.TURN:
+            _back(bank, i, now_s, n.TURN_OUT * hours)
         else:
             glides(bank, i, setting, now_s, n.TURN_OUT * hours)
             if claimed:
                 levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = float(n.TURN_OUT)
-    f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
+    f.weight += math.log1p(-min(left * hours, 0.99))
 
 
 @compiled(uncounted=True)
 def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     """Say whether two histories differ by the moment of an old switch alone."""
-    w, v = bank.whole[i], bank.whole[j]
-    last = w[COUNT] - 1
-    if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
-        first = w[COUNT] == 0 and v[COUNT] == 0 and w[REGIME] == v[REGIME]
-        return bool(first and w[LIAR] == v[LIAR] and w[KIND] == v[KIND])
-    if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
+    f, v = bank.row[i], bank.row[j]
+    last = f.count - 1
+    if f.count != v.count or f.liar != v.liar or f.kind != v.kind or last < 0:
+        first = f.count == 0 and v.count == 0 and f.regime == v.regime
+        return bool(first and f.liar == v.liar and f.kind == v.kind)
+    if f.regime != v.regime or now_s - bank.switched[i, last].at < _OLD_S * pace:
         return False
-    if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
+    if abs(bank.switched[i, last].at - bank.switched[j, last].at) > _ALIKE_S * pace:
         return False
     differ = 0
     for k in range(last + 1):
-        differ += bank.what[i, k] != bank.what[j, k]
+        differ += bank.switched[i, k].what != bank.switched[j, k].what
     return differ == 0
 
 
@@ -557,16 +478,16 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     count = bank.used[0]
     best = -np.inf
     for i in range(count):
-        best = max(best, bank.number[i, WEIGHT])
+        best = max(best, bank.row[i].weight)
     if best == -np.inf:  # it begins anew
         bank.used[0] = 0
         return -np.inf
     total = 0.0
     for i in range(count):
-        total += math.exp(bank.number[i, WEIGHT] - best)
+        total += math.exp(bank.row[i].weight - best)
     norm = best + math.log(total)
     for i in range(count):
-        bank.number[i, WEIGHT] -= norm
+        bank.row[i].weight -= norm
     if bank.clock[0] % _THIN_EVERY == 0:
         _keep(bank, -LOST)
         _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
@@ -579,7 +500,7 @@ def _keep(bank: Histories, least: float) -> None:
     """Drop the histories of less log weight."""
     kept = 0
     for i in range(bank.used[0]):
-        if bank.number[i, WEIGHT] > least:
+        if bank.row[i].weight > least:
             if kept != i:
                 _copy(bank, i, kept)
             kept += 1
@@ -600,19 +521,18 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
                 _copy(bank, i, kept)
             kept += 1
             continue
-        a, b = bank.number[into, WEIGHT], bank.number[i, WEIGHT]
+        a, b = bank.row[into].weight, bank.row[i].weight
         total = max(a, b) + math.log1p(math.exp(-abs(a - b)))
         part = math.exp(b - total)
-        last = bank.whole[i, COUNT] - 1
-        at = ramp = 0.0
-        if last >= 0:
-            at = bank.at[into, last] + part * (bank.at[i, last] - bank.at[into, last])
-            ramp = bank.ramp[into, last] + part * (bank.ramp[i, last] - bank.ramp[into, last])
+        last = bank.row[i].count - 1
+        one, other = bank.switched[into, last], bank.switched[i, last]
+        at = one.at + part * (other.at - one.at)
+        ramp = one.ramp + part * (other.ramp - one.ramp)
         if b > a:
             _copy(bank, i, into)
-        bank.number[into, WEIGHT] = total
+        bank.row[into].weight = total
         if last >= 0:
-            bank.at[into, last], bank.ramp[into, last] = at, ramp
+            one.at, one.ramp = at, ramp
     bank.used[0] = kept
 
 
@@ -623,8 +543,8 @@ def _least_of_the_best(bank: Histories) -> float:
     for _ in range(_HALVINGS):
         above = 0
         for i in range(bank.used[0]):
-            above += bank.number[i, WEIGHT] > least
-        if above > KEPT:
+            above += bank.row[i].weight > least
+        if above > s.KEPT:
             low = least
         elif least == -LOST:
             break

@@ -10,6 +10,7 @@ from itertools import compress, product
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import Bank, step
 from shipdrag_ros.coastdown.regimes.binned import Binned, bin_window
 from shipdrag_ros.coastdown.regimes.births import LOST
@@ -22,27 +23,13 @@ from shipdrag_ros.coastdown.regimes.read_out import (
     spans_of,
     stretches,
 )
-from shipdrag_ros.coastdown.regimes.state import (
-    AMID,
-    BRAKE,
-    DRIVEN,
-    GLIDE,
-    GLIDE_TURN,
-    LEVEL,
-    N_EDDY,
-    N_EDDY_S,
-    N_GUST,
-    N_WANDER,
-    N_WANDER_S,
-    SHAFTS,
-    BankSetting,
-)  # fmt: skip
+from shipdrag_ros.coastdown.regimes.state import BankSetting
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-REGIMES = ((DRIVEN, AMID, LEVEL), (GLIDE,), (BRAKE,), (GLIDE_TURN,))
+REGIMES = ((s.DRIVEN, s.AMID, s.LEVEL), (s.GLIDE,), (s.BRAKE,), (s.GLIDE_TURN,))
 ENGINES, GLIDES, BRAKES, TURNS = range(4)
 
 
@@ -115,7 +102,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     if binned is None or not binned.top > 0.0:
         return None
     hull = HullPrior.any_body(ship)
-    read_out = np.isfinite(binned.said[:, SHAFTS : SHAFTS + 4]).any(axis=0)
+    read_out = np.isfinite(binned.said[:, s.SHAFTS : s.SHAFTS + 4]).any(axis=0)
     resistance = math.exp(hull_law(hull, math.log(binned.top))[0] + hull.level)
     setting = BankSetting.of(hull, binned.step_s, shafts=int(read_out.sum()))._replace(
         told_s=binned.before * binned.step_s,
@@ -157,8 +144,8 @@ def _bank(binned: Binned, gust: float, wander: float, wander_s: float) -> Bank:
     bank = Bank.fresh()
     noise = bank.noise.used
     noise[:] = binned.noise
-    noise[N_GUST] = gust
-    noise[[N_WANDER, N_EDDY]], noise[[N_WANDER_S, N_EDDY_S]] = wander, wander_s
+    noise[s.N_GUST] = gust
+    noise[[s.N_WANDER, s.N_EDDY]], noise[[s.N_WANDER_S, s.N_EDDY_S]] = wander, wander_s
     bank.revs[:] = most_revs(binned)
     bank.first[:] = math.log(binned.top), 60.0, np.nan
     # what nothing shows before the first bin that is read goes by
@@ -170,7 +157,7 @@ def most_revs(binned: Binned) -> Float64:
     """
     Return the most revs times pitch of each shaft, (4,) [rad/s], with the sign it mostly has.
     """
-    turning = np.nan_to_num(binned.said[:, SHAFTS : SHAFTS + 4])
+    turning = np.nan_to_num(binned.said[:, s.SHAFTS : s.SHAFTS + 4])
     most = np.abs(turning).max(axis=0)
     mostly = np.sign(np.where(np.abs(turning) > 0.5 * most, turning, 0.0)).sum(axis=0)
     return np.asarray(most * np.where(mostly < 0.0, -1.0, 1.0))

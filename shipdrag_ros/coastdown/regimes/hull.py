@@ -58,14 +58,23 @@ class HullPrior(NamedTuple):
         """
         Take it from a ship file, with or without a baseline.
         """
-        slow, fast = (math.log(float(ship.speed(each))) for each in _SPEEDS)
-        log_u = np.linspace(slow, fast, _POINTS)
-        known = _baseline(ship, np.exp(log_u))
-        curve, level, exponent = known or (
-            _generic(ship, np.exp(log_u)),
-            n.RESISTANCE,
-            n.EXPONENT,
-        )
+        log_u = _points(ship, _SPEEDS)
+        speed = np.exp(log_u)
+        known = _baseline(ship, speed) or (_generic(ship, speed), n.RESISTANCE, n.EXPONENT)
+        return cls._made(ship, log_u, *known)
+
+    @classmethod
+    def any_body(cls, ship: Ship) -> HullPrior:
+        """
+        Take it for whatever glides: a hull of length and volume has its friction at least.
+        """
+        log_u = _points(ship, _ANY_SPEEDS)
+        return cls._made(ship, log_u, _friction(ship, np.exp(log_u)), n.ANY_BODY, n.ANY_EXPONENT)
+
+    @classmethod
+    def _made(
+        cls, ship: Ship, log_u: Float64, curve: Float64, level: Float64, exponent: Float64
+    ) -> HullPrior:
         return cls(
             float(log_u[0]),
             float(log_u[1] - log_u[0]),
@@ -79,23 +88,10 @@ class HullPrior(NamedTuple):
             _run_down(ship),
         )
 
-    @classmethod
-    def any_body(cls, ship: Ship) -> HullPrior:
-        """
-        Take it for whatever glides: a hull of length and volume has its friction at least.
-        """
-        slow, fast = (math.log(float(ship.speed(each))) for each in _ANY_SPEEDS)
-        log_u = np.linspace(slow, fast, _POINTS)
-        (level, level_sd), (exponent, exponent_sd) = n.ANY_BODY.tolist(), n.ANY_EXPONENT.tolist()
-        return cls.of(ship)._replace(
-            first=slow,
-            step=float(log_u[1] - log_u[0]),
-            curve=_friction(ship, np.exp(log_u)),
-            level=level,
-            level_var=level_sd**2,
-            exponent=exponent,
-            exponent_var=exponent_sd**2,
-        )
+
+def _points(ship: Ship, froude: tuple[float, float]) -> Float64:
+    slow, fast = (math.log(float(ship.speed(each))) for each in froude)
+    return np.linspace(slow, fast, _POINTS)
 
 
 def _run_down(ship: Ship) -> Float64:

@@ -13,25 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.motion import ROOT_TWO_PI, hull_law, rest_speed
-from shipdrag_ros.coastdown.regimes.state import (
-    ADVANCE,
-    GROUND,
-    LOG,
-    N_EDDY,
-    N_EDDY_S,
-    N_FIX,
-    N_GROUND,
-    N_GUST,
-    N_LOG,
-    N_RATE,
-    N_WALK,
-    N_WANDER,
-    N_WANDER_S,
-    RANGES,
-    RATE,
-    BankSetting,
-)  # fmt: skip
+from shipdrag_ros.coastdown.regimes.state import BankSetting
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
@@ -126,12 +110,12 @@ def listen(
         value = _value(setting, said, which)
         if not np.isnan(value):
             _bends(noise, which, value)
-            if which <= GROUND:
-                _coarse(noise, which, said[RANGES + which], driven)
+            if which <= s.GROUND:
+                _coarse(noise, which, said[s.RANGES + which], driven)
             _one(noise, setting, which, value, before, driven)
-    if not np.isnan(said[RATE]):
+    if not np.isnan(said[s.RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
-        clipped = min(abs(said[RATE]), 3.0 * max(sd, _STEADY_RAD_S))
+        clipped = min(abs(said[s.RATE]), 3.0 * max(sd, _STEADY_RAD_S))
         gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
@@ -141,14 +125,10 @@ def listen(
 @compiled(inline=True, uncounted=True)
 def _value(setting: BankSetting, said: Float64, which: int) -> float:
     """Return what an instrument says, or what the log says more than the speed over ground."""
-    if which == LOG:
-        return float(said[LOG])
-    if which == GROUND:
-        return float(said[GROUND])
     if which != _APART:
-        return float(said[ADVANCE])
-    ground = said[ADVANCE] / setting.step_s if np.isnan(said[GROUND]) else said[GROUND]
-    return float(said[LOG] - ground)
+        return float(said[which])
+    ground = said[s.ADVANCE] / setting.step_s if np.isnan(said[s.GROUND]) else said[s.GROUND]
+    return float(said[s.LOG] - ground)
 
 
 @compiled(uncounted=True)
@@ -168,9 +148,9 @@ def _bends(noise: NoiseFilters, which: int, value: float) -> None:
 @compiled(inline=True, uncounted=True)
 def _spread(noise: NoiseFilters, which: int, setting: BankSetting) -> float:
     """Return the sd that white noise has, were those its; of fixes from differences of theirs."""
-    variance, least = (20.0, setting.step_s) if which == ADVANCE else (6.0, 1.0)
+    variance, least = (20.0, setting.step_s) if which == s.ADVANCE else (6.0, 1.0)
     # readings that stand still are not without noise
-    speed = max(noise.mean[LOG if which == _APART else which, 0, 1], rest_speed(setting.hull))
+    speed = max(noise.mean[s.LOG if which == _APART else which, 0, 1], rest_speed(setting.hull))
     size = noise.bend[which, 0] * 1.2533 / math.sqrt(variance)
     return float(max(size, n.WHITE_FLOOR * speed * least))
 
@@ -195,8 +175,8 @@ def _rounding_of(noise: NoiseFilters, which: int) -> float:
 def _rounding(noise: NoiseFilters, which: int) -> float:
     """Return that of an instrument, or of the log less the speed over ground."""
     if which == _APART:
-        return math.hypot(_rounding_of(noise, LOG), _rounding_of(noise, GROUND))
-    return _rounding_of(noise, which) if which <= GROUND else 0.0
+        return math.hypot(_rounding_of(noise, s.LOG), _rounding_of(noise, s.GROUND))
+    return _rounding_of(noise, which) if which <= s.GROUND else 0.0
 
 
 @compiled(uncounted=True)
@@ -237,10 +217,7 @@ def _one(
 @compiled(uncounted=True)
 def _start(x: Float64, p: Float64, speed: float, fix: float, step_s: float) -> None:
     """Put a filter in balance at a speed, read from a log or from two fixes of that error."""
-    for j in range(_STATES):
-        x[j] = 0.0
-        for k in range(_STATES):
-            p[j, k] = 0.0
+    x[:], p[:] = 0.0, 0.0
     x[0] = x[1] = speed
     p[0, 0] = p[1, 1] = (0.05 * max(abs(speed), 1e-3)) ** 2 + 2.0 * (fix / step_s) ** 2
     p[3, 3], p[4, 4] = 1e-4, fix * fix
@@ -324,8 +301,8 @@ def _compare(noise: NoiseFilters, which: int) -> None:
     """
     alone, apart, found = noise.beside
     alone[:], apart[:], found[:] = -np.inf, -np.inf, 0.0
-    other = LOG if which != LOG else GROUND if noise.seen[GROUND] >= 8 else 2
-    if noise.seen[_APART] < 8 or (which == 2 and noise.seen[GROUND] >= 8):
+    other = s.LOG if which != s.LOG else s.GROUND if noise.seen[s.GROUND] >= 8 else 2
+    if noise.seen[_APART] < 8 or (which == 2 and noise.seen[s.GROUND] >= 8):
         return
     for k in range(FILTERS):
         kind = _kind_of(k)
@@ -364,16 +341,21 @@ def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
         spread = _spread(noise, which, setting)
         white = math.hypot(math.sqrt(w / total) * spread, _rounding(noise, which))
         if not gusted:
-            out[N_GUST], gusted = math.exp(g / total), True
+            out[s.N_GUST], gusted = math.exp(g / total), True
         wander, wander_s = math.exp(b / total), math.exp(t / total)
         if which == 0:
-            out[N_WANDER], out[N_WANDER_S], out[N_LOG] = wander, wander_s, white
+            out[s.N_WANDER], out[s.N_WANDER_S], out[s.N_LOG] = wander, wander_s, white
         elif which == 1:
-            out[N_EDDY], out[N_EDDY_S], out[N_GROUND] = wander, wander_s, white
+            out[s.N_EDDY], out[s.N_EDDY_S], out[s.N_GROUND] = wander, wander_s, white
         elif noise.seen[1] < 8:
-            out[N_EDDY], out[N_EDDY_S], out[N_FIX], out[N_WALK] = wander, wander_s, white, 0.0
+            out[s.N_EDDY], out[s.N_EDDY_S], out[s.N_FIX], out[s.N_WALK] = (
+                wander,
+                wander_s,
+                white,
+                0.0,
+            )
         else:  # the speed over ground has said what is common
-            out[N_FIX] = white
-            out[N_WALK] = wander * math.sqrt(2.0 * wander_s * setting.pace)
+            out[s.N_FIX] = white
+            out[s.N_WALK] = wander * math.sqrt(2.0 * wander_s * setting.pace)
     if noise.rate[1] > 8.0:
-        out[N_RATE] = math.sqrt(noise.rate[0]) + 1e-5
+        out[s.N_RATE] = math.sqrt(noise.rate[0]) + 1e-5

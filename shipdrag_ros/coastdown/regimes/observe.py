@@ -16,16 +16,13 @@ from shipdrag_ros.coastdown.bins import (
     displacement,
     mean_place,
     mean_turning,
+    span,
 )
 from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
-from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RANGES, RATE, SHAFTS
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import KIND, Channel, Float64
 
-_LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
-_TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
-_HEADING = int(Channel.HEADING)
-_SHAFT, _SHAFT_2, _PITCH = int(Channel.SHAFT), int(Channel.SHAFT_2), int(Channel.PITCH)
 _BESIDE = 120  # seconds over which two instruments are compared
 _COURSE = 6  # bins of a way that shows a course
 
@@ -34,10 +31,8 @@ _COURSE = 6  # bins of a way that shows a course
 def _mean_speed(bins: Bins, source: int, last: int, width: int) -> float:
     totals = bins.speeds[source]
     mask = len(totals) - 1
-    newest = bins.closed[source]
-    before = max(last - width, newest - mask)
-    last = max(before, min(last, newest))
-    low, high = totals[before & mask], totals[last & mask]
+    before, newest = span(bins, source, last, width)
+    low, high = totals[before & mask], totals[newest & mask]
     count = high[COUNT] - low[COUNT]
     return (high[SPEED] - low[SPEED]) / (PER_UNIT * count) if count > 0 else np.nan
 
@@ -108,19 +103,23 @@ def _is_one_way(bins: Bins, track: int, last: int, width: int) -> bool:
     return bool(most < math.hypot(east, north) + 4.0 * (total - most) / (steps - 1.0))
 
 
+@compiled(inline=True, uncounted=True)
+def _say_speed(bins: Bins, kind: int, last: int, width: int, said: Float64, column: int) -> None:
+    """Put mean and range of the speed of an instrument that speaks into `said`."""
+    source = _speaking(bins, kind, last, width)
+    said[column] = _mean_speed(bins, source, last, width) * _level(bins, source, kind)
+    said[s.RANGES + column] = _range(bins, source, last, width)
+
+
 @compiled('void(Bins, i8, i8, f8, f8[::1])', like={'Bins': Bins.fresh(1)}, uncounted=True)
 def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> None:
     """
     Put what the bins last - width + 1 .. last say into `said`; NaN where they say nothing.
     """
-    for k in range(len(said)):
-        said[k] = np.nan
-    log, ground = _speaking(bins, _LOG, last, width), _speaking(bins, _GROUND, last, width)
-    said[LOG] = _mean_speed(bins, log, last, width) * _level(bins, log, _LOG)
-    said[GROUND] = _mean_speed(bins, ground, last, width) * _level(bins, ground, _GROUND)
-    said[RANGES] = _range(bins, log, last, width)
-    said[RANGES + 1] = _range(bins, ground, last, width)
-    for kind in _TRACKS:
+    said[:] = np.nan
+    _say_speed(bins, Channel.SPEED_THROUGH_WATER, last, width, said, s.LOG)
+    _say_speed(bins, Channel.SPEED_OVER_GROUND, last, width, said, s.GROUND)
+    for kind in (Channel.POSITION, Channel.POSITION_GEODETIC):
         track = _speaking(bins, kind, last, width)
         if mean_place(bins, track, last, width)[3] == 0:
             continue
@@ -129,18 +128,18 @@ def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> 
         way = math.hypot(along, across)
         if not np.isnan(time) and way > 0.0:
             advance = (east * along + north * across) / way * width / time
-            said[ADVANCE] = advance
+            said[s.ADVANCE] = advance
             _, old_east, old_north = displacement(bins, track, last - width, _COURSE * width)
             turned = _apart(math.atan2(across, along), math.atan2(old_north, old_east))
             if _is_one_way(bins, track, last, width):
-                said[RATE] = turned / step_s
-    _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
-    _, old_cosine, old_sine, old = mean_place(bins, _HEADING, last - width, width)
+                said[s.RATE] = turned / step_s
+    _, cosine, sine, count = mean_place(bins, Channel.HEADING, last, width)
+    _, old_cosine, old_sine, old = mean_place(bins, Channel.HEADING, last - width, width)
     if count > 0 and old > 0:
-        said[RATE] = _apart(math.atan2(sine, cosine), math.atan2(old_sine, old_cosine)) / step_s
+        said[s.RATE] = _apart(math.atan2(sine, cosine), math.atan2(old_sine, old_cosine)) / step_s
     for k in range(4):
-        shaft = _SHAFT if k == 0 else _SHAFT_2 + k - 1
+        shaft = Channel.SHAFT if k == 0 else Channel.SHAFT_2 + k - 1
         turning, count = mean_turning(bins, shaft, last, width)
         if count > 0:
-            pitch, known = mean_turning(bins, _PITCH + k, last, width)
-            said[SHAFTS + k] = turning * pitch if known > 0 else turning
+            pitch, known = mean_turning(bins, Channel.PITCH + k, last, width)
+            said[s.SHAFTS + k] = turning * pitch if known > 0 else turning

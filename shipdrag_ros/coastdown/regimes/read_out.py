@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import (
     OUT,
     P_BRAKED,
@@ -19,25 +20,11 @@ from shipdrag_ros.coastdown.regimes.bank import (
     P_TURNING,
     Bank,
 )
-from shipdrag_ros.coastdown.regimes.state import (
-    AMID,
-    BRAKE,
-    COUNT,
-    DRIVEN,
-    GLIDE,
-    GLIDE_KIND,
-    GLIDE_TURN,
-    HELD,
-    LEVEL,
-    SWITCHES,
-    TURN,
-    WEIGHT,
-    BankSetting,
-)
+from shipdrag_ros.coastdown.regimes.state import BankSetting
 from shipdrag_ros.samples import Float64, Int64
 
 _LIKELY = 0.5
-_UNPOWERED = (GLIDE, BRAKE, GLIDE_TURN)
+_UNPOWERED = (s.GLIDE, s.BRAKE, s.GLIDE_TURN)
 
 
 class SmoothedGlide(NamedTuple):
@@ -107,16 +94,7 @@ class Spans(NamedTuple):
         """
         Return some of them.
         """
-        return Spans(
-            self.what[chosen],
-            self.begin_s[chosen],
-            self.date_s[chosen],
-            self.gone_s[chosen],
-            self.end_s[chosen],
-            self.weight[chosen],
-            self.after[chosen],
-            self.again[chosen],
-        )
+        return Spans._make(each[chosen] for each in self)
 
 
 def spans_of(bank: Bank, setting: BankSetting) -> Spans:
@@ -126,24 +104,25 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     all_ = bank.histories
     used = int(all_.used[0])
     now_s = int(all_.clock[0]) * setting.step_s
-    count = all_.whole[:used, COUNT, np.newaxis]
+    count = all_.row['count'][:used, np.newaxis]
     # she is driven from the start on, up to the first switch
-    at = np.concatenate([np.zeros((used, 1)), all_.at[:used]], axis=1)
-    what = np.concatenate([np.full((used, 1), DRIVEN), all_.what[:used]], axis=1)
-    ramp = np.concatenate([np.zeros((used, 1)), all_.ramp[:used]], axis=1)
-    place = np.arange(SWITCHES + 1)
+    first = np.zeros((used, 1), s.SWITCH)
+    first['what'] = s.DRIVEN
+    switched = np.concatenate([first, all_.switched[:used]], axis=1)
+    at, what, ramp = (switched[name] for name in ('at', 'what', 'ramp'))
+    place = np.arange(s.SWITCHES + 1)
     last = place == count
     end = np.where(last, now_s, np.roll(at, -1, axis=1))
-    ramp = np.where(what == GLIDE, ramp, 0.0)
+    ramp = np.where(what == s.GLIDE, ramp, 0.0)
     gone = np.minimum(at + ramp, end)
     scaled = setting.shafts > 0 and setting.engine == 0.0  # revs by those of steady sailing
-    seen = scaled & (all_.whole[:used, GLIDE_KIND, np.newaxis] < HELD)
+    seen = scaled & (all_.row['glide_kind'][:used, np.newaxis] < s.HELD)
     # the revs fall evenly: an abrupt stop after a third of that costs as much speed
     date = np.minimum(at + np.where(seen, ramp, ramp / 3.0), end)
     after = np.where(last, -1, np.roll(what, -1, axis=1))
-    is_glide = what == GLIDE
+    is_glide = what == s.GLIDE
     again = np.cumsum(is_glide, axis=1) - is_glide > 0
-    weight = np.broadcast_to(np.exp(all_.number[:used, WEIGHT, np.newaxis]), what.shape)
+    weight = np.broadcast_to(np.exp(all_.row['weight'][:used, np.newaxis]), what.shape)
     there = (place <= count) & (end > at)
     return Spans(what, at, date, gone, end, weight, after, again).part(there)
 
@@ -168,14 +147,14 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     """
     Return the probability of each regime in each bin since the start, given all that came.
     """
-    engaged = (found.what == LEVEL) & found.again
+    engaged = (found.what == s.LEVEL) & found.again
     chosen = {
-        P_DRIVEN: np.isin(found.what, (DRIVEN, LEVEL, AMID)) & ~engaged,
-        P_BRAKED: found.what == BRAKE,
-        P_TURNING: (found.what == TURN) | (found.what == GLIDE_TURN),
+        P_DRIVEN: np.isin(found.what, (s.DRIVEN, s.LEVEL, s.AMID)) & ~engaged,
+        P_BRAKED: found.what == s.BRAKE,
+        P_TURNING: (found.what == s.TURN) | (found.what == s.GLIDE_TURN),
         P_ENGAGED: engaged,
     }
-    glide = found.part(found.what == GLIDE)
+    glide = found.part(found.what == s.GLIDE)
     of = {
         number: probability_of(found.part(which), bins, step_s) for number, which in chosen.items()
     }
@@ -195,7 +174,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
     speed : (bins,)
         Mean speed in each bin [m/s]: a ship that keeps it glides no more.
     """
-    found, step_s = found.part(found.what == GLIDE), setting.step_s
+    found, step_s = found.part(found.what == s.GLIDE), setting.step_s
     likely = _over_time(found.weight, found.gone_s, found.end_s, len(speed), step_s)
     all_of: list[SmoothedGlide] = []
     for first, last in stretches(likely > n.HOLD[0]):
@@ -210,7 +189,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         glide = _one(found.part(one))
         even_s = _even_s(speed, glide, step_s)
         if even_s < glide.end_s:
-            glide = glide._replace(end_s=even_s, after=LEVEL)
+            glide = glide._replace(end_s=even_s, after=s.LEVEL)
         if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
             all_of.append(glide)
     return all_of
@@ -233,7 +212,7 @@ def _one(found: Spans) -> SmoothedGlide:
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
-    codes = np.arange(-1, AMID + 1)
+    codes = np.arange(-1, s.AMID + 1)
     after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
     return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
 
@@ -266,7 +245,7 @@ def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float
     """
     step_s, spared_s = setting.step_s, n.SHORTEST_S * setting.pace
     likely = probability_of(found.part(np.isin(found.what, _UNPOWERED)), bins, step_s)
-    glide = found.part(found.what == GLIDE)
+    glide = found.part(found.what == s.GLIDE)
     several = []
     for first, last in stretches(likely > _LIKELY):
         first_s, last_s = first * step_s, last * step_s
@@ -285,7 +264,7 @@ def slowed_by(found: Spans, speed: Float64, first: int, step_s: float) -> LostSp
     last = first + int(np.argmin(speed[first:])) + 1
     lost = -np.diff(speed[first:last], prepend=speed[max(first - 1, 0)])
     shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
-    codes = (LEVEL, AMID, BRAKE, TURN, GLIDE_TURN)
+    codes = (s.LEVEL, s.AMID, s.BRAKE, s.TURN, s.GLIDE_TURN)
     parts = [(found.what == code) & (shared > 0.0) for code in codes]
     losses = [
         probability_of(found.part(part), len(speed), step_s)[first:last] * lost for part in parts

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
@@ -27,22 +28,41 @@ CHANGING, STATES = 7, 11
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 AMID = 6  # amid a manoeuvre under power, as a record may begin and a claimed window may be
 
-# further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
-# start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
-# expected, or held; revs over speed of a free screw, or over those of a run-down; prior of ln a,
-# exponent, and their variances; where an instrument that says nothing true stays, and its fixes
-WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
-STAYS, STAYS_WAY = 12, 13
-MEAN_U, MEAN_LAG = 14, 15  # over the bin, less those at its end
-GUST_A = 16  # resistance under even power, of which gusts are parts [m/s^2]
-EXCESS = 17  # log density of the bin's readings of motion, over its expectation
-BEHIND = 18  # log weight less that of the best, before births
-THRUST = 19  # at the stop of a glide, over the resistance: of balance, or of an engine astern
-COLUMNS = 20
-# and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
-# number of switches, whether she has glided, how the screw was dragged then
-REGIME, KIND, LIAR, COUNT, GLIDED, GLIDE_KIND = range(6)
-WHOLE = 6
+HISTORY = np.dtype(
+    [
+        ('regime', 'i8'),
+        ('kind', 'i8'),  # how the screw is dragged, or whether torque is held
+        ('liar', 'i8'),  # the input that says nothing true
+        ('count', 'i8'),  # of switches
+        ('glided', 'i8'),  # whether she has glided
+        ('glide_kind', 'i8'),  # how the screw was dragged then
+        ('weight', 'f8'),  # logarithm
+        ('behind', 'f8'),  # of the best, before births
+        ('since', 'f8'),  # of its last switch [s]
+        ('before', 'f8'),  # ln u_e before it
+        ('ramp_from', 'f8'),  # ln u_e at the start of its ramp
+        ('ramp_s', 'f8'),  # length of ramp or run-down [s]
+        ('first_a', 'f8'),  # first resistance [m/s^2]
+        ('thrust', 'f8'),  # at the stop over that: of balance, or of an engine astern
+        ('gust_a', 'f8'),  # resistance under even power, of which gusts are parts [m/s^2]
+        ('revs', 'f8'),  # over those expected, or held
+        ('free', 'f8'),  # revs over speed of a free screw, or over those of a run-down
+        ('a0', 'f8'),  # prior of ln a
+        ('a_var', 'f8'),
+        ('p0', 'f8'),  # and of the exponent
+        ('p_var', 'f8'),
+        ('stays', 'f8'),  # where an instrument that says nothing true stays
+        ('stays_way', 'f8'),  # and its fixes
+        ('mean_u', 'f8'),  # over the bin, less that at its end
+        ('mean_lag', 'f8'),
+        ('excess', 'f8'),  # log density of the bin's readings of motion, over its expectation
+    ],
+    align=True,
+)
+"""What else is known of a history."""
+SWITCH = np.dtype([('at', 'f8'), ('what', 'i8'), ('ramp', 'f8')], align=True)
+"""When it was [s since the start], the regime entered and its ramp [s]."""
+_PAST = np.dtype([('row', HISTORY), ('switched', SWITCH, (SWITCHES,))])
 NOBODY, THE_LOG, THE_TRACK = range(3)
 GOVERNED, TORQUE, FADING = range(3)  # a level: revs are held, or torque; or it falls evenly
 WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
@@ -71,37 +91,36 @@ class Histories(NamedTuple):
         Histories; bins since the start.
     mean, spread
         (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
-    number, whole
-        Columns as above.
-    at, what, ramp : (ROOM, SWITCHES)
-        When each switch was [s since the start], the regime entered and its ramp [s].
+    row : (ROOM,)
+        A `HISTORY` each.
+    switched : (ROOM, SWITCHES)
+        A `SWITCH` each.
+    words : (ROOM, n) int64
+        The memory of both, to copy it.
     """
 
     used: Int64
     clock: Int64
     mean: Float64
     spread: Float64
-    number: Float64
-    whole: Int64
-    at: Float64
-    what: Int64
-    ramp: Float64
+    row: NDArray[np.void]
+    switched: NDArray[np.void]
+    words: Int64
 
     @classmethod
     def fresh(cls) -> Histories:
         """
         Return a bank without a history.
         """
+        past = np.zeros(ROOM, _PAST)
         return cls(
             np.zeros(1, np.int64),
             np.zeros(1, np.int64),
             np.zeros((ROOM, STATES)),
             np.zeros((ROOM, STATES, STATES)),
-            np.zeros((ROOM, COLUMNS)),
-            np.zeros((ROOM, WHOLE), np.int64),
-            np.zeros((ROOM, SWITCHES)),
-            np.zeros((ROOM, SWITCHES), np.int64),
-            np.zeros((ROOM, SWITCHES)),
+            past['row'],
+            past['switched'],
+            past.view(np.int64).reshape(ROOM, -1),
         )
 
 

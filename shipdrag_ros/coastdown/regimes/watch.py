@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins, newest_bin
+from shipdrag_ros.coastdown.bins import Bins
 from shipdrag_ros.coastdown.events import BY_SPEED, Dismissal, EndedBy, NotCoastdown, Regimes
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import (
     FIT,
     OUT,
@@ -32,22 +33,7 @@ from shipdrag_ros.coastdown.regimes.read_out import (
     spans_of,
     unpowered,
 )
-from shipdrag_ros.coastdown.regimes.state import (
-    ADVANCE,
-    AMID,
-    BRAKE,
-    COUNT,
-    GLIDE,
-    GLIDE_TURN,
-    GROUND,
-    LEVEL,
-    LN_U,
-    LOG,
-    LOW,
-    TURN,
-    WEIGHT,
-    BankSetting,
-)
+from shipdrag_ros.coastdown.regimes.state import BankSetting
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
@@ -64,18 +50,18 @@ _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
 
 _ENDED = {
-    LEVEL: EndedBy.ENGINE,
-    AMID: EndedBy.ENGINE,
-    BRAKE: EndedBy.BRAKE,
-    TURN: EndedBy.TURN,
-    GLIDE_TURN: EndedBy.TURN,
+    s.LEVEL: EndedBy.ENGINE,
+    s.AMID: EndedBy.ENGINE,
+    s.BRAKE: EndedBy.BRAKE,
+    s.TURN: EndedBy.TURN,
+    s.GLIDE_TURN: EndedBy.TURN,
 }
 _WHY = {
-    LEVEL: (Dismissal.SETTLED, 'power was reduced, not cut'),
-    AMID: (Dismissal.THRUST, 'she was driven by a power that varied'),
-    BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
-    TURN: (Dismissal.TURN, 'she turned under power'),
-    GLIDE_TURN: (Dismissal.TURN, 'she turned'),
+    s.LEVEL: (Dismissal.SETTLED, 'power was reduced, not cut'),
+    s.AMID: (Dismissal.THRUST, 'she was driven by a power that varied'),
+    s.BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
+    s.TURN: (Dismissal.TURN, 'she turned under power'),
+    s.GLIDE_TURN: (Dismissal.TURN, 'she turned'),
 }
 _AGAIN = Dismissal.THRUST, 'she slowed less than water alone slows her, as if driven again'
 _REVERSED = Dismissal.ASTERN, 'a propeller was reversed'
@@ -153,36 +139,27 @@ class RegimeFilter:
     ----------
     ship
         Its length and volume.
+    bins
+        Of the monitor: which shafts are read.
     width
         Seconds in a bin of the bank.
-    first
-        Second from which on the record is taken.
-    shafts
-        How many are read.
+    woken
+        Second in which it is woken; the record before it is taken too.
     """
 
-    def __init__(self, ship: Ship, width: int, first: int, *, shafts: int = 0) -> None:
+    def __init__(self, ship: Ship, bins: Bins, width: int, woken: int) -> None:
+        first = woken - LEAD_S
+        shafts = sum(int(bins.filling[each]) > first for each in SHAFTS)
         self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
         self._bank = Bank.fresh()
         self._width = width
         self._next = first // width + 1
         self._first = self._next
-        self._woken = first
+        self._woken = woken
         self._out: list[Float64] = []
         self._low: list[float] = []
         self._read: list[int] = []  # readings of motion in each bin
         self._even_s = 0.0
-
-    @classmethod
-    def woken(cls, bins: Bins, ship: Ship, width: int, number: int) -> RegimeFilter:
-        """
-        Return one that was woken in second `number`; the record before it is taken too.
-        """
-        first = number - LEAD_S
-        shafts = sum(newest_bin(bins, int(each)) > first for each in SHAFTS)
-        made = cls(ship, width, first, shafts=shafts)
-        made._woken = number
-        return made
 
     @staticmethod
     def width(slope_window_s: float) -> int:
@@ -208,8 +185,8 @@ class RegimeFilter:
                 self._bank, self._out, self._low, self._read = Bank.fresh(), [], [], []
             return True
         self._out.append(self._bank.out.copy())
-        self._low.append(float(self._bank.said[LOW]))
-        motion = self._bank.said[[LOG, GROUND, ADVANCE]]
+        self._low.append(float(self._bank.said[s.LOW]))
+        motion = self._bank.said[[s.LOG, s.GROUND, s.ADVANCE]]
         self._read.append(int(np.count_nonzero(~np.isnan(motion))))
         even = self._bank.out[P_EVEN] > _EVEN
         self._even_s = self._even_s + self._width if even else 0.0
@@ -262,10 +239,11 @@ class RegimeFilter:
         """
         all_ = self._bank.histories
         used = int(all_.used[0])
-        each, last = np.arange(used), all_.whole[:used, COUNT] - 1
-        glides = (last >= 0) & (all_.what[each, last] == GLIDE)
-        before = self._zero_s + all_.at[each, last] <= second
-        return float(np.exp(all_.number[:used, WEIGHT])[glides & before].sum())
+        each, last = np.arange(used), all_.row['count'][:used] - 1
+        switched = all_.switched[each, last]
+        glides = (last >= 0) & (switched['what'] == s.GLIDE)
+        before = self._zero_s + switched['at'] <= second
+        return float(np.exp(all_.row['weight'][:used])[glides & before].sum())
 
     def slow_since(self, speed_m_s: float) -> float | None:
         """
@@ -279,9 +257,9 @@ class RegimeFilter:
 
         all_ = self._bank.histories
         used = int(all_.used[0])
-        over = all_.mean[:used, LN_U] - math.log(speed_m_s)
-        over /= np.sqrt(all_.spread[:used, LN_U, LN_U])
-        faster = float(np.exp(all_.number[:used, WEIGHT]) @ ndtr(over))
+        over = all_.mean[:used, s.LN_U] - math.log(speed_m_s)
+        over /= np.sqrt(all_.spread[:used, s.LN_U, s.LN_U])
+        faster = float(np.exp(all_.row['weight'][:used]) @ ndtr(over))
         if faster > n.ANNOUNCE[1]:
             return None
         slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0
@@ -376,7 +354,7 @@ class RegimeFilter:
         by = slowed_by(self._spans, table[:, SPEED], first, self._width)
         if by is None:
             return None
-        reason, text = _AGAIN if by.what == LEVEL and by.again else _WHY[by.what]
+        reason, text = _AGAIN if by.what == s.LEVEL and by.again else _WHY[by.what]
         astern = np.array(self._low[first : first + len(by.lost_m_s)]) < _ASTERN
         if by.lost_m_s[astern].sum() > 0.5 * by.lost_m_s.sum():
             reason, text = _REVERSED
