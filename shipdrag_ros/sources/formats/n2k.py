@@ -381,7 +381,7 @@ class N2kReader:
                 raise NoValue('cannot be decoded')
             channel, rank, a, b = read(_Fields(message, self._options, self._tally.note))
         except NoValue as reason:
-            self._tally.reject(name, reason.reason, line)
+            self._tally.reject(name, str(reason), line)
             return None
         return Reading(channel, Origin(rank, f'{name} from {frame.sender}'), stamp_ns, a, b)
 
