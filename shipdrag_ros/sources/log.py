@@ -152,12 +152,6 @@ class Log:
             self.include(int(block.receive_ns[0]), int(block.receive_ns[-1]))
             self.blocks.append(block)
 
-    def attach(self, name: str, text: str) -> None:
-        """
-        Take a text that belongs to the samples.
-        """
-        self.attachments[name] = text
-
     def copy_to(self, bag: BagWriter) -> None:
         """
         Write all of it into a bag.
@@ -309,6 +303,13 @@ class ImportResult:
             for count, how in counts
             if count
         ]
+
+    def told(self, path: Path, kind: str) -> list[str]:
+        """
+        Return what is to be said of a file: what each input was taken from, what was left out.
+        """
+        lines = [f'{path}: {kind}', *(f'  {each}' for each in self.understood)]
+        return [*lines, *self.summary(path)[1:], *self.details()]
 
     def table(self) -> Table:
         """

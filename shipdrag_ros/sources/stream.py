@@ -301,7 +301,7 @@ def read_stream(
         **values.about(block, log),
     )
     about_log = {'source': job.source.name, **(about or {}), **asdict(result)}
-    log.attach(ATTACHMENT, strict_yaml.dump(about_log))
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about_log)
     return result
 
 

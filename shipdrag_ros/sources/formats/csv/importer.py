@@ -163,7 +163,7 @@ def read_csv(
         'rate_hz': rate,
         'where': dict(where),
     }
-    log.attach(ATTACHMENT, strict_yaml.dump(about))
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     for rows in table.rows(progress):
         log.write_samples(record.take(rows))
     result = record.result(table, log)

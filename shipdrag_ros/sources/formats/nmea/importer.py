@@ -300,7 +300,7 @@ def read_nmea(job: format.Job, log: Log) -> NmeaResult:
     clock = _clock(text, taken, day)
     whole = _whole(source)
     if whole is not None:
-        log.attach(LOG_ATTACHMENT, whole)
+        log.attachments[LOG_ATTACHMENT] = whole
     block = taken.samples(clock)
     rejected = taken.rejected(text.lines_of)
     if text.rejected:
@@ -329,7 +329,7 @@ def read_nmea(job: format.Job, log: Log) -> NmeaResult:
     )
     about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
     about |= {'checksum': 'optional' if bare else 'required', **asdict(result)}
-    log.attach(ATTACHMENT, strict_yaml.dump(about))
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     return result
 
 
