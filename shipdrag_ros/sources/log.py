@@ -56,6 +56,17 @@ class Rejected:
             self.first.append(f'line {line}: {shown!r}')
 
 
+Refused = dict[str, dict[str, Rejected]]
+"""What was rejected, by input, 'time' or 'line', and reason."""
+
+
+def reject(refused: Refused, name: str, reason: str, line: int, text: str) -> None:
+    """
+    Count one more.
+    """
+    refused.setdefault(name, {}).setdefault(reason, Rejected()).add(line, text)
+
+
 @dataclass(frozen=True)
 class Understood:
     """

@@ -50,18 +50,18 @@ _APART_M = (
 _METRES_PER_DEGREE = 1852.0 * 60.0
 
 
-Track = tuple[Int64, Float64]
+_Fixes = tuple[Int64, Float64]
 """Times [ns], and latitudes and longitudes [deg] then."""
 
 
-def _track(block: Block) -> Track:
+def _track(block: Block) -> _Fixes:
     """Return where the ship of a log was, at most once a second."""
     chosen = block[block.channel == Channel.POSITION_GEODETIC]
     seconds, first = np.unique(chosen.stamp_ns // SECOND_NS, return_index=True)
     return seconds * SECOND_NS, chosen.value[first]
 
 
-def _away_m(here: Track, there: Track) -> Float64:
+def _away_m(here: _Fixes, there: _Fixes) -> Float64:
     """Return how far [m] `there` is from `here` at its times, less what a ship sails between."""
     (here_ns, here_deg), (there_ns, there_deg) = here, there
     after = np.searchsorted(here_ns, there_ns).clip(1, len(here_ns) - 1)
@@ -82,7 +82,7 @@ def _refuse_two_ships(names: Sequence[str], blocks: Sequence[Block]) -> None:
 
     Positions in metres have origins of their own and are not held against each other.
     """
-    known: list[tuple[str, Track]] = []
+    known: list[tuple[str, _Fixes]] = []
     for name, block in zip(names, blocks, strict=True):
         here = _track(block)
         if len(here[0]) < 2:

@@ -30,9 +30,10 @@ from shipdrag_ros.sources.log import (
     LIMIT_NS,
     ImportResult,
     Log,
-    Rejected,
+    Refused,
     Understood,
     most_of,
+    reject,
     rejected_words,
 )
 
@@ -89,7 +90,7 @@ class Tally:
     """
 
     records: int = 0
-    rejected: dict[str, dict[str, Rejected]] = field(default_factory=dict)
+    rejected: Refused = field(default_factory=dict)
     not_used: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
 
@@ -97,7 +98,7 @@ class Tally:
         """
         Count what was rejected; `records` is where it stands.
         """
-        self.rejected.setdefault(name, {}).setdefault(reason, Rejected()).add(self.records, text)
+        reject(self.rejected, name, reason, self.records, text)
 
     def note(self, text: str) -> None:
         """

@@ -27,7 +27,7 @@ from shipdrag_ros.nmea.sentences import (
     days_of,
 )
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
-from shipdrag_ros.sources.log import Rejected
+from shipdrag_ros.sources.log import Refused, Rejected
 from shipdrag_ros.sources.stream import SourcedValues
 
 GAP_NS = 10 * SECOND_NS
@@ -113,7 +113,6 @@ class SentenceClock:
         return day * DAY_NS + of_day_ns
 
 
-Refused = dict[str, dict[str, Rejected]]
 TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]
 
 _NONE = -1  # no time of receipt, no date
