@@ -17,7 +17,7 @@ import shipdrag_ros as sd
 from shipdrag_ros.samples import Block, concatenate
 from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, row_clock
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
-from shipdrag_ros.sources.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import LogTable
 
 COLUMNS = {
     'speed_through_water': 'log:kn',

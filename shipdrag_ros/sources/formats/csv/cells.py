@@ -21,8 +21,8 @@ from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, Form, TimeColumn
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, texts_of
 from shipdrag_ros.sources.log import BASE_NS, LIMIT_NS
-from shipdrag_ros.sources.table import Cells, LogTable, texts_of
 
 _PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')

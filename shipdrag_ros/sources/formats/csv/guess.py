@@ -39,7 +39,7 @@ from shipdrag_ros.sources.formats.csv.columns import (
     columns_of,
     role_and_unit,
 )
-from shipdrag_ros.sources.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import LogTable
 
 _STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
 _MOVING_M_S = 0.4
@@ -73,11 +73,7 @@ def plane_speed(time_s: Float64, x: Float64, y: Float64) -> Float64:
     """
     speed = np.full(len(time_s), np.nan)
     good = np.flatnonzero(np.isfinite(time_s) & np.isfinite(x) & np.isfinite(y))
-    good = (
-        good[np.r_[True, np.diff(np.maximum.accumulate(time_s[good])) > 0.0]]
-        if len(good)
-        else good
-    )
+    good = good[np.diff(np.maximum.accumulate(time_s[good]), prepend=-np.inf) > 0.0]
     if len(good) < 2:
         return speed
     time = time_s[good]

@@ -59,6 +59,7 @@ from shipdrag_ros.sources.formats.csv.guess import (
     placed,
     with_dates,
 )
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     ImportResult,
@@ -68,7 +69,6 @@ from shipdrag_ros.sources.log import (
     reject,
     rejected_words,
 )
-from shipdrag_ros.sources.table import Cells, LogTable, TableRows
 
 
 @dataclass(frozen=True, kw_only=True)
