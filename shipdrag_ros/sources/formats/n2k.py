@@ -23,9 +23,9 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources import format
-from shipdrag_ros.sources.log import BASE_NS, Log, iso_ns
+from shipdrag_ros.sources.log import BASE_NS, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, counted, stream_format
 
 MINUTE_NS = 60 * SECOND_NS
 _SINCE = r'\((?P<seconds>\d{1,10})\.(?P<fraction>\d{1,9})\)\s+'
@@ -326,29 +326,25 @@ class _Fields(dict[str, Any]):
 
 def _read(job: format.Job, tally: Tally) -> Iterator[Reading]:
     clock, packets = clock_of(job, tally), _Packets()
-    lines = Lines(job.source, progress=job.progress)
-    for line in lines:
-        tally.records += 1
-        frame = parse(line) if line else None
-        if frame is not None:
-            stamp_ns, name = clock.ns(frame), f'PGN {frame.pgn}'
-            read = _READERS.get(frame.pgn)
-            if read is None:
-                tally.not_used[name] += 1
-            elif stamp_ns is None:
-                tally.reject('time', 'no time in the line', line)
-            elif (data := packets.whole(frame)) is not None:
-                try:
-                    channel, rank, a, b = read(_fields(frame.pgn, data, job, tally))
-                except NoValue as reason:
-                    tally.reject(name, str(reason), line)
-                else:
-                    origin = Origin(rank, f'{name} from {frame.sender}')
-                    yield Reading(channel, origin, stamp_ns, a, b)
-        elif line:
+    for line in counted(Lines(job.source, progress=job.progress), tally):
+        frame = parse(line)
+        if frame is None:
             tally.reject('line', 'no frame', line)
-    if lines.damage:
-        tally.note(f'The log could not be read to its end, {lines.damage}.')
+            continue
+        stamp_ns, name = clock.ns(frame), f'PGN {frame.pgn}'
+        read = _READERS.get(frame.pgn)
+        if read is None:
+            tally.not_used[name] += 1
+        elif stamp_ns is None:
+            tally.reject('time', 'no time in the line', line)
+        elif (data := packets.whole(frame)) is not None:
+            try:
+                channel, rank, a, b = read(_fields(frame.pgn, data, job, tally))
+            except NoValue as reason:
+                tally.reject(name, str(reason), line)
+            else:
+                origin = Origin(rank, f'{name} from {frame.sender}')
+                yield Reading(channel, origin, stamp_ns, a, b)
 
 
 def _fields(pgn: int, data: bytes, job: format.Job, tally: Tally) -> _Fields:
@@ -446,16 +442,11 @@ def _score(head: format.Head) -> float:
     return format.CERTAIN if head.share(parse) > 0.5 else format.NO
 
 
-def _open(job: format.Job, log: Log) -> StreamResult:
-    about = {key: job.options.get(key) for key in ('date', 'gear', 'rate', 'transducer')}
-    return read_stream(job, log, 'n2k', lambda tally: _read(job, tally), about=about)
-
-
-FORMAT = format.Format(
+FORMAT = stream_format(
     name='n2k',
     kind='a log of NMEA 2000',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
     options=(format.DATE, format.GEAR, format.RATE, format.TRANSDUCER),
 )
