@@ -531,9 +531,10 @@ class _Counts(RowClock):
         self._comma = has_decimal_commas(texts)
         self._unit_ns = time.unit_ns
         self._known = False
+        self._plain = CellReader()
         for text in () if time.given else texts[:1]:
             try:
-                count = abs(CellReader().one(text.replace(',', '.', 1) if self._comma else text))
+                count = abs(self._plain.one(text.replace(',', '.', 1) if self._comma else text))
             except BadCell:
                 continue
             unit = next((unit for unit, least in _COUNTS_FROM if count >= least), 's')
@@ -567,7 +568,7 @@ class _Counts(RowClock):
 
     def _count_ns(self, cell: str) -> int:
         plain = cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
-        CellReader().one(plain)
+        self._plain.one(plain)
         exact = Decimal(plain) * self._unit_ns
         if exact.copy_abs() >= LIMIT_NS:
             raise BadCell('no possible date', cell)
