@@ -23,6 +23,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
+from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log, new_bag
 
@@ -55,7 +56,7 @@ def write(source: Path, out: Path) -> NmeaResult:
     Make a bag of a log.
     """
     log = Log()
-    result = read_nmea(source, log)
+    result = read_nmea(Job(source), log)
     with new_bag(out, {}) as bag:
         log.copy_to(bag)
     return result

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked
@@ -33,9 +33,9 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import Format, Option
+from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.log import new_bag
-from shipdrag_ros.sources.reading import format_of, job_of, read_joined
+from shipdrag_ros.sources.reading import format_of, read_joined
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,20 +104,20 @@ def run(options: argparse.Namespace) -> int:
         output.progress(f'reading {options.sources[0]}') as progress,
     ):
         parts = [
-            (each, replace(job_of(each, source, given), progress=progress))
+            (each, Job(source, given, progress))
             for source, each in zip(options.sources, chosen, strict=True)
         ]
         try:
-            found = read_joined(parts)
+            log, results, notes = read_joined(parts)
         except ImportDataError as error:
             if named is None:
                 raise
             raise ImportDataError(
                 f'{error}; read as {named.kind} for --format: without it the content decides'
             ) from error
-        found.log.copy_to(bag)
+        log.copy_to(bag)
     documents = []
-    for source, each, result in zip(options.sources, chosen, found.results, strict=True):
+    for source, each, result in zip(options.sources, chosen, results, strict=True):
         output.log(f'{source}: {each.kind}')
         for understood in result.understood:
             output.log(f'  {understood}')
@@ -127,9 +127,9 @@ def run(options: argparse.Namespace) -> int:
         for line in result.details():
             output.say(line)
         documents.append({'source': str(source), 'format': each.name, **asdict(result)})
-    for line in found.notes:
+    for line in notes:
         output.say(line)
-    whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': found.notes}
+    whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': notes}
     output.json({'bag': str(options.out), **whole})
     return 0
 

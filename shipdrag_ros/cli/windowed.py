@@ -38,10 +38,10 @@ def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, s
     """
     if all(is_bag(path) for path in paths):
         return open_runs(paths, remap=remap)
-    from shipdrag_ros.sources.reading import Understanding, read_any  # a bag needs no importer
+    from shipdrag_ros.sources.reading import read_any  # a bag needs no importer
 
-    def show(found: Understanding) -> None:
-        for line in found.lines():
+    def show(lines: list[str]) -> None:
+        for line in lines:
             output.log(line)
 
     return read_any(paths, remap=remap, show=show)

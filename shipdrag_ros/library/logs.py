@@ -17,13 +17,13 @@ from shipdrag_ros.library.shown import in_python
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import Format, Option
+from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
 from shipdrag_ros.sources.formats.csv.importer import read_csv
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows, texts_of
 from shipdrag_ros.sources.log import ImportResult, Log
-from shipdrag_ros.sources.reading import LogRun, format_of, job_of, join
-from shipdrag_ros.sources.table import Cells, LogTable, TableRows, texts_of
+from shipdrag_ros.sources.reading import LogRun, format_of, join
 
 NANOSECONDS = 'ns'
 FRAME = 'frame'
@@ -361,12 +361,12 @@ def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_P
         declared = how.named or TABLE  # however few columns it has
         if declared.name != TABLE.name:
             raise ImportDataError(f'a frame is a table, and not {declared.kind}; leave format out')
-        found: ImportResult = read_csv(source, log, job_of(declared, path, options).options)
+        found: ImportResult = read_csv(source, log, options)
     else:
         name, path = str(source), source
         options = how.options(path, alone=alone)
         declared = format_of(path, options, how.named)
-        found = declared.read(job_of(declared, path, options), log)
+        found = declared.read(Job(path, options), log)
     run = LogRun(log, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]

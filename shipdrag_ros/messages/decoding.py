@@ -366,7 +366,7 @@ def decode_batch(
     n = len(start)
     code, found = np.empty(n, np.uint8), np.full(n, GatherResult.NOTHING, np.uint8)
     readings = [_readings()[source] for source in sources]
-    width = max((reading.width for reading in readings), default=_COLUMNS)
+    width = max((reading.width for reading in readings), default=COLUMNS)
     stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
     unreadable = []
     more: list[Further] = []
@@ -383,8 +383,8 @@ def decode_batch(
         for by in reading.steps:
             unread = gather(data, start, end, place, by, stamp_ns, rows, found)
             if reading.columns is not None:
-                computed = reading.columns(rows[place, _COLUMNS : reading.width])
-                rows[place, :_COLUMNS] = computed
+                computed = reading.columns(rows[place, COLUMNS : reading.width])
+                rows[place, :COLUMNS] = computed
             if not unread:
                 break
             place = place[found[place] != GatherResult.READ]
@@ -395,7 +395,7 @@ def decode_batch(
         stamp_ns, receive_ns = stamp_ns[kept], receive_ns[kept]
     elif len(kept) < n:
         code, stamp_ns, rows, receive_ns = code[kept], stamp_ns[kept], rows[kept], receive_ns[kept]
-    block = Block(code, stamp_ns, receive_ns, rows[:, :2], rows[:, 2:_COLUMNS])
+    block = Block(code, stamp_ns, receive_ns, rows[:, :2], rows[:, 2:COLUMNS])
     return DecodedBatch(block, kept, tuple(unreadable))
 
 
@@ -425,7 +425,6 @@ def _count(found: UInt8, surplus: int = 0) -> Counter[Unreadable]:
     return counts
 
 
-_COLUMNS = 4  # two values and two variances, which the extra fields follow
 Converted = Callable[[Float64], Float64]
 
 
@@ -542,11 +541,11 @@ def _reading(
 ) -> tuple[Source, _Reading]:
     """Pair a source with its two values and two variances; `columns` makes them of the fields."""
     if columns is not None:
-        fields = (*[''] * _COLUMNS, *fields)
+        fields = (*[''] * COLUMNS, *fields)
     ways = [steps(type_name, fields)] if fields else []  # joints are read otherwise
     if older is not None:
         ways.append(steps(older, [field for field in fields if field != 'variance']))
-    width, stamped = max(len(fields), _COLUMNS), types.is_stamped(type_name)
+    width, stamped = max(len(fields), COLUMNS), types.is_stamped(type_name)
     return Source(channel.input, type_name), _Reading(
         channel, tuple(ways), columns, width, stamped
     )

@@ -84,10 +84,9 @@ class GatherResult(IntEnum):
 
 _READ = int(GatherResult.READ)
 _MALFORMED = int(GatherResult.MALFORMED)
-COLUMNS = 4
+COLUMNS = 4  # two values and two variances, which the extra fields follow
 _VARIANCES = 2  # from this column on
 BODY = ENCAPSULATION_BYTES
-_PADDING = PADDING_BYTES
 TIME_BYTES = 8
 BAD = -1
 
@@ -235,7 +234,7 @@ def _read(
             layout[count, 0], layout[count, 1] = step, base + first - start
             layout[count, 2] = second
     layout[0, 0], layout[0, 1] = count, BODY + strings_end
-    return _MALFORMED if size - at > _PADDING else _READ
+    return _MALFORMED if size - at > PADDING_BYTES else _READ
 
 
 @compiled(inline=True, uncounted=True)

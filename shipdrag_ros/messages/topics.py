@@ -315,7 +315,6 @@ def output_message(topic: OutputTopic, message: object, stamp_ns: int, node: str
     )
 
 
-DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 OK, WARN, ERROR, STALE = range(4)
 OF_CONDITIONS = 'they are'
 """Key of the conditions that the figures of an estimate are of."""
@@ -434,7 +433,7 @@ def read_health(payload: bytes) -> list[Health]:
     MalformedMessage
         If it is no DiagnosticArray.
     """
-    return health_of(types.deserialize(DIAGNOSTICS, payload).status)
+    return health_of(types.deserialize(types.DIAGNOSTIC_ARRAY, payload).status)
 
 
 def health_of(statuses: Iterable[Any]) -> list[Health]:

@@ -203,8 +203,8 @@ class Interpreter:
 
     Parameters
     ----------
-    mounting
-        What the sentences do not say about the ship.
+    transducer_m
+        Depth of the echo sounder below the surface [m]; None if unknown.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ class Interpreter:
         What is fed by another source than before, a sentence each, until it is taken from here.
     """
 
-    def __init__(self, mounting: sentences.Mounting | None = None) -> None:
+    def __init__(self, transducer_m: float | None = None) -> None:
         self.sentences: Counter[str] = Counter()
         self.rejected: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self.unknown: Counter[str] = Counter()
@@ -236,7 +236,7 @@ class Interpreter:
         self.used: Counter[str] = Counter()
         self.not_taken: defaultdict[str, Counter[str]] = defaultdict(Counter)
         self.changes: list[str] = []
-        self._reader = sentences.SentenceReader(mounting)
+        self._reader = sentences.SentenceReader(transducer_m)
         self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
 

@@ -11,9 +11,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import date
-from enum import Enum
 from functools import lru_cache
 from math import cos, hypot, isfinite, pi, radians, remainder, sin
 from typing import Any, NamedTuple, TypeVar
@@ -26,8 +24,10 @@ from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Channel
 _FOOT_M = 0.3048
 _FATHOM_M = 6.0 * _FOOT_M
 _WIND_UNITS = {'N': M_S_PER_KNOT, 'K': 1.0 / 3.6, 'M': 1.0, 'S': 0.44704}
-_LATITUDE = re.compile(r'(\d{2})(\d{2}(?:\.\d+)?)')
-_LONGITUDE = re.compile(r'(\d{3})(\d{2}(?:\.\d+)?)')
+_ANGLES = {
+    'NS': re.compile(r'(\d{2})(\d{2}(?:\.\d+)?)'),
+    'EW': re.compile(r'(\d{3})(\d{2}(?:\.\d+)?)'),
+}
 _NO_MEASUREMENT = {'N': 'no fix', 'E': 'dead reckoning', 'M': 'manual', 'S': 'simulated'}
 _NO_HEADING = {'E': 'estimated', 'M': 'manual', 'S': 'simulated', 'V': 'not valid'}
 _NO_FIX = {'0': 'no fix', '6': 'dead reckoning', '7': 'manual', '8': 'simulated'}
@@ -39,12 +39,7 @@ NOT_STATED = 'state the depth of the transducer'
 
 
 class NoValue(Exception):
-    """A value that a sentence does not hold; the reason, and the text found instead."""
-
-    def __init__(self, reason: str, text: str = '') -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.text = text
+    """A value that a sentence does not hold, and why."""
 
 
 class MeasuredValue(NamedTuple):
@@ -78,11 +73,14 @@ class Fields(dict[str, str]):
         Of the sentence.
     texts
         What follows its address, without blanks around them.
+    transducer_m
+        Depth of the echo sounder below the surface [m]; None if unknown.
     """
 
-    def __init__(self, kind: str, texts: Sequence[str]) -> None:
+    def __init__(self, kind: str, texts: Sequence[str], transducer_m: float | None = None) -> None:
         super().__init__(zip(_NAMES.get(kind, ()), texts))
         self.kind = kind
+        self.transducer_m = transducer_m
 
     def __missing__(self, name: str) -> str:
         return ''
@@ -95,7 +93,7 @@ class Fields(dict[str, str]):
         if not text:
             raise NoValue('empty')
         if not NUMBER.fullmatch(text) or not isfinite(number := float(text)):
-            raise NoValue('not a number', text)
+            raise NoValue('not a number')
         return number
 
     def first(self, *choices: tuple[str, float]) -> float:
@@ -113,95 +111,74 @@ class Fields(dict[str, str]):
         """
         if self[name] and self[name] not in allowed:
             status = self[name] if len(self[name]) == 1 else 'not known'
-            raise NoValue(f'status {status}', self[name])
-
-
-@dataclass(frozen=True)
-class Mounting:
-    """
-    What a log does not say about the ship.
-
-    Attributes
-    ----------
-    transducer_m
-        Depth of the echo sounder below the surface [m]; None if unknown.
-    """
-
-    transducer_m: float | None = None
+            raise NoValue(f'status {status}')
 
 
 # None: the sentence need not hold it, and does not
-FieldsReader = Callable[[Fields, Mounting], MeasuredValue | None]
+FieldsReader = Callable[[Fields], MeasuredValue | None]
 
 
-def _water_vhw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _water_vhw(fields: Fields) -> MeasuredValue:
     return MeasuredValue(fields.first(('spdN', M_S_PER_KNOT), ('spdK', 1.0 / 3.6)))
 
 
-def _water_vbw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _water_vbw(fields: Fields) -> MeasuredValue:
     fields.check('waterspdstatus', allowed='A')
     return MeasuredValue(fields.number('longwaterspd') * M_S_PER_KNOT)
 
 
-def _ground_vbw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _ground_vbw(fields: Fields) -> MeasuredValue:
     fields.check('groundspdstatus', allowed='A')
     return MeasuredValue(
         hypot(fields.number('longgroundspd'), fields.number('transgroundspd')) * M_S_PER_KNOT
     )
 
 
-def _ground_vtg(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _ground_vtg(fields: Fields) -> MeasuredValue:
     _check_mode(fields)
     return MeasuredValue(fields.first(('sogn', M_S_PER_KNOT), ('sogk', 1.0 / 3.6)))
 
 
-def _ground_rmc(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _ground_rmc(fields: Fields) -> MeasuredValue:
     _check_fix(fields)
     return MeasuredValue(fields.number('spd') * M_S_PER_KNOT)
 
 
-def _position(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _position(fields: Fields) -> MeasuredValue:
     _check_fix(fields)
     return MeasuredValue(
-        _angle(fields, 'lat', _LATITUDE, 'NS', ('N', 'S'), 90.0),
-        _angle(fields, 'lon', _LONGITUDE, 'EW', ('E', 'W'), 180.0),
+        _angle(fields, 'lat', 'NS', 90.0),
+        _angle(fields, 'lon', 'EW', 180.0),
     )
 
 
-def _angle(
-    fields: Fields,
-    name: str,
-    form: re.Pattern[str],
-    side: str,
-    sides: tuple[str, str],
-    largest_deg: float,
-) -> float:
+def _angle(fields: Fields, name: str, sides: str, largest_deg: float) -> float:
     """Return degrees from degrees and minutes and a side, the first positive."""
-    text = fields[name]
-    if not text or not fields[side]:
+    text, side = fields[name], fields[sides]
+    if not text or not side:
         raise NoValue('empty')
-    found = form.fullmatch(text)
-    if found is None or fields[side] not in sides:
-        raise NoValue('no latitude and longitude', f'{text},{fields[side]}')
+    found = _ANGLES[sides].fullmatch(text)
+    if found is None or side not in tuple(sides):
+        raise NoValue('no latitude and longitude')
     minutes = float(found[2])
     angle_deg = int(found[1]) + minutes / 60.0
     if minutes >= 60.0 or angle_deg > largest_deg:
-        raise NoValue('no latitude and longitude', text)
-    return angle_deg if fields[side] == sides[0] else -angle_deg
+        raise NoValue('no latitude and longitude')
+    return angle_deg if side == sides[0] else -angle_deg
 
 
-def _yaw_hdt(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _yaw_hdt(fields: Fields) -> MeasuredValue:
     return MeasuredValue(_yaw(fields.number('headingT')))
 
 
-def _yaw_ths(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _yaw_ths(fields: Fields) -> MeasuredValue:
     mode = fields['mi']
     if mode in _NO_HEADING:
-        raise NoValue(f'mode {mode}: {_NO_HEADING[mode]}', mode)
+        raise NoValue(f'mode {mode}: {_NO_HEADING[mode]}')
     return MeasuredValue(_yaw(fields.number('headt')))
 
 
-def _yaw_hdg(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _yaw_hdg(fields: Fields) -> MeasuredValue:
     """Apply what deviation and variation the sensor states; none is no zero variation."""
     heading_deg = fields.number('headingM')
     if fields['deviation']:
@@ -213,7 +190,7 @@ def _yaw_hdg(fields: Fields, mounting: Mounting) -> MeasuredValue:
 
 def _easterly(fields: Fields, name: str, side: str) -> float:
     if fields[side] not in ('E', 'W'):
-        raise NoValue(f'{name} neither E nor W', fields[side])
+        raise NoValue(f'{name} neither E nor W')
     return fields.number(name) if fields[side] == 'E' else -fields.number(name)
 
 
@@ -222,12 +199,12 @@ def _yaw(compass_deg: float) -> float:
     return remainder(radians(90.0 - compass_deg), 2.0 * pi)
 
 
-def _shaft(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _shaft(fields: Fields) -> MeasuredValue:
     place, detail = _shaft_place(fields)
     return MeasuredValue(fields.number('rpm') * pi / 30.0, detail=detail, channel=SHAFTS[place])
 
 
-def _pitch(fields: Fields, mounting: Mounting) -> MeasuredValue | None:
+def _pitch(fields: Fields) -> MeasuredValue | None:
     """Return the ratio to the greatest pitch; a fixed propeller has none to give."""
     if not fields['pitch'] or fields['source'] != 'S':
         return None
@@ -245,47 +222,47 @@ def _shaft_place(fields: Fields) -> tuple[int, str]:
     """
     fields.check('status', allowed='A')
     if fields['source'] != 'S':
-        raise NoValue('not of a shaft', fields['source'])
+        raise NoValue('not of a shaft')
     number = fields['engineshaftnum'] or '0'
     if not number.isdecimal() or int(number) > len(SHAFTS):
-        raise NoValue('no number of a shaft from 0 to 4', number)
+        raise NoValue('no number of a shaft from 0 to 4')
     return (int(number) - 1) % len(SHAFTS), f'shaft {number}'
 
 
-def _wind(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _wind(fields: Fields) -> MeasuredValue:
     fields.check('status', allowed='A')
     if fields['reference'] == 'T':
-        raise NoValue('true wind, computed and not measured', 'T')
+        raise NoValue('true wind, computed and not measured')
     if fields['reference'] != 'R':
-        raise NoValue('neither R nor T', fields['reference'])
+        raise NoValue('neither R nor T')
     unit = _WIND_UNITS.get(fields['speedu'])
     if unit is None:
-        raise NoValue('no unit', fields['speedu'])
+        raise NoValue('no unit')
     # where it comes from, clockwise from ahead; its velocity points the other way
     angle, speed = radians(fields.number('angle')), fields.number('speed') * unit
     return MeasuredValue(-speed * cos(angle), speed * sin(angle))
 
 
-def _depth_dpt(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _depth_dpt(fields: Fields) -> MeasuredValue:
     depth_m = fields.number('depth')
     # negative: to the keel, whose depth is not stated
     if fields['offset'] and (offset_m := fields.number('offset')) >= 0.0:
         return MeasuredValue(depth_m + offset_m, detail=OWN_OFFSET)
-    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
+    return MeasuredValue(depth_m + _transducer(fields), detail=STATED_DEPTH)
 
 
-def _depth_dbt(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _depth_dbt(fields: Fields) -> MeasuredValue:
     depth_m = fields.first(('depthm', 1.0), ('depthf', _FOOT_M), ('depthfath', _FATHOM_M))
-    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
+    return MeasuredValue(depth_m + _transducer(fields), detail=STATED_DEPTH)
 
 
-def _transducer(mounting: Mounting) -> float:
-    if mounting.transducer_m is None:
+def _transducer(fields: Fields) -> float:
+    if fields.transducer_m is None:
         raise NoValue(NOT_STATED)
-    return mounting.transducer_m
+    return fields.transducer_m
 
 
-def _rudder(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _rudder(fields: Fields) -> MeasuredValue:
     """Return the starboard or single rudder, or the port one; as sent, + turns to starboard."""
     for side, detail in (('stbd', ''), ('port', 'port')):
         if fields[f'{side}angle']:
@@ -311,7 +288,7 @@ def _check_fix(fields: Fields) -> None:
         if not quality:
             raise NoValue('quality empty')
         if quality in _NO_FIX:
-            raise NoValue(f'quality {quality}: {_NO_FIX[quality]}', quality)
+            raise NoValue(f'quality {quality}: {_NO_FIX[quality]}')
         return
     if not fields['status']:
         if fields.kind == 'GLL' and len(fields) <= _GLL_OF_OLD:
@@ -324,13 +301,13 @@ def _check_fix(fields: Fields) -> None:
 def _check_mode(fields: Fields) -> None:
     mode = fields['posMode']
     if mode in _NO_MEASUREMENT:
-        raise NoValue(f'mode {mode}: {_NO_MEASUREMENT[mode]}', mode)
+        raise NoValue(f'mode {mode}: {_NO_MEASUREMENT[mode]}')
 
 
-def _water_uhaw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+def _water_uhaw(fields: Fields) -> MeasuredValue:
     """Return the part along the heading of what an ADCP measures east and north [kn]."""
     if fields['kind'] != 'UVH':
-        raise NoValue('not of east, north and heading', fields['kind'])
+        raise NoValue('not of east, north and heading')
     heading = radians(fields.number('heading'))
     east, north = fields.number('east'), fields.number('north')
     return MeasuredValue((east * sin(heading) + north * cos(heading)) * M_S_PER_KNOT)
@@ -382,13 +359,6 @@ _RANK = {kind: place for place, kind in enumerate(READERS)}
 _KEPT = 1 << 14  # sentences; instruments say the same again and again
 
 AnySource = TypeVar('AnySource', bound=tuple[Any, ...])
-
-
-class Checksum(Enum):
-    """Whether a sentence must have a checksum; one it has must be right."""
-
-    REQUIRED = 'required'
-    OPTIONAL = 'optional'
 
 
 class SentenceSource(NamedTuple):
@@ -461,16 +431,14 @@ class SentenceReader:
 
     Parameters
     ----------
-    mounting
-        What they do not say about the ship.
+    transducer_m
+        Depth of the echo sounder below the surface [m]; None if unknown.
     checksum
-        Whether they must have one.
+        Whether they must have a checksum; one that they have must be right.
     """
 
-    def __init__(
-        self, mounting: Mounting | None = None, checksum: Checksum = Checksum.REQUIRED
-    ) -> None:
-        self._mounting = mounting or Mounting()
+    def __init__(self, transducer_m: float | None = None, *, checksum: bool = True) -> None:
+        self._transducer_m = transducer_m
         self._checksum = checksum
         self._repeated = lru_cache(_KEPT)(self._read)
 
@@ -483,7 +451,7 @@ class SentenceReader:
 
     def _read(self, text: str) -> Sentence | str:
         content, star, stated = text.partition('*')
-        if not star and self._checksum is Checksum.REQUIRED:
+        if not star and self._checksum:
             return 'without checksum'
         if star and (len(stated) != 2 or checksum_of(content) != stated.upper()):
             return 'wrong checksum'
@@ -497,13 +465,13 @@ class SentenceReader:
         name = kind or talker  # a proprietary one is all talker
         if name not in READERS and name not in TIMED:
             return Sentence(talker, kind, None, (), ())
-        fields = Fields(name, texts)
+        fields = Fields(name, texts, self._transducer_m)
         values, refused = [], []
         for listed, read in READERS.get(name, ()):
             try:
-                value = read(fields, self._mounting)
+                value = read(fields)
             except NoValue as reason:
-                refused.append((listed, reason.reason))
+                refused.append((listed, str(reason)))
                 continue
             if value is not None:
                 a, b, detail, channel = value
@@ -565,11 +533,11 @@ def _time(fields: Fields) -> SentenceTime | NoValue | None:
 def _of_day_ns(text: str) -> int:
     found = _TIME.fullmatch(text)
     if found is None:
-        raise NoValue('no time of day', text)
+        raise NoValue('no time of day')
     hour, minute, second = int(found[1]), int(found[2]), int(found[3])
     leap = (hour, minute, second) == (23, 59, 60)
     if hour > 23 or minute > 59 or (second > 59 and not leap):
-        raise NoValue('no time of day', text)
+        raise NoValue('no time of day')
     fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
     return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns
 
@@ -585,7 +553,7 @@ def _day(fields: Fields) -> int | None:
 def _rmc_day(text: str) -> int:
     found = _DATE.fullmatch(text)
     if found is None:
-        raise NoValue('no possible date', text)
+        raise NoValue('no possible date')
     century = 19 if int(found[3]) >= _CENTURY_TURNS else 20
     return _days(f'{century}{found[3]}', found[2], found[1])
 
@@ -594,13 +562,13 @@ def _rmc_day(text: str) -> int:
 def _days(*texts: str) -> int:
     """Return the days since 1970 of year, month and day."""
     if not all(text.isdecimal() and text.isascii() for text in texts):
-        raise NoValue('no possible date', ','.join(texts))
+        raise NoValue('no possible date')
     try:
         days = days_of(date(*map(int, texts)))
     except (ValueError, OverflowError):
-        raise NoValue('no possible date', '-'.join(texts)) from None
+        raise NoValue('no possible date') from None
     if not 0 <= days * DAY_NS < _LIMIT_NS - DAY_NS:
-        raise NoValue('no possible date', '-'.join(texts))
+        raise NoValue('no possible date')
     return days
 
 

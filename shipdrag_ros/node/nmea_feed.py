@@ -26,7 +26,7 @@ from shipdrag_ros.messages import EventKind, Source, decode
 from shipdrag_ros.messages.topics import ERROR, OK, STALE, WARN, Status
 from shipdrag_ros.nmea.interpreter import SILENT_NS, TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.live import Address, LiveNmea, SourceCounts, parse_addresses
-from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
+from shipdrag_ros.nmea.sentences import NOT_STATED, READERS
 from shipdrag_ros.node.health import SILENT_S
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.session import Session
@@ -115,8 +115,8 @@ class NmeaFeed:
         self._session = session
         self._topics: dict[str, InputTopic] = {}
         transducer_m = settings.nmea_transducer_m
-        self._mounting = Mounting(transducer_m if transducer_m >= 0.0 else None)
-        self._interpreter = Interpreter(self._mounting)
+        self._transducer_m = transducer_m if transducer_m >= 0.0 else None
+        self._interpreter = Interpreter(self._transducer_m)
         self._rivals: defaultdict[str, Rivals] = defaultdict(Rivals)
         self._topic_refused: Counter[str] = Counter()
         self._nmea_refused: Counter[str] = Counter()
@@ -154,7 +154,7 @@ class NmeaFeed:
         """
         Choose anew who feeds what: the node was activated.
         """
-        self._interpreter = Interpreter(self._mounting)
+        self._interpreter = Interpreter(self._transducer_m)
         self._rivals.clear()
         self._topic_refused.clear()
         self._nmea_refused.clear()

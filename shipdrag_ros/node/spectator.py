@@ -41,7 +41,7 @@ from shipdrag_ros.messages import (
     topics,
 )
 from shipdrag_ros.messages.topics import read_health as decode_health
-from shipdrag_ros.messages.types import stamp_ns
+from shipdrag_ros.messages.types import DIAGNOSTIC_ARRAY, stamp_ns
 from shipdrag_ros.node.inputs import LATCHED, is_installed, message_class
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
@@ -95,7 +95,7 @@ class Spectator:
         self._of_inputs: dict[str, tuple[str, str, Any]] = {}
         self._last_s: dict[str, float] = {}
         self._ros.create_subscription(
-            message_class(topics.DIAGNOSTICS),
+            message_class(DIAGNOSTIC_ARRAY),
             '/diagnostics',
             self._on_diagnostics,
             _RELIABLE,

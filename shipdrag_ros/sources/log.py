@@ -56,6 +56,17 @@ class Rejected:
             self.first.append(f'line {line}: {shown!r}')
 
 
+Refused = dict[str, dict[str, Rejected]]
+"""What was rejected, by input, 'time' or 'line', and reason."""
+
+
+def reject(refused: Refused, name: str, reason: str, line: int, text: str) -> None:
+    """
+    Count one more.
+    """
+    refused.setdefault(name, {}).setdefault(reason, Rejected()).add(line, text)
+
+
 @dataclass(frozen=True)
 class Understood:
     """
@@ -151,12 +162,6 @@ class Log:
         if len(block):
             self.include(int(block.receive_ns[0]), int(block.receive_ns[-1]))
             self.blocks.append(block)
-
-    def attach(self, name: str, text: str) -> None:
-        """
-        Take a text that belongs to the samples.
-        """
-        self.attachments[name] = text
 
     def copy_to(self, bag: BagWriter) -> None:
         """
@@ -309,6 +314,13 @@ class ImportResult:
             for count, how in counts
             if count
         ]
+
+    def told(self, path: Path, kind: str) -> list[str]:
+        """
+        Return what is to be said of a file: what each input was taken from, what was left out.
+        """
+        lines = [f'{path}: {kind}', *(f'  {each}' for each in self.understood)]
+        return [*lines, *self.summary(path)[1:], *self.details()]
 
     def table(self) -> Table:
         """

@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any
@@ -50,98 +50,57 @@ _APART_M = (
 _METRES_PER_DEGREE = 1852.0 * 60.0
 
 
-class LogTrack:
+_Fixes = tuple[Int64, Float64]
+"""Times [ns], and latitudes and longitudes [deg] then."""
+
+
+def _track(block: Block) -> _Fixes:
+    """Return where the ship of a log was, at most once a second."""
+    chosen = block[block.channel == Channel.POSITION_GEODETIC]
+    seconds, first = np.unique(chosen.stamp_ns // SECOND_NS, return_index=True)
+    return seconds * SECOND_NS, chosen.value[first]
+
+
+def _away_m(here: _Fixes, there: _Fixes) -> Float64:
+    """Return how far [m] `there` is from `here` at its times, less what a ship sails between."""
+    (here_ns, here_deg), (there_ns, there_deg) = here, there
+    after = np.searchsorted(here_ns, there_ns).clip(1, len(here_ns) - 1)
+    both = np.stack((after - 1, after))  # before and after; the nearer one counts
+    between_ns = np.abs(there_ns - here_ns[both])
+    which = between_ns.argmin(axis=0), np.arange(len(there_ns))
+    near, between_s = both[which], between_ns[which] / SECOND_NS
+    north = there_deg[:, 0] - here_deg[near, 0]
+    east = (there_deg[:, 1] - here_deg[near, 1] + 180.0) % 360.0 - 180.0
+    east *= np.cos(np.radians(there_deg[:, 0]))
+    away_m: Float64 = np.hypot(north, east) * _METRES_PER_DEGREE - ABSURD_SPEED_M_S * between_s
+    return away_m
+
+
+def _refuse_two_ships(names: Sequence[str], blocks: Sequence[Block]) -> None:
     """
-    Where the ship of a log was, at most once a second.
+    Refuse logs of which half of the common fixes are further apart than a ship is long.
 
-    Parameters
-    ----------
-    name
-        Of the log.
-    block
-        Its samples.
-    """
-
-    def __init__(self, name: str, block: Block) -> None:
-        self.name = name
-        chosen = block[block.channel == Channel.POSITION_GEODETIC]
-        seconds, first = np.unique(chosen.stamp_ns // SECOND_NS, return_index=True)
-        self.time_ns: Int64 = seconds * SECOND_NS
-        self.degrees: Float64 = chosen.value[first]
-
-    def away_m(self, other: LogTrack) -> tuple[Float64, Int64]:
-        """
-        Return how far the other is from here when she is there, less the way between.
-
-        Parameters
-        ----------
-        other
-            With a place at least.
-
-        Returns
-        -------
-        distances, times
-            [m], beyond what a ship can sail from the nearest time of this log; [ns].
-        """
-        after = np.searchsorted(self.time_ns, other.time_ns).clip(1, len(self.time_ns) - 1)
-        before_ns = other.time_ns - self.time_ns[after - 1]
-        after_ns = self.time_ns[after] - other.time_ns
-        near = np.where(np.abs(before_ns) <= np.abs(after_ns), after - 1, after)
-        north = other.degrees[:, 0] - self.degrees[near, 0]
-        east = (other.degrees[:, 1] - self.degrees[near, 1] + 180.0) % 360.0 - 180.0
-        east *= np.cos(np.radians(other.degrees[:, 0]))
-        apart_m = np.hypot(north, east) * _METRES_PER_DEGREE
-        between_s = np.abs(other.time_ns - self.time_ns[near]) / SECOND_NS
-        return apart_m - ABSURD_SPEED_M_S * between_s, other.time_ns
-
-
-def refuse_two_ships(ways: Sequence[LogTrack]) -> None:
-    """
-    Refuse logs that hold a ship at two places at one time.
-
-    Raises
-    ------
-    ImportDataError
-        If half of the common fixes of two logs are further apart than a ship is long.
-
-    Notes
-    -----
     Positions in metres have origins of their own and are not held against each other.
     """
-    known = [way for way in ways if len(way.time_ns) > 1]
-    for number, one in enumerate(known):
-        for other in known[:number]:
-            away_m, times = other.away_m(one)
-            if np.median(away_m) > _APART_M:
-                at = utc(int(times[len(times) // 2]))
+    known: list[tuple[str, _Fixes]] = []
+    for name, block in zip(names, blocks, strict=True):
+        here = _track(block)
+        if len(here[0]) < 2:
+            continue
+        for other, there in known:
+            apart_m = np.median(_away_m(there, here))
+            if apart_m > _APART_M:
+                at = utc(int(here[0][len(here[0]) // 2]))
                 raise ImportDataError(
-                    f'{other.name!r} and {one.name!r} are {np.median(away_m) / 1000.0:.0f} km '
-                    f'apart about {at}: they are of two ships, or one clock is wrong. Read each '
-                    'by itself'
+                    f'{other!r} and {name!r} are {apart_m / 1000.0:.0f} km apart about {at}: they '
+                    'are of two ships, or one clock is wrong. Read each by itself'
                 )
+        known.append((name, here))
 
 
-@dataclass(frozen=True)
-class Joined:
-    """
-    What became of the files.
-
-    Attributes
-    ----------
-    log
-        What they hold together.
-    results
-        Of each file.
-    notes
-        What was left out when they were put together, a sentence each.
-    """
-
-    log: Log
-    results: list[ImportResult]
-    notes: list[str]
-
-
-def read_joined(parts: Sequence[tuple[Format, Job]]) -> Joined:
+def read_joined(
+    parts: Sequence[tuple[Format, Job]],
+) -> tuple[Log, list[ImportResult], list[str]]:
     """
     Read the measurements of files as one log.
 
@@ -149,6 +108,12 @@ def read_joined(parts: Sequence[tuple[Format, Job]]) -> Joined:
     ----------
     parts
         Format and job of each file.
+
+    Returns
+    -------
+    log, results, notes
+        What they hold together; of each file; what was left out when they were put together,
+        a sentence each.
 
     Raises
     ------
@@ -160,10 +125,10 @@ def read_joined(parts: Sequence[tuple[Format, Job]]) -> Joined:
     Of an input that two files hold for the same time, the first file's is taken:
     two instruments are never mixed.
     """
-    logs = [Log() for _ in parts]
-    results = [declared.read(job, log) for (declared, job), log in zip(parts, logs, strict=True)]
-    joined, lost, notes = join([(job.source.name, log) for (_, job), log in zip(parts, logs)])
-    return Joined(joined, [_without(*each) for each in zip(results, lost, strict=True)], notes)
+    logs = [(job.source.name, Log()) for _, job in parts]
+    results = [each.read(job, log) for (each, job), (_, log) in zip(parts, logs, strict=True)]
+    joined, lost, notes = join(logs)
+    return joined, [_without(*each) for each in zip(results, lost, strict=True)], notes
 
 
 def _without(result: ImportResult, lost: Counter[str]) -> ImportResult:
@@ -189,12 +154,12 @@ def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[Counter[str]], list
         return logs[0][1], [Counter()], []
     blocks = [_block(log) for _, log in logs]
     names = [name for name, _ in logs]
-    refuse_two_ships([LogTrack(*each) for each in zip(names, blocks, strict=True)])
+    _refuse_two_ships(names, blocks)
     taken, lost = _taken(blocks)
     whole = in_arrival_order(taken)
     joined = Log()
     about = {name: log.attachments.get(ATTACHMENT, '') for name, log in logs}
-    joined.attach(ATTACHMENT, strict_yaml.dump({'sources': about}))
+    joined.attachments[ATTACHMENT] = strict_yaml.dump({'sources': about})
     joined.write_samples(whole)
     notes = [
         f'{name}: {", ".join(sorted(counts))} not taken for the time that an earlier file gives '
@@ -346,37 +311,11 @@ class LogRun(Run):
             self._log.copy_to(bag)
 
 
-@dataclass(frozen=True)
-class Understanding:
-    """
-    What was understood of a file that is no bag.
-
-    Attributes
-    ----------
-    path
-    kind
-        Of the file, `a CSV file` for instance.
-    result
-        What became of it.
-    """
-
-    path: Path
-    kind: str
-    result: ImportResult
-
-    def lines(self) -> list[str]:
-        """
-        Return what is to be said: what each input was taken from, and what was left out.
-        """
-        lines = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
-        return [*lines, *self.result.summary(self.path)[1:], *self.result.details()]
-
-
 def read_any(
     paths: Iterable[Path],
     *,
     remap: Mapping[str, str] | None = None,
-    show: Callable[[Understanding], None] | None = None,
+    show: Callable[[list[str]], None] | None = None,
 ) -> list[Run]:
     """
     Open files of any format that is known, as `open_runs` opens bags.
@@ -388,7 +327,8 @@ def read_any(
     remap
         Recorded topic -> input.
     show
-        Called with what was understood of each log.
+        Called with what is to be said of each log: what each input was taken from, and what was
+        left out.
 
     Returns
     -------
@@ -427,7 +367,7 @@ def read_any(
 
 
 def _imported(
-    path: Path, remap: Mapping[str, str] | None, show: Callable[[Understanding], None] | None
+    path: Path, remap: Mapping[str, str] | None, show: Callable[[list[str]], None] | None
 ) -> Run:
     declared, log = format_of(path, {}), Log()
     try:
@@ -439,7 +379,7 @@ def _imported(
             f'{error} (make a bag of it with `shipdrag import`, which takes these options)'
         ) from error
     if show is not None:
-        show(Understanding(path, declared.kind, result))
+        show(result.told(path, declared.kind))
     return LogRun(log, [path], remap)
 
 
@@ -458,11 +398,3 @@ def format_of(source: Path, options: Mapping[str, Any], named: Format | None = N
         raise ImportDataError(f'{str(source)!r} is a bag already: `shipdrag replay` takes it')
     chosen = [each for each in known if each.chosen_by in options]
     return named or (chosen[0] if chosen else best_of(known, head))
-
-
-def job_of(declared: Format, source: Path, options: Mapping[str, Any]) -> Job:
-    """
-    Return what a format is asked to do, with those of the options that it knows.
-    """
-    own = {option.key for option in declared.options}
-    return Job(source, {key: value for key, value in options.items() if key in own})

@@ -3,8 +3,8 @@
 A log of messages, each with its time.
 
 What every format of messages shares: one source an input, times that do not
-jump, and a count of what is left out. A format gives a function that reads its
-file and yields readings.
+jump, and a count of what is left out. A format is a module with a function that reads its
+file and yields readings, declared by `stream_format`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -23,18 +24,20 @@ from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import best
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
-from shipdrag_ros.sources.format import Job
+from shipdrag_ros.sources.format import Format, Head, Job, Option
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     BATCH_SAMPLES,
     LIMIT_NS,
     ImportResult,
     Log,
-    Rejected,
+    Refused,
     Understood,
     most_of,
+    reject,
     rejected_words,
 )
+from shipdrag_ros.sources.opened import Lines
 
 JUMP_NS = 10 * SECOND_NS
 """A time that steps further forward, and back with the next one, is a damaged one."""
@@ -89,7 +92,7 @@ class Tally:
     """
 
     records: int = 0
-    rejected: dict[str, dict[str, Rejected]] = field(default_factory=dict)
+    rejected: Refused = field(default_factory=dict)
     not_used: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
 
@@ -97,7 +100,7 @@ class Tally:
         """
         Count what was rejected; `records` is where it stands.
         """
-        self.rejected.setdefault(name, {}).setdefault(reason, Rejected()).add(self.records, text)
+        reject(self.rejected, name, reason, self.records, text)
 
     def note(self, text: str) -> None:
         """
@@ -301,8 +304,47 @@ def read_stream(
         **values.about(block, log),
     )
     about_log = {'source': job.source.name, **(about or {}), **asdict(result)}
-    log.attach(ATTACHMENT, strict_yaml.dump(about_log))
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about_log)
     return result
+
+
+def stream_format(
+    *,
+    name: str,
+    kind: str,
+    about: str | None,
+    score: Callable[[Head], float],
+    read: Callable[[Job, Tally], Iterator[Reading]],
+    options: tuple[Option, ...] = (),
+) -> Format:
+    """
+    Declare a format of messages.
+
+    Parameters
+    ----------
+    name, kind, about, score, options
+        See `Format`.
+    read
+        Yields the readings of a file in their order.
+    """
+
+    def into(job: Job, log: Log) -> StreamResult:
+        given = {option.key: job.options.get(option.key) for option in options}
+        return read_stream(job, log, name, partial(read, job), about=given)
+
+    return Format(name, kind, about, score, into, options)
+
+
+def counted(lines: Lines, tally: Tally) -> Iterator[str]:
+    """
+    Yield the lines of a log that are not blank, and count all.
+    """
+    for line in lines:
+        tally.records += 1
+        if line:
+            yield line
+    if lines.damage:
+        tally.note(f'The log could not be read to its end, {lines.damage}.')
 
 
 def _checked(readings: Iterator[Reading], tally: Tally) -> Iterator[Reading]:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.nmea.interpreter import BEHIND_NS, SETTLE_NS, SILENT_NS, Interpreter, raw_message
-from shipdrag_ros.nmea.sentences import Mounting
 from shipdrag_ros.samples import Channel
 from tests.sources.log_samples import sentence
 
@@ -72,7 +71,7 @@ def test_a_depth_says_what_makes_it_one_from_the_surface() -> None:
     none, found = settled('SDDPT,20.0,')
     assert none.feeding() == found == {}
     assert none.no_value == {'depth DPT: state the depth of the transducer': 2}
-    stated = Interpreter(Mounting(3.0))
+    stated = Interpreter(3.0)
     for stamp_ns in (START_NS, START_NS + SETTLE_NS):
         (*_, message) = [None, *stated.messages(sentence('SDDPT,20.0,-1.0'), LINE, stamp_ns)]
     assert message is not None

@@ -24,8 +24,8 @@ from shipdrag_ros.sources.formats.csv.importer import (
     TableResult,
     read_csv,
 )
+from shipdrag_ros.sources.formats.csv.table import LogTable
 from shipdrag_ros.sources.log import BASE_NS, Log
-from shipdrag_ros.sources.table import LogTable
 
 from .conftest import into_bag
 

@@ -22,13 +22,11 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.format import best_of, head_of
+from shipdrag_ros.sources.format import Job, best_of, head_of
 from shipdrag_ros.sources.formats import n2k
 from shipdrag_ros.sources.reading import (
     LogRun,
-    Understanding,
     format_of,
-    job_of,
     read_any,
     read_joined,
 )
@@ -70,8 +68,8 @@ def block_of(*paths: Path, **options: object) -> Block:
         (run,) = read_any(paths)
         return concatenate([part for part in run.inputs() if isinstance(part, Block)])
     chosen = [(format_of(path, options), path) for path in paths]
-    found = read_joined([(each, job_of(each, path, options)) for each, path in chosen])
-    run = LogRun(found.log, paths)
+    log, *_ = read_joined([(each, Job(path, options)) for each, path in chosen])
+    run = LogRun(log, paths)
     return concatenate([part for part in run.inputs() if isinstance(part, Block)])
 
 
@@ -199,9 +197,9 @@ def test_engine_revolutions_are_the_shaft_only_with_a_gear(files: dict[str, Path
 
 
 def test_the_first_line_is_shown(files: dict[str, Path]) -> None:
-    shown: list[Understanding] = []
+    shown: list[list[str]] = []
     read_any([files['csv']], show=shown.append)
-    lines = shown[0].lines()
+    lines = shown[0]
     assert "  speed_through_water <- 'STW [kn]' [kn], first 6 m/s" in lines
     assert any(
         "'Heading [deg]' is taken as degrees clockwise from north" in line for line in lines
@@ -333,9 +331,9 @@ def test_a_heading_without_end_costs_no_other_value_of_a_log_of_ardupilot(files,
     start = b'\xa3\x95'
     raw = files['ardupilot'].read_bytes() + start + b'\x80' + about + start + b'\x84' + endless
     path.write_bytes(raw)
-    shown: list[Understanding] = []
+    shown: list[list[str]] = []
     read_any([path], show=shown.append)
-    assert any('no possible value' in line for line in shown[0].lines())
+    assert any('no possible value' in line for line in shown[0])
     found, whole = (
         values(block_of(each), Channel.POSITION_GEODETIC) for each in (path, files['ardupilot'])
     )
@@ -357,9 +355,9 @@ def test_a_line_of_deep_brackets_is_counted(tmp_path: Path) -> None:
     path = tmp_path / 'log.jsonl'
     deep = '{"updates":' + '[' * 30_000
     path.write_bytes(made.signalk() + b'\n' + deep.encode())
-    shown: list[Understanding] = []
+    shown: list[list[str]] = []
     read_any([path], show=shown.append)
-    assert any('more than 12 brackets deep' in line for line in shown[0].lines())
+    assert any('more than 12 brackets deep' in line for line in shown[0])
 
 
 def test_a_packed_bomb_ends_in_an_error(tmp_path: Path) -> None:
@@ -378,12 +376,12 @@ def test_times_that_jump_away_and_back_are_left_out(tmp_path: Path) -> None:
     lines[140] = lines[140].replace('(17', '(16', 1)
     path = tmp_path / 'log.txt'
     path.write_text('\n'.join(lines))
-    shown: list[Understanding] = []
+    shown: list[list[str]] = []
     (run,) = read_any([path], show=shown.append)
     span = run.span_ns
     assert span is not None
     assert span[1] - span[0] == (made.ROWS - 1) * 10**9
-    assert any('time: 2 rejected, jumps away and back' in line for line in shown[0].lines())
+    assert any('time: 2 rejected, jumps away and back' in line for line in shown[0])
 
 
 def test_the_formats_load_no_library_before_it_is_needed() -> None:

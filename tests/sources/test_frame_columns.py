@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Block, concatenate
-from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, RowClock
+from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, row_clock
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
-from shipdrag_ros.sources.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import LogTable
 
 COLUMNS = {
     'speed_through_water': 'log:kn',
@@ -90,7 +90,7 @@ def test_counts_as_numbers_are_the_times_of_their_texts(unit: str, values: list[
     found = []
     for cells in (np.array(values), [repr(each) if each == each else '' for each in values]):
         bad: dict[int, BadCell] = {}
-        clock = RowClock.of(parse_time(f't:{unit}'), None, [], table)
+        clock = row_clock(parse_time(f't:{unit}'), None, [], table)
         times = clock.times(cells, 0, bad)
         found.append([None if place in bad else int(t) for place, t in enumerate(times)])
     assert found[0] == found[1]

@@ -23,8 +23,8 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
-from shipdrag_ros.nmea.sentences import Checksum
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
+from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
 
@@ -54,7 +54,7 @@ def run(log: str | bytes, **options: Any) -> tuple[NmeaResult, Block]:
         source, out = Path(folder, 'in.nmea'), Path(folder, 'out.mcap')
         source.write_bytes(log if isinstance(log, bytes) else log.encode())
         try:
-            result = into_bag(read_nmea, source, out, **options)
+            result = into_bag(lambda log, to: read_nmea(Job(log, options), to), source, out)
         except ImportDataError:
             assert not out.exists()
             raise
@@ -180,7 +180,7 @@ def test_values_are_those_written(case, below, at, unit):
 )
 def test_every_form(body: str, channel: Channel, value: float) -> None:
     clock = sentence('GPZDA,120000.00,28,02,2024,00,00')
-    result, block = run(lines(clock, sentence(body)), transducer_m=2.5)
+    result, block = run(lines(clock, sentence(body)), transducer=2.5)
     found = of(block, channel)
     assert len(found) == 1
     assert abs(found.value[0, 0]) == pytest.approx(abs(value), rel=1e-7, abs=1e-12)
@@ -366,7 +366,7 @@ def stamps(block: Block) -> list[str]:
 def test_midnight_without_a_date() -> None:
     log = lines(gga('235959.50'), gga('000000.00'), gga('000000.50'), gga('113000'), gga('2200'))
     log = log.replace(gga('2200'), gga('220000'))
-    _, block = run(log, day=date(2023, 12, 31))
+    _, block = run(log, date=date(2023, 12, 31))
     assert stamps(block) == [
         '2023-12-31 23:59:59.5',
         '2024-01-01 00:00:00.0',
@@ -375,7 +375,7 @@ def test_midnight_without_a_date() -> None:
         '2024-01-01 22:00:00.0',
     ]
     for clock in ('000000.00', '120000', '235959.99'):
-        _, block = run(lines(gga(clock)), day=date(2023, 12, 31))
+        _, block = run(lines(gga(clock)), date=date(2023, 12, 31))
         assert stamps(block)[0].startswith('2023-12-31')
 
 
@@ -398,7 +398,7 @@ def test_times_of_day_before_the_first_date_are_of_the_day_before_midnight() -> 
 
 
 def test_a_leap_second_is_the_midnight_after_it() -> None:
-    _, block = run(lines(gga('235959'), gga('235960'), gga('000000')), day=date(2016, 12, 31))
+    _, block = run(lines(gga('235959'), gga('235960'), gga('000000')), date=date(2016, 12, 31))
     assert stamps(block) == [
         '2016-12-31 23:59:59.0',
         '2017-01-01 00:00:00.0',
@@ -422,7 +422,7 @@ def test_two_digits_of_the_year() -> None:
         log = lines(sentence(f'GPRMC,120000,A,4612.9,N,00610.1,E,5.0,3,0102{digits},,,A'))
         if year > 2037:
             with pytest.raises(ImportDataError, match='no possible date'):
-                run(log, day=date(2024, 2, 28))
+                run(log, date=date(2024, 2, 28))
         else:
             assert stamps(run(log)[1])[0].startswith(f'{year}-02-01')
 
@@ -431,12 +431,12 @@ def test_the_week_rollover_of_an_old_receiver() -> None:
     true = date(2024, 2, 28)
     early = date.fromordinal(true.toordinal() - 7168)
     log = lines(rmc(0, day=early.strftime('%d%m%y')), vhw(1), rmc(1, day=early.strftime('%d%m%y')))
-    result, block = run(log, day=true)
+    result, block = run(log, date=true)
     assert result.shift_days == 7168
     assert seconds(block, Channel.POSITION_GEODETIC) == [0.0, 1.0]
     assert run(log)[0].shift_days == 0
     with pytest.raises(ImportDataError, match=r'begins on 2004-07-14.*leave --date out'):
-        run(log, day=date(2024, 2, 27))
+        run(log, date=date(2024, 2, 27))
 
 
 def test_a_time_without_a_fix_counts_only_where_it_goes_on() -> None:
@@ -527,7 +527,7 @@ def test_checksums() -> None:
         'no sentence': 1,
         'no address': 1,
     }
-    result, block = run(log, checksum=Checksum.OPTIONAL)
+    result, block = run(log, no_checksum=True)
     assert len(of(block, Channel.SPEED_THROUGH_WATER)) == 3
     with pytest.raises(ImportDataError, match=r'without checksum 1 times.*--no-checksum'):
         run(lines(bare))
@@ -551,7 +551,7 @@ def test_a_damaged_byte_never_becomes_a_value(place: int, byte: int) -> None:
 @given(st.binary(max_size=600))
 def test_any_bytes_in_between_are_counted_or_nothing(noise: bytes) -> None:
     log = lines(rmc(0)).encode() + noise + b'\n' + lines(rmc(1)).encode()
-    _, block = run(log, checksum=Checksum.REQUIRED)
+    _, block = run(log, no_checksum=False)
     assert seconds(block, Channel.POSITION_GEODETIC)[0] == 0.0
     assert seconds(block, Channel.POSITION_GEODETIC)[-1] == 1.0
 
@@ -581,8 +581,8 @@ def test_files_that_are_no_log() -> None:
         run(b'\x1f\x8bno gzip')
     with pytest.raises(ImportDataError, match=r'gave no sample.*give a log with any of'):
         run(lines(sentence('GPZDA,120000.00,28,02,2024,00,00')))
-    with pytest.raises(ImportDataError, match='cannot be read: No such file'):
-        read_nmea(Path('no.nmea'), Log())
+    with pytest.raises(ImportDataError, match='does not exist'):
+        read_nmea(Job(Path('no.nmea')), Log())
 
 
 def test_a_huge_line_is_counted_once() -> None:
@@ -620,11 +620,11 @@ def test_a_long_log_is_not_attached(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_log_attached_is_the_log(tmp_path: Path) -> None:
     source, out = tmp_path / 'a.log', tmp_path / 'a.mcap'
     source.write_bytes(lines(rmc(0), 'Zürich', vhw(1)).replace('\n', '\r\n').encode())
-    into_bag(read_nmea, source, out)
+    into_bag(lambda log, to: read_nmea(Job(log), to), source, out)
     (bag,) = open_runs([out])
     assert bag.attachments['log.nmea'].encode() == source.read_bytes()
     with pytest.raises(BagError, match='exists'):
-        into_bag(read_nmea, source, out)
+        into_bag(lambda log, to: read_nmea(Job(log), to), source, out)
     assert out.exists()
 
 
@@ -685,6 +685,6 @@ def test_dates_before_a_rollover_are_said_where_receipts_are_of_today() -> None:
     result, _ = run('\n'.join(lines))
     assert result.days_early == 7168
     assert any('give --date 2024-02-28' in line for line in result.summary(Path('x')))
-    mended, block = run('\n'.join(lines), day=date(2024, 2, 28))
+    mended, block = run('\n'.join(lines), date=date(2024, 2, 28))
     assert mended.start_ns == int(block.stamp_ns[0]) == START_NS
     assert not any('--date' in line for line in mended.summary(Path('x')))

@@ -14,7 +14,7 @@ import pytest
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
-from shipdrag_ros.sources.reading import Understanding, read_any
+from shipdrag_ros.sources.reading import read_any
 
 SPEED = 5.0  # m/s, to the north
 
@@ -23,10 +23,10 @@ def read(folder: Path, header: str, rows: Iterable[str]) -> tuple[Block, str]:
     """Return the samples of a table, and what is shown of it."""
     path = folder / 'log.csv'
     path.write_text('\n'.join([header, *rows]) + '\n')
-    shown: list[Understanding] = []
+    shown: list[list[str]] = []
     (run,) = read_any([path], show=shown.append)
     block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
-    return block, '\n'.join(shown[0].lines())
+    return block, '\n'.join(shown[0])
 
 
 def of(block: Block, channel: Channel) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.sources.table import read_numbers
+from shipdrag_ros.sources.formats.csv.table import read_numbers
 
 
 @pytest.mark.parametrize('mark', [',', ';', '\t'])

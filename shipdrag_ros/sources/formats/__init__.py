@@ -18,13 +18,6 @@ from shipdrag_ros.sources.format import Format
 GROUP = 'shipdrag.formats'
 
 
-def names() -> tuple[str, ...]:
-    """
-    Return the modules of the formats, without importing them.
-    """
-    return tuple(module.name for module in iter_modules(__path__))
-
-
 def points() -> tuple[EntryPoint, ...]:
     """
     Return the entry points of the formats of this folder, and of other packages.

@@ -14,9 +14,9 @@ from math import isfinite, pi, radians, remainder
 from typing import Any
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job, missing_library
-from shipdrag_ros.sources.log import BASE_NS, UNDATED, Log
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
+from shipdrag_ros.sources.log import BASE_NS, UNDATED
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
 
 # a message begins with A3 95, the first one defines the definitions (type 80)
 _MAGIC = b'\xa3\x95\x80\x80'
@@ -29,26 +29,22 @@ def _score(head: Head) -> float:
     return CERTAIN if head.raw.startswith(_MAGIC) else NO
 
 
-def _open(job: Job, log: Log) -> StreamResult:
+def _read(job: Job, tally: Tally) -> Iterator[Reading]:
     try:
         from pymavlink.DFReader import DFReader_binary
     except ModuleNotFoundError:
         raise missing_library(job, 'a log of ArduPilot', 'pymavlink') from None
-
-    def read(tally: Tally) -> Iterator[Reading]:
-        found: list[Reading] = []
-        try:
-            with (
-                redirect_stdout(StringIO()),
-                _silence(),
-                closing(DFReader_binary(str(job.source))) as stored,
-            ):
-                found.extend(_readings(stored, tally))
-        except Exception as error:  # the parser raises what a damaged byte happens to raise
-            tally.note(f'The log could not be read to its end: {error or type(error).__name__}.')
-        yield from found
-
-    return read_stream(job, log, 'ardupilot', read)
+    found: list[Reading] = []
+    try:
+        with (
+            redirect_stdout(StringIO()),
+            _silence(),
+            closing(DFReader_binary(str(job.source))) as stored,
+        ):
+            found.extend(_readings(stored, tally))
+    except Exception as error:  # the parser raises what a damaged byte happens to raise
+        tally.note(f'The log could not be read to its end: {error or type(error).__name__}.')
+    yield from found
 
 
 @contextmanager
@@ -98,10 +94,10 @@ def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, 
                 yield SHAFTS[place], 1, f'{name} {key}', float(fields[key]) * pi / 30.0, 0.0
 
 
-FORMAT = Format(
+FORMAT = stream_format(
     name='ardupilot',
     kind='a log of ArduPilot (.bin)',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
 )

@@ -16,10 +16,10 @@ from xml.parsers import expat
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Format, Head, Job
-from shipdrag_ros.sources.log import Log, iso_ns
+from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Head, Job
+from shipdrag_ros.sources.log import iso_ns
 from shipdrag_ros.sources.opened import check_unpacked, opened
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
 
 _CHUNK = 1 << 16
 _DEEPEST = 32
@@ -34,10 +34,6 @@ def _score(head: Head) -> float:
     if b'<gpx' in start:
         return CERTAIN
     return LIKELY if start.lstrip().startswith(b'<?xml') and head.path.suffix == '.gpx' else NO
-
-
-def _open(job: Job, log: Log) -> StreamResult:
-    return read_stream(job, log, 'gpx', lambda tally: _read(job, tally))
 
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
@@ -126,10 +122,10 @@ def _is_coordinate(text: str, largest: float) -> bool:
     return _NUMBER.fullmatch(text) is not None and abs(float(text)) <= largest
 
 
-FORMAT = Format(
+FORMAT = stream_format(
     name='gpx',
     kind='a GPX track',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
 )

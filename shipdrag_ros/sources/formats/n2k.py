@@ -13,23 +13,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from datetime import UTC, date
+from datetime import UTC
 from functools import cache
 from itertools import chain, islice, pairwise
 from math import cos, pi, remainder, sin
 from typing import Any, NamedTuple
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.sentences import NoValue
+from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources import format
-from shipdrag_ros.sources.log import BASE_NS, Log, iso_ns
+from shipdrag_ros.sources.log import BASE_NS, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, counted, stream_format
 
 MINUTE_NS = 60 * SECOND_NS
-DAY_NS = 1440 * MINUTE_NS
 _SINCE = r'\((?P<seconds>\d{1,10})\.(?P<fraction>\d{1,9})\)\s+'
 _CLOCK = r'(?P<hour>\d\d):?(?P<minute>\d\d):?(?P<second>\d\d)\.(?P<fraction>\d{1,6})\s+'
 _ISO = r'\d{4}-\d\d-\d\d[-T ]\d\d:\d\d:\d\d(?:[.,]\d{1,12})?'
@@ -126,12 +124,9 @@ def _frame(parts: dict[str, str]) -> N2kFrame | None:
         if len(data) > 8:
             return None
         return N2kFrame(time_ns, cycle_ns, pgn, str(number & 0xFF), data, False)
-    if 'decimal_pgn' in parts:
-        pgn, sender, whole = int(parts['decimal_pgn']), parts['sender'], len(data) > 8
-    elif 'hex_sender' in parts:
-        pgn, sender, whole = int(parts['pgn'], 16), str(int(parts['hex_sender'], 16)), True
-    else:
-        pgn, sender, whole = int(parts['pgn'], 16), parts['sender'], False
+    sender = parts.get('sender') or str(int(parts['hex_sender'], 16))
+    pgn = int(parts['decimal_pgn']) if 'decimal_pgn' in parts else int(parts['pgn'], 16)
+    whole = 'hex_sender' in parts or ('decimal_pgn' in parts and len(data) > 8)
     return N2kFrame(time_ns, cycle_ns, pgn, sender, data, whole)
 
 
@@ -150,32 +145,56 @@ _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _SYSTEM_TIME, _GNSS = 126992, 129029
 _DATED_FRAMES = 50_000  # in which a date is looked for
 _FAST = (_GNSS,)
-_EPOCH_DAYS = date(1970, 1, 1).toordinal()
 
 
-@dataclass(frozen=True)
 class FrameClock:
     """
-    How the times of the lines are to be read.
+    Follows the times of the frames.
 
-    Attributes
+    Parameters
     ----------
-    rate_hz
-        Frames a second, where the lines state no time.
     base_ns
         Added to times that do not count from 1970 [ns].
-    notes
-        What was assumed, a sentence each.
+    rate_hz
+        Frames a second, where the lines state no time.
     """
 
-    rate_hz: float | None = None
-    base_ns: int = 0
-    notes: tuple[str, ...] = ()
+    def __init__(self, base_ns: int = 0, rate_hz: float | None = None) -> None:
+        self._base_ns = base_ns
+        self._rate_hz = rate_hz
+        self._frames = -1
+        self._cycles = 0
+        self._last_ns = 0
+
+    def ns(self, frame: N2kFrame) -> int | None:
+        """
+        Return the time of the next frame [ns since 1970], None where it has none.
+        """
+        self._frames += 1
+        if self._rate_hz is not None:
+            return self._base_ns + round(self._frames / self._rate_hz * SECOND_NS)
+        if frame.time_ns is None:
+            return None
+        time_ns = (
+            self.counted_on(frame.time_ns, frame.cycle_ns) if frame.cycle_ns else frame.time_ns
+        )
+        return self._base_ns + time_ns
+
+    def counted_on(self, time_ns: int, cycle_ns: int) -> int:
+        """
+        Return a time that begins again after a cycle, counted on.
+        """
+        if time_ns < self._last_ns - cycle_ns // 2:
+            self._cycles += 1
+        elif time_ns > self._last_ns + cycle_ns // 2 and self._cycles:
+            self._cycles -= 1  # a damaged time had passed for the next cycle's
+        self._last_ns = time_ns
+        return self._cycles * cycle_ns + time_ns
 
 
-def clock_of(job: format.Job) -> FrameClock:
+def clock_of(job: format.Job, tally: Tally) -> FrameClock:
     """
-    Find out how the times of a log are to be read.
+    Find out how the times of a log are to be read; what is assumed is noted.
 
     Raises
     ------
@@ -185,13 +204,13 @@ def clock_of(job: format.Job) -> FrameClock:
     name = repr(str(job.source))
     rate_hz = job.options.get('rate')
     day = job.options.get('date')
-    days = None if day is None else day.toordinal() - _EPOCH_DAYS
+    days = None if day is None else days_of(day)
     frames = (frame for line in Lines(job.source) if (frame := parse(line)) is not None)
     first = next(frames, None)
     if first is None:
         raise ImportDataError(f'{name} holds no frame of NMEA 2000')
     if rate_hz is not None:
-        return FrameClock(rate_hz, days * DAY_NS if days else BASE_NS)
+        return FrameClock(days * DAY_NS if days else BASE_NS, rate_hz)
     if first.time_ns is None:
         raise ImportDataError(
             f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
@@ -206,14 +225,16 @@ def clock_of(job: format.Job) -> FrameClock:
                 f'{name}: its times are no dates and go back and forth, as those of `candump -td` '
                 'do; log with `candump -L`, or give --rate HZ'
             )
-        return FrameClock(base_ns=BASE_NS)
+        return FrameClock(BASE_NS)
     known_ns = _start_in(chain([first], islice(frames, _DATED_FRAMES)))
     if first.cycle_ns == MINUTE_NS:
-        notes = ['The times of the frames count within a minute: a pause of a minute is not seen.']
-        if known_ns is None:
-            notes.append('No frame states the date; the times count from 2000-01-01.')
-        start_ns = BASE_NS if days is None else days * DAY_NS
-        return FrameClock(base_ns=start_ns if known_ns is None else known_ns, notes=tuple(notes))
+        tally.note(
+            'The times of the frames count within a minute: a pause of a minute is not seen.'
+        )
+        if known_ns is not None:
+            return FrameClock(known_ns)
+        tally.note('No frame states the date; the times count from 2000-01-01.')
+        return FrameClock(BASE_NS if days is None else days * DAY_NS)
     if days is None and known_ns is not None:
         days = known_ns // DAY_NS
     if days is None:
@@ -221,16 +242,16 @@ def clock_of(job: format.Job) -> FrameClock:
             f'{name} has times of day, and no date (no PGN 126992 or 129029 with one); give '
             '--date YYYY-MM-DD of its first time, in UTC'
         )
-    return FrameClock(base_ns=days * DAY_NS)
+    return FrameClock(days * DAY_NS)
 
 
 def _start_in(frames: Iterable[N2kFrame]) -> int | None:
     """
     Return when the cycle of the first frame began [ns since 1970], by a message with a date.
     """
-    packets, unwrapped = _Packets(), _Unwrapped()
+    packets, clock = _Packets(), FrameClock()
     for frame in frames:
-        since_ns = 0 if frame.time_ns is None else unwrapped.ns(frame.time_ns, frame.cycle_ns)
+        since_ns = 0 if frame.time_ns is None else clock.counted_on(frame.time_ns, frame.cycle_ns)
         if frame.pgn in (_SYSTEM_TIME, _GNSS):
             data = packets.whole(frame)
             place = 2 if frame.pgn == _SYSTEM_TIME else 1
@@ -242,22 +263,6 @@ def _start_in(frames: Iterable[N2kFrame]) -> int | None:
                     # a time of day is the line's own, to which the message gives its day
                     return time_ns if frame.cycle_ns == MINUTE_NS else days * DAY_NS
     return None
-
-
-class _Unwrapped:
-    """Times that begin again after a cycle, counted on."""
-
-    def __init__(self) -> None:
-        self._cycles = 0
-        self._last_ns = 0
-
-    def ns(self, time_ns: int, cycle_ns: int) -> int:
-        if time_ns < self._last_ns - cycle_ns // 2:
-            self._cycles += 1
-        elif time_ns > self._last_ns + cycle_ns // 2 and self._cycles:
-            self._cycles -= 1  # a damaged time had passed for the next cycle's
-        self._last_ns = time_ns
-        return self._cycles * cycle_ns + time_ns
 
 
 @cache
@@ -291,110 +296,62 @@ N2kValue = tuple[Channel, int, float, float]
 """Channel, rank of the source, and two values."""
 
 
-class _Fields:
-    """The fields of a message, and what is known besides."""
+class _Fields(dict[str, Any]):
+    """The fields of a message by name, and what is known besides."""
 
     def __init__(
         self, message: Any, options: Mapping[str, Any], note: Callable[[str], None]
     ) -> None:
-        self._fields = {field.id: field for field in message.fields}
+        super().__init__((field.id, field) for field in message.fields)
         self.options = options
         self.note = note
 
+    def __missing__(self, name: str) -> Any:
+        raise NoValue('without the field')  # of a message of another length
+
     def value(self, name: str) -> Any:
         """Return the value of a field, None where it is not available."""
-        return self._of(name).value
+        return self[name].value
 
     def number(self, name: str) -> Any:
         """Return the value of a field; NoValue where it is not available."""
-        value = self.value(name)
-        if value is None:
+        if self[name].value is None:
             raise NoValue('not available')
-        return value
+        return self[name].value
 
     def instance(self) -> Any:
         """Return which of several instruments it is of."""
-        return self._of('instance').raw_value
-
-    def _of(self, name: str) -> Any:
-        try:
-            return self._fields[name]
-        except KeyError:  # of a message of another length
-            raise NoValue('without the field') from None
+        return self['instance'].raw_value
 
 
-class N2kReader:
-    """
-    Takes the messages of a log.
-
-    Parameters
-    ----------
-    tally
-    clock
-        From `clock_of`.
-    options
-        `gear` and `transducer`, where they were given.
-    """
-
-    def __init__(self, tally: Tally, clock: FrameClock, options: Mapping[str, Any]) -> None:
-        self._tally = tally
-        self._clock = clock
-        self._options = options
-        self._packets = _Packets()
-        self._frames = 0
-        self._unwrapped = _Unwrapped()
-
-    def read(self, job: format.Job) -> Iterator[Reading]:
-        """
-        Yield the readings of a log.
-        """
-        for text in self._clock.notes:
-            self._tally.note(text)
-        lines = Lines(job.source, progress=job.progress)
-        for line in lines:
-            self._tally.records += 1
-            frame = parse(line) if line else None
-            if frame is not None:
-                found = self._reading(frame, line)
-                if found is not None:
-                    yield found
-            elif line:
-                self._tally.reject('line', 'no frame', line)
-        if lines.damage:
-            self._tally.note(f'The log could not be read to its end, {lines.damage}.')
-
-    def _reading(self, frame: N2kFrame, line: str) -> Reading | None:
-        stamp_ns = self._stamp_ns(frame)
-        read, name = _READERS.get(frame.pgn), f'PGN {frame.pgn}'
+def _read(job: format.Job, tally: Tally) -> Iterator[Reading]:
+    clock, packets = clock_of(job, tally), _Packets()
+    for line in counted(Lines(job.source, progress=job.progress), tally):
+        frame = parse(line)
+        if frame is None:
+            tally.reject('line', 'no frame', line)
+            continue
+        stamp_ns, name = clock.ns(frame), f'PGN {frame.pgn}'
+        read = _READERS.get(frame.pgn)
         if read is None:
-            self._tally.not_used[name] += 1
-            return None
-        if stamp_ns is None:
-            self._tally.reject('time', 'no time in the line', line)
-            return None
-        data = self._packets.whole(frame)
-        if data is None:
-            return None
-        message = _backend().decode(frame.pgn, data, units='si')
-        try:
-            if message is None:
-                raise NoValue('cannot be decoded')
-            channel, rank, a, b = read(_Fields(message, self._options, self._tally.note))
-        except NoValue as reason:
-            self._tally.reject(name, reason.reason, line)
-            return None
-        return Reading(channel, Origin(rank, f'{name} from {frame.sender}'), stamp_ns, a, b)
+            tally.not_used[name] += 1
+        elif stamp_ns is None:
+            tally.reject('time', 'no time in the line', line)
+        elif (data := packets.whole(frame)) is not None:
+            try:
+                channel, rank, a, b = read(_fields(frame.pgn, data, job, tally))
+            except NoValue as reason:
+                tally.reject(name, str(reason), line)
+            else:
+                origin = Origin(rank, f'{name} from {frame.sender}')
+                yield Reading(channel, origin, stamp_ns, a, b)
 
-    def _stamp_ns(self, frame: N2kFrame) -> int | None:
-        self._frames += 1
-        if self._clock.rate_hz is not None:
-            since_s = (self._frames - 1) / self._clock.rate_hz
-            return self._clock.base_ns + round(since_s * SECOND_NS)
-        if frame.time_ns is None:
-            return None
-        if not frame.cycle_ns:
-            return frame.time_ns + self._clock.base_ns
-        return self._clock.base_ns + self._unwrapped.ns(frame.time_ns, frame.cycle_ns)
+
+def _fields(pgn: int, data: bytes, job: format.Job, tally: Tally) -> _Fields:
+    message = _backend().decode(pgn, data, units='si')
+    if message is None:
+        raise NoValue('cannot be decoded')
+    return _Fields(message, job.options, tally.note)
 
 
 def _water(fields: _Fields) -> N2kValue:
@@ -485,19 +442,11 @@ def _score(head: format.Head) -> float:
     return format.CERTAIN if head.share(parse) > 0.5 else format.NO
 
 
-def _open(job: format.Job, log: Log) -> StreamResult:
-    clock = clock_of(job)
-    about = {key: job.options.get(key) for key in ('date', 'gear', 'rate', 'transducer')}
-    return read_stream(
-        job, log, 'n2k', lambda tally: N2kReader(tally, clock, job.options).read(job), about=about
-    )
-
-
-FORMAT = format.Format(
+FORMAT = stream_format(
     name='n2k',
     kind='a log of NMEA 2000',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
     options=(format.DATE, format.GEAR, format.RATE, format.TRANSDUCER),
 )

@@ -105,7 +105,7 @@ def _open(job: Job, log: Log) -> CopyResult:
             f'an input; {reasons or f"it has {others or 0}"}'
         )
     log.messages = messages
-    log.attach(ATTACHMENT, strict_yaml.dump({'source': job.source.name, 'kind': kind}))
+    log.attachments[ATTACHMENT] = strict_yaml.dump({'source': job.source.name, 'kind': kind})
     return _result(kind, log, tally)
 
 

@@ -17,10 +17,10 @@ from math import cos, pi, remainder, sin
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Format, Head, Job
-from shipdrag_ros.sources.log import Log, iso_ns
+from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Head, Job
+from shipdrag_ros.sources.log import iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, counted, stream_format
 
 _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')
@@ -50,15 +50,13 @@ def _score(head: Head) -> float:
     return POSSIBLE if head.share(lambda line: '"path"' in line) > 0.3 else NO
 
 
-def _open(job: Job, log: Log) -> StreamResult:
-    gear, own = job.options.get('gear'), _own_vessel(job)
-    return read_stream(
-        job,
-        log,
-        'signalk',
-        lambda tally: _Deltas(tally, gear, own).read(job),
-        about={'gear': gear},
-    )
+def _read(job: Job, tally: Tally) -> Iterator[Reading]:
+    deltas = _Deltas(tally, job.options.get('gear'), _own_vessel(job))
+    lines = Lines(job.source, progress=job.progress)
+    for line in counted(lines, tally):
+        yield from deltas.of_line(line)
+    if lines.too_long:
+        tally.note(f'{len(lines.too_long)} lines were too long for a delta.')
 
 
 def _own_vessel(job: Job) -> str:
@@ -78,18 +76,8 @@ class _Deltas:
         self._own = own
         self._winds: dict[tuple[str, str], tuple[int, float]] = {}
 
-    def read(self, job: Job) -> Iterator[Reading]:
-        lines = Lines(job.source, progress=job.progress)
-        for line in lines:
-            self._tally.records += 1
-            if line:
-                yield from self._line(line)
-        if lines.damage:
-            self._tally.note(f'The log could not be read to its end, {lines.damage}.')
-        if lines.too_long:
-            self._tally.note(f'{len(lines.too_long)} lines were too long for a delta.')
-
-    def _line(self, line: str) -> Iterator[Reading]:
+    def of_line(self, line: str) -> Iterator[Reading]:
+        """Yield what a line holds."""
         text = line[line.find('{') :] if '{' in line[:200] else line  # behind a time or a source
         # before the parser, which goes as deep as its text
         if max(accumulate((c in '[{') - (c in ']}') for c in text), default=0) > _DEEPEST:
@@ -179,11 +167,11 @@ def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12
 
 
-FORMAT = Format(
+FORMAT = stream_format(
     name='signalk',
     kind='a log of Signal K',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
     options=(GEAR,),
 )

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
-from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job, missing_library
-from shipdrag_ros.sources.log import BASE_NS, UNDATED, Log
-from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
+from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
+from shipdrag_ros.sources.log import BASE_NS, UNDATED
+from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
 
 _MAGIC = b'ULog\x01\x12\x35'
 _LIMIT_BYTES = 2 << 30  # pyulog holds the whole log in memory
@@ -33,7 +33,7 @@ def _score(head: Head) -> float:
     return CERTAIN if head.raw.startswith(_MAGIC) else NO
 
 
-def _open(job: Job, log: Log) -> StreamResult:
+def _read(job: Job, tally: Tally) -> Iterator[Reading]:
     try:
         from pyulog import ULog
     except ModuleNotFoundError:
@@ -49,22 +49,18 @@ def _open(job: Job, log: Log) -> StreamResult:
         raise ImportDataError(
             f'{str(job.source)!r} is an ULog that cannot be read: {error or type(error).__name__}'
         ) from error
-
-    def read(tally: Tally) -> Iterator[Reading]:
-        try:
-            readings = list(_read(found, tally))
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-            # definitions that are damaged name other columns
-            raise ImportDataError(
-                f'{str(job.source)!r} is an ULog whose definitions are damaged: {error!r}'
-            ) from error
-        yield from readings
-
-    return read_stream(job, log, 'ulog', read)
+    try:
+        readings = _readings(found, tally)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        # definitions that are damaged name other columns
+        raise ImportDataError(
+            f'{str(job.source)!r} is an ULog whose definitions are damaged: {error!r}'
+        ) from error
+    yield from readings
 
 
-def _read(log: Any, tally: Tally) -> Iterator[Reading]:
-    """Yield the readings of all topics by time."""
+def _readings(log: Any, tally: Tally) -> list[Reading]:
+    """Return the readings of all topics by time."""
     base_ns = _base_ns(log)
     if base_ns == BASE_NS:
         tally.note(UNDATED)
@@ -84,7 +80,7 @@ def _read(log: Any, tally: Tally) -> Iterator[Reading]:
                 for stamp_ns, one, two in values
                 if np.isfinite(one) and np.isfinite(two)
             ]
-    yield from sorted(found, key=lambda reading: reading.stamp_ns)
+    return sorted(found, key=lambda reading: reading.stamp_ns)
 
 
 def _base_ns(log: Any) -> int:
@@ -122,10 +118,10 @@ def _values(name: str, columns: dict[str, Any]) -> Iterator[tuple[Channel, Float
                 yield channel, rpm * pi / 30.0, 0.0
 
 
-FORMAT = Format(
+FORMAT = stream_format(
     name='ulog',
     kind='an ULog (PX4)',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=_read,
 )

@@ -21,8 +21,8 @@ from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, Form, TimeColumn
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, texts_of
 from shipdrag_ros.sources.log import BASE_NS, LIMIT_NS
-from shipdrag_ros.sources.table import Cells, LogTable, texts_of
 
 _PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
@@ -239,53 +239,6 @@ _CLOCK = re.compile(
 _IN_TITLE = re.compile(r'(?<!\d)(20\d\d)[-_./]?(\d\d)[-_./]?(\d\d)(?!\d)')
 
 
-@dataclass(frozen=True)
-class DateForm:
-    """
-    How dates are written in a table.
-
-    Attributes
-    ----------
-    order
-        One of `ORDERS`; '' for times of day alone.
-    zone
-        Of times that state none.
-    """
-
-    order: str
-    zone: tzinfo = UTC
-
-    def read(self, text: str) -> int:
-        """
-        Return the time of a cell [ns since 1970], or [ns since midnight] of one without a date.
-
-        Raises
-        ------
-        BadCell
-            If it is none.
-        """
-        if not text:
-            raise BadCell('empty', text)
-        day, clock = parts(text)
-        clock_ns, zone = _clock_ns(clock, text)
-        if not self.order:
-            if day:
-                raise BadCell('a date where others have none', text)
-            return clock_ns
-        year, month, number = _numbers(day, self.order, text)
-        try:
-            midnight = datetime(year, month, number, tzinfo=zone or self.zone)
-            # the zone's offset at the time itself, which a change of the clocks moves
-            local = midnight + timedelta(seconds=clock_ns // SECOND_NS)
-            seconds = int(local.timestamp())
-        except (ValueError, OverflowError):
-            raise BadCell('no possible date', text) from None
-        time_ns = seconds * SECOND_NS + clock_ns % SECOND_NS
-        if not 0 <= time_ns < LIMIT_NS:
-            raise BadCell('no possible date', text)
-        return time_ns
-
-
 def parts(text: str) -> tuple[str, str]:
     """
     Split a cell into date and time of day; either may be empty.
@@ -424,7 +377,7 @@ _COUNTS_FROM = (('ns', 10**17), ('us', 10**14), ('ms', 10**11))  # since 1970, f
 
 class RowClock:
     """
-    Times of rows [ns], from their number or from a cell.
+    Times of rows [ns], each from its cell.
 
     Attributes
     ----------
@@ -435,95 +388,8 @@ class RowClock:
     """
 
     def __init__(self) -> None:
-        self._row_ns: Fraction | None = None
-        self._unit_ns = NANOSECONDS['s']
-        self._dates: DateForm | None = None
-        self._comma = False
-        self._known = False
-        self._midnights = 0
-        self._last_of_day_ns = 0
         self.base_ns: int | None = None
         self.notes: list[str] = []
-
-    @classmethod
-    def of(
-        cls,
-        time: TimeColumn | None,
-        rate_hz: float | None,
-        cells: Sequence[str],
-        table: LogTable,
-    ) -> RowClock:
-        """
-        Make the clock of a table.
-
-        Parameters
-        ----------
-        time, rate_hz
-            One of the two: the column of the time, or rows a second.
-        cells
-            Of the time, in the first rows.
-        table
-            Whose titles and name may show the date.
-
-        Raises
-        ------
-        ImportDataError
-            If the rate is none, or day and month are ambiguous.
-        """
-        clock = cls()
-        if time is None:
-            assert rate_hz is not None
-            if not (isfinite(rate_hz) and rate_hz > 0.0):
-                raise ImportDataError(
-                    f'--rate {rate_hz!r}: expected a number of rows a second above 0'
-                )
-            clock._row_ns = SECOND_NS / Fraction(rate_hz)
-            clock.base_ns = BASE_NS
-            return clock
-        texts = [cell.strip() for cell in cells if cell.strip()]
-        if len(time.names) == 2 or (texts and is_date(texts[0])):
-            clock._read_dates(time, texts, table)
-        else:
-            clock._read_counts(time, texts)
-        return clock
-
-    def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
-        order, known_by = time.order, ''
-        if not order:
-            order, known_by = order_of(texts, table)
-            if not order and texts and parts(texts[0])[0]:
-                raise ImportDataError(
-                    f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
-                    '--date-order dmy or --date-order mdy'
-                )
-        self._dates = DateForm(order, time.zone)
-        if not order:
-            self.base_ns = BASE_NS
-            self.notes.append('The times are times of day without a date.')
-            return
-        if known_by and order != 'ymd':
-            words = {'d': 'day', 'm': 'month', 'y': 'year'}
-            written = '/'.join(words[each] for each in order)
-            self.notes.append(f'Dates are {written}, as {known_by} show.')
-        stated = 'utc' in ' '.join(time.names).lower() or any(map(_has_zone, texts[:1]))
-        if time.zone is UTC and not stated:
-            self.notes.append('The times state no zone and are taken as UTC (--zone).')
-
-    def _read_counts(self, time: TimeColumn, texts: Sequence[str]) -> None:
-        self._comma = has_decimal_commas(texts)
-        self._unit_ns = time.unit_ns
-        if time.given:
-            return
-        for text in texts[:1]:
-            try:
-                plain = text.replace(',', '.', 1) if self._comma else text
-                count = abs(CellReader().one(plain))
-            except BadCell:
-                continue
-            unit = next((unit for unit, least in _COUNTS_FROM if count >= least), 's')
-            if unit != 's':
-                self._unit_ns = NANOSECONDS[unit]
-                self.notes.append(f'The times are counts of {unit} since 1970, by their size.')
 
     def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
         """
@@ -538,52 +404,150 @@ class RowClock:
         bad
             Filled with why, by the place of a cell that holds none.
         """
-        if self._row_ns is not None:
-            parts = range(first, first + len(cells))
-            times = [BASE_NS + round(number * self._row_ns) for number in parts]
-            return np.array(times, np.int64)
-        if self._dates is None and isinstance(cells, np.ndarray):
-            return self._counted(cells, bad)
         found = np.zeros(len(cells), np.int64)
         for place, cell in enumerate(texts_of(cells) if isinstance(cells, np.ndarray) else cells):
             try:
-                found[place] = self._time_ns(cell)
+                time_ns = self._time_ns(cell)
+                if not 0 <= time_ns < LIMIT_NS:
+                    raise BadCell('no possible date', cell)
+                found[place] = time_ns
             except BadCell as error:
                 bad[place] = error
         return found
 
     def _time_ns(self, cell: str) -> int:
-        if self._dates is None:
-            time_ns = self._count_ns(cell)
-            self._begin(time_ns)
-            time_ns += self.base_ns or 0
-        else:
-            time_ns = self._dates.read(cell)
-            if not self._dates.order:
-                time_ns = self._since_midnight(time_ns)
-        if not 0 <= time_ns < LIMIT_NS:
-            raise BadCell('no possible date', cell)
-        return time_ns
+        raise NotImplementedError
 
-    def _count_ns(self, cell: str) -> int:
-        plain = cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
-        CellReader().one(plain)
-        exact = Decimal(plain) * self._unit_ns
-        if exact.copy_abs() >= LIMIT_NS:
-            raise BadCell('no possible date', cell)
-        return int(exact.to_integral_value())
 
-    def _begin(self, time_ns: int) -> None:
-        """Say by the first count whether they count from 1970 or from a start."""
-        if not self._known:
-            self.base_ns = BASE_NS if time_ns < _RELATIVE_BELOW_NS else None
-            self._known = True
+def row_clock(
+    time: TimeColumn | None, rate_hz: float | None, cells: Sequence[str], table: LogTable
+) -> RowClock:
+    """
+    Make the clock of a table.
 
-    def _counted(self, counts: NDArray[Any], bad: dict[int, BadCell]) -> Int64:
-        """Return what `_time_ns` makes of the text of each number."""
-        times, exact = _counts_ns(counts, len(str(self._unit_ns)) - 1)
+    Parameters
+    ----------
+    time, rate_hz
+        One of the two: the column of the time, or rows a second.
+    cells
+        Of the time, in the first rows.
+    table
+        Whose titles and name may show the date.
+
+    Raises
+    ------
+    ImportDataError
+        If the rate is none, or day and month are ambiguous.
+    """
+    if time is None:
+        assert rate_hz is not None
+        return _Steady(rate_hz)
+    texts = [cell.strip() for cell in cells if cell.strip()]
+    if len(time.names) == 2 or (texts and is_date(texts[0])):
+        return _Dates(time, texts, table)
+    return _Counts(time, texts)
+
+
+class _Steady(RowClock):
+    """Of rows that are so many a second."""
+
+    def __init__(self, rate_hz: float) -> None:
+        super().__init__()
+        if not (isfinite(rate_hz) and rate_hz > 0.0):
+            raise ImportDataError(
+                f'--rate {rate_hz!r}: expected a number of rows a second above 0'
+            )
+        self.base_ns = BASE_NS
+        self._row_ns = SECOND_NS / Fraction(rate_hz)
+
+    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
+        rows = range(first, first + len(cells))
+        return np.array([BASE_NS + round(number * self._row_ns) for number in rows], np.int64)
+
+
+class _Dates(RowClock):
+    """Of dates, or of times of day alone."""
+
+    def __init__(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
+        super().__init__()
+        self._zone = time.zone
+        self._midnights = 0
+        self._last_of_day_ns = 0
+        self._order, known_by = time.order, ''
+        if not self._order:
+            self._order, known_by = order_of(texts, table)
+        order = self._order
+        if not order and texts and parts(texts[0])[0]:
+            raise ImportDataError(
+                f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
+                '--date-order dmy or --date-order mdy'
+            )
+        if not order:
+            self.base_ns = BASE_NS
+            self.notes.append('The times are times of day without a date.')
+            return
+        if known_by and order != 'ymd':
+            words = {'d': 'day', 'm': 'month', 'y': 'year'}
+            written = '/'.join(words[each] for each in order)
+            self.notes.append(f'Dates are {written}, as {known_by} show.')
+        stated = 'utc' in ' '.join(time.names).lower() or any(map(_has_zone, texts[:1]))
+        if time.zone is UTC and not stated:
+            self.notes.append('The times state no zone and are taken as UTC (--zone).')
+
+    def _time_ns(self, cell: str) -> int:
+        if not cell:
+            raise BadCell('empty', cell)
+        day, clock = parts(cell)
+        clock_ns, zone = _clock_ns(clock, cell)
+        if not self._order:
+            if day:
+                raise BadCell('a date where others have none', cell)
+            return self._since_midnight(clock_ns)
+        year, month, number = _numbers(day, self._order, cell)
+        try:
+            midnight = datetime(year, month, number, tzinfo=zone or self._zone)
+            # the zone's offset at the time itself, which a change of the clocks moves
+            local = midnight + timedelta(seconds=clock_ns // SECOND_NS)
+            seconds = int(local.timestamp())
+        except (ValueError, OverflowError):
+            raise BadCell('no possible date', cell) from None
+        return seconds * SECOND_NS + clock_ns % SECOND_NS
+
+    def _since_midnight(self, of_day_ns: int) -> int:
+        """Add the midnights passed: a time of day that goes back by hours is of the next day."""
+        if of_day_ns < self._last_of_day_ns - _DAY_NS // 2:
+            self._midnights += 1
+        elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
+            self._midnights -= 1  # a row from before the midnight behind one from after it
+        self._last_of_day_ns = of_day_ns
+        return BASE_NS + self._midnights * _DAY_NS + of_day_ns
+
+
+class _Counts(RowClock):
+    """Of counts since 1970, or from a start."""
+
+    def __init__(self, time: TimeColumn, texts: Sequence[str]) -> None:
+        super().__init__()
+        self._comma = has_decimal_commas(texts)
+        self._unit_ns = time.unit_ns
+        self._known = False
+        self._plain = CellReader()
+        for text in () if time.given else texts[:1]:
+            try:
+                count = abs(self._plain.one(text.replace(',', '.', 1) if self._comma else text))
+            except BadCell:
+                continue
+            unit = next((unit for unit, least in _COUNTS_FROM if count >= least), 's')
+            if unit != 's':
+                self._unit_ns = NANOSECONDS[unit]
+                self.notes.append(f'The times are counts of {unit} since 1970, by their size.')
+
+    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
+        if not isinstance(cells, np.ndarray):
+            return super().times(cells, first, bad)
+        times, exact = _counts_ns(cells, len(str(self._unit_ns)) - 1)
         for place in np.flatnonzero(~exact).tolist():
-            (cell,) = texts_of(counts[place : place + 1])
+            (cell,) = texts_of(cells[place : place + 1])
             try:
                 times[place] = self._count_ns(cell)
             except BadCell as error:
@@ -594,17 +558,27 @@ class RowClock:
             self._begin(int(times[good.argmax()]))
         times += self.base_ns or 0
         for place in np.flatnonzero(good & ((times < 0) | (times >= LIMIT_NS))).tolist():
-            bad[place] = BadCell('no possible date', str(counts[place]))
+            bad[place] = BadCell('no possible date', str(cells[place]))
         return times
 
-    def _since_midnight(self, of_day_ns: int) -> int:
-        """Add the midnights passed: a time of day that goes back by hours is of the next day."""
-        if of_day_ns < self._last_of_day_ns - _DAY_NS // 2:
-            self._midnights += 1
-        elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
-            self._midnights -= 1  # a row from before the midnight behind one from after it
-        self._last_of_day_ns = of_day_ns
-        return BASE_NS + self._midnights * _DAY_NS + of_day_ns
+    def _time_ns(self, cell: str) -> int:
+        time_ns = self._count_ns(cell)
+        self._begin(time_ns)
+        return time_ns + (self.base_ns or 0)
+
+    def _count_ns(self, cell: str) -> int:
+        plain = cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
+        self._plain.one(plain)
+        exact = Decimal(plain) * self._unit_ns
+        if exact.copy_abs() >= LIMIT_NS:
+            raise BadCell('no possible date', cell)
+        return int(exact.to_integral_value())
+
+    def _begin(self, time_ns: int) -> None:
+        """Say by the first count whether they count from 1970 or from a start."""
+        if not self._known:
+            self.base_ns = BASE_NS if time_ns < _RELATIVE_BELOW_NS else None
+            self._known = True
 
 
 def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.bool_]]:

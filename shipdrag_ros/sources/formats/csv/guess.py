@@ -23,12 +23,12 @@ from shipdrag_ros.samples import ALL_MOTION, FURTHER, Channel, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     CellReader,
-    RowClock,
     coordinate_readers,
     has_decimal_commas,
     is_date,
     is_midnight,
     parts,
+    row_clock,
 )
 from shipdrag_ros.sources.formats.csv.columns import (
     COMPASS,
@@ -39,7 +39,7 @@ from shipdrag_ros.sources.formats.csv.columns import (
     columns_of,
     role_and_unit,
 )
-from shipdrag_ros.sources.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import LogTable
 
 _STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
 _MOVING_M_S = 0.4
@@ -73,11 +73,7 @@ def plane_speed(time_s: Float64, x: Float64, y: Float64) -> Float64:
     """
     speed = np.full(len(time_s), np.nan)
     good = np.flatnonzero(np.isfinite(time_s) & np.isfinite(x) & np.isfinite(y))
-    good = (
-        good[np.r_[True, np.diff(np.maximum.accumulate(time_s[good])) > 0.0]]
-        if len(good)
-        else good
-    )
+    good = good[np.diff(np.maximum.accumulate(time_s[good]), prepend=-np.inf) > 0.0]
     if len(good) < 2:
         return speed
     time = time_s[good]
@@ -198,7 +194,7 @@ class FirstRows:
         places = [self.table.column(name) for name in time.names]
         texts = self._rows.joined(places)
         try:
-            clock = RowClock.of(time, None, texts, self.table)
+            clock = row_clock(time, None, texts, self.table)
         except ImportDataError:
             return None
         bad: dict[int, BadCell] = {}
@@ -373,25 +369,25 @@ def guess(
     rows = FirstRows(table)
     made = _Guesser(rows, speed_unit)
     if time is None and not counted:
-        time = guessed_time(rows, made.found.notes)
-    made.found.time = time
+        time = guessed_time(rows, made.notes)
+    made.time = time
     if made.is_plain():
         made.plain()
     else:
         made.by_names(time)
-    if not any(each.channel.input in ALL_MOTION for each in made.found.inputs):
+    if not any(each.channel.input in ALL_MOTION for each in made.inputs):
         raise ImportDataError(made.nothing())
-    return made.found
+    return made
 
 
-class _Guesser:
+class _Guesser(Guess):
     """Guesses by the first rows of a table."""
 
     def __init__(self, rows: FirstRows, speed_unit: str) -> None:
+        super().__init__()
         self._rows = rows
         self._speed_unit = speed_unit
         self._track: Float64 | None = None
-        self.found = Guess()
 
     def _one(self, role: str) -> NamedColumn | None:
         columns = self._rows.roles.get(role, [])
@@ -401,8 +397,8 @@ class _Guesser:
         return columns[0] if columns else None
 
     def _doubt(self, text: str) -> None:
-        if text not in self.found.unclear:
-            self.found.unclear.append(text)
+        if text not in self.unclear:
+            self.unclear.append(text)
 
     def _ask(
         self,
@@ -423,7 +419,7 @@ class _Guesser:
         self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
     def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
-        self.found.inputs.append(columns_of(name, [each.key for each in columns], list(units)))
+        self.inputs.append(columns_of(name, [each.key for each in columns], list(units)))
 
     # columns named as the inputs are
 
@@ -452,8 +448,8 @@ class _Guesser:
                     f'which is no angle in rad; a column of this name is in SI units. Name the '
                     f'unit in it, {name}_deg, or give --map'
                 )
-            self.found.inputs.append(found)
-        self.found.notes.append('The columns have the names of the inputs: their units are SI.')
+            self.inputs.append(found)
+        self.notes.append('The columns have the names of the inputs: their units are SI.')
 
     # columns by their usual names
 
@@ -529,7 +525,7 @@ class _Guesser:
             self._ask(name, columns, [likely] * len(columns))
             return False
         if not unit:
-            self.found.notes.append(
+            self.notes.append(
                 f'{keys}: no unit is stated; in {seen} it agrees with the way between the '
                 'positions.'
             )
@@ -544,12 +540,12 @@ class _Guesser:
             return
         if column.unit == 'rad' and column.key.lower() == 'heading_rad':
             self._take('heading', [column], ['rad'])
-            self.found.notes.append(
+            self.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
             )
         elif self._unit(column, 'deg') == 'deg':
             self._take('heading', [column], [COMPASS])
-            self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
+            self.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:
             unit = column.unit if column.unit == 'rad' else COMPASS
             why = 'whether it is yaw or compass, or its unit, is not known'
@@ -566,7 +562,7 @@ class _Guesser:
     def nothing(self) -> str:
         """Say that nothing that moves is known, and what to type."""
         path = self._rows.path
-        why = '; '.join(self.found.unclear) or (
+        why = '; '.join(self.unclear) or (
             f'its columns are {", ".join(map(repr, self._rows.header))}, and none has a '
             'usual name of a speed or a position; say which it is, for instance --map '
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'

@@ -40,6 +40,7 @@ from shipdrag_ros.sources.formats.csv.cells import (
     combined,
     coordinate_readers,
     has_decimal_commas,
+    row_clock,
     zone_of,
 )
 from shipdrag_ros.sources.formats.csv.columns import (
@@ -58,15 +59,16 @@ from shipdrag_ros.sources.formats.csv.guess import (
     placed,
     with_dates,
 )
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     ImportResult,
     Log,
-    Rejected,
+    Refused,
     Understood,
+    reject,
     rejected_words,
 )
-from shipdrag_ros.sources.table import Cells, LogTable, TableRows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +155,7 @@ def read_csv(
     where = options.get('where', ())
     chosen = [(table.column(name), text) for name, text in where]
     sample = table.first_rows(_SAMPLE_ROWS)
-    clock = RowClock.of(time, rate, sample.joined(time_places), table)
+    clock = row_clock(time, rate, sample.joined(time_places), table)
     inputs = zip(channels, places, _readers(channels, places, sample), strict=True)
     record = _RowSamples(list(inputs), chosen, clock, time_places)
     about = {
@@ -163,7 +165,7 @@ def read_csv(
         'rate_hz': rate,
         'where': dict(where),
     }
-    log.attach(ATTACHMENT, strict_yaml.dump(about))
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     for rows in table.rows(progress):
         log.write_samples(record.take(rows))
     result = record.result(table, log)
@@ -193,7 +195,7 @@ class _RowSamples:
         self._newest_ns = self._arrived_ns = -1
         self._set_back_ns = 0  # by which a clock was set back so far
         self._written: Counter[str] = Counter()
-        self._rejected: dict[str, dict[str, Rejected]] = {}
+        self._rejected: Refused = {}
         self._seen: dict[str, None] = {}  # a set that keeps the order
 
     def take(self, rows: TableRows) -> Block:
@@ -216,8 +218,7 @@ class _RowSamples:
                 read.all(rows.columns[place], bad) * factor
                 for read, place, factor in zip(readers, places, columns.factors, strict=True)
             ]
-            for place in sorted(bad):
-                self._reject(columns.channel.input, rows.lines[place], bad[place])
+            self._reject(columns.channel.input, rows, bad)
             known[list(bad), k] = False
             value[:, k, 0], value[:, k, 1] = combined(columns.form, values)
             if columns.channel.kind in _SPEEDS:
@@ -285,8 +286,7 @@ class _RowSamples:
         for place in np.flatnonzero(~fits).tolist():
             text = rows.beyond[rows.lines[place]]
             bad[place] = BadCell(f'more than {len(rows.columns)} columns', text)
-        for place in sorted(bad):
-            self._reject('time', rows.lines[place], bad[place])
+        self._reject('time', rows, bad)
         fits[list(bad)] = False
         return times[fits], rows[fits]
 
@@ -354,9 +354,9 @@ class _RowSamples:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, line: int, bad: BadCell) -> None:
-        by_reason = self._rejected.setdefault(name, {})
-        by_reason.setdefault(bad.reason, Rejected()).add(line, bad.cell)
+    def _reject(self, name: str, rows: TableRows, bad: Mapping[int, BadCell]) -> None:
+        for place, why in sorted(bad.items()):
+            reject(self._rejected, name, why.reason, rows.lines[place], why.cell)
 
 
 def _readers(

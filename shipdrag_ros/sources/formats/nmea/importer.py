@@ -24,15 +24,13 @@ from typing import ClassVar
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros import display, strict_yaml
-from shipdrag_ros.errors import ImportDataError, reason_of
+from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import (
     DAY_NS,
     MAGNETIC,
     READERS,
     START,
     TIMED,
-    Checksum,
-    Mounting,
     SentenceReader,
     checksum_of,
     days_of,
@@ -81,67 +79,31 @@ class NmeaLog:
         File with a sentence a line. Before a sentence may stand a TAG block,
         or the time of its receipt: seconds or milliseconds since 1970, or ISO
         8601, taken as UTC without a zone.
+    progress
+        Called with how many bytes are read, and of how many.
 
     Attributes
     ----------
+    lines
+        All that stands in it, from its last reading.
     rejected
         Lines without a sentence by reason.
-    lines
-        Number of lines.
-    damage
-        Why the reading ended early, empty if it did not.
-
-    Raises
-    ------
-    ImportDataError
-        If the file cannot be read, is empty or in UTF-16.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, progress: PartDone | None = None) -> None:
+        self.lines = Lines(path, encoding=_ENCODING, longest=_LONGEST, progress=progress)
         self.rejected: dict[str, Rejected] = {}
-        self.lines = 0
-        self.damage = ''
-        try:
-            with opened(self.path) as (_, file):
-                start = file.read(2)
-        except BROKEN as error:
-            reason = reason_of(error)
-            raise ImportDataError(
-                f'{str(path)!r} cannot be read: {reason}; give a log of NMEA 0183'
-            ) from error
-        if not start:
-            raise ImportDataError(f'{str(path)!r} is empty; give a log with a sentence a line')
-        if start in _UTF_16:
-            raise ImportDataError(f'{str(path)!r} is in UTF-16; save it as UTF-8')
 
-    def text(self, limit_bytes: int) -> str | None:
-        """
-        Return the whole log, or None if it is longer or no text in UTF-8.
-        """
-        with opened(self.path) as (_, file):
-            try:
-                raw = file.read(limit_bytes + 1)
-                return None if len(raw) > limit_bytes else raw.decode()
-            except (*BROKEN, UnicodeDecodeError):
-                return None
-
-    def texts(self, progress: PartDone | None = None) -> Iterator[tuple[int, str, int | None]]:
+    def texts(self) -> Iterator[tuple[int, str, int | None]]:
         """
         Yield line, text and time of receipt [ns] of what may be sentences, in their order.
-
-        Parameters
-        ----------
-        progress
-            Called with how many bytes are read, and of how many.
         """
-        lines = Lines(self.path, encoding=_ENCODING, longest=_LONGEST, progress=progress)
+        lines = self.lines
         for line in lines:
             if line[:1] == '$' and line.rfind('$') == 0 and '!' not in line:
                 yield lines.number, line[1:].strip(), None
             elif line:
                 yield from self._of_line(lines.number, line.removeprefix(_UTF_8_MARK))
-        self.lines, self.damage = lines.number, lines.damage
         for number in lines.too_long:
             self.reject(f'longer than {_LONGEST} characters', number, '')
 
@@ -150,7 +112,7 @@ class NmeaLog:
         Return line and text of what stands at some places among the texts.
         """
         left, found = set(places), {}
-        texts = NmeaLog(self.path).texts() if left else iter(())
+        texts = NmeaLog(self.lines.path).texts() if left else iter(())
         for place, (line, text, _) in enumerate(texts):
             if place in left:
                 found[place] = line, text
@@ -207,12 +169,8 @@ def _receive_ns(prefix: str) -> int | None:
 def _counted_ns(digits: str, fraction: str) -> int:
     count = int(digits)
     unit_ns = 1_000_000 if count >= _MILLISECONDS_FROM else SECOND_NS
-    return count * unit_ns + _fraction_ns(fraction, unit_ns)
-
-
-def _fraction_ns(text: str, unit_ns: int) -> int:
-    """Return `.25` of a unit exactly; none without text."""
-    return round(Fraction(f'0{text}') * unit_ns) if text else 0
+    part_ns = round(Fraction(f'0{fraction}') * unit_ns) if fraction else 0
+    return count * unit_ns + part_ns
 
 
 LOG_ATTACHMENT = 'log.nmea'
@@ -305,35 +263,12 @@ class NmeaResult(ImportResult):
         return lines
 
 
-def read_nmea(
-    source: Path,
-    log: Log,
-    *,
-    day: date | None = None,
-    transducer_m: float | None = None,
-    checksum: Checksum = Checksum.REQUIRED,
-    progress: PartDone | None = None,
-) -> NmeaResult:
+def read_nmea(job: format.Job, log: Log) -> NmeaResult:
     """
     Read the measurements of a log.
 
-    Parameters
-    ----------
-    source
-        Log, see `NmeaLog`.
-    log
-        Where to.
-    day
-        Date (UTC) of the first time in the log; needed if the log has none. Of a
-        log whose dates are a whole number of GPS week cycles (1024 weeks)
-        away from it, the dates are shifted.
-    transducer_m
-        Depth of the echo sounder below the surface [m], for sentences that
-        do not state it.
-    checksum
-        Whether sentences without one are taken.
-    progress
-        Called with how much is read, and of how much.
+    Of a log whose dates are a whole number of GPS week cycles (1024 weeks) away from the
+    `date` of the job, the dates are shifted.
 
     Raises
     ------
@@ -346,19 +281,26 @@ def read_nmea(
     least half as many values as the most frequent; two instruments of
     different place or scale are never mixed.
     """
-    text = NmeaLog(source)
-    reader = SentenceReader(Mounting(transducer_m), checksum)
+    source, head = job.source, format.head_of(job.source)
+    if head.raw.startswith(_UTF_16):
+        raise ImportDataError(f'{str(source)!r} is in UTF-16; save it as UTF-8')
+    day, transducer_m = job.options.get('date'), job.options.get('transducer')
+    bare = job.options.get('no_checksum')
+    if bare is None:
+        bare = _without_checksums(head)
+    text = NmeaLog(source, job.progress)
+    reader = SentenceReader(transducer_m, checksum=not bare)
     taken = TakenSentences()
-    for place, (line, each, receive_ns) in enumerate(text.texts(progress)):
+    for place, (line, each, receive_ns) in enumerate(text.texts()):
         sentence = reader.read(each)
         if isinstance(sentence, str):
             text.reject(sentence, line, each)
         else:
             taken.take(place, line, each, sentence, receive_ns)
     clock = _clock(text, taken, day)
-    whole = text.text(LOG_LIMIT_BYTES)
+    whole = _whole(source)
     if whole is not None:
-        log.attach(LOG_ATTACHMENT, whole)
+        log.attachments[LOG_ATTACHMENT] = whole
     block = taken.samples(clock)
     rejected = taken.rejected(text.lines_of)
     if text.rejected:
@@ -371,7 +313,7 @@ def read_nmea(
     not_used, unknown = _of_no_use(taken)
     heading = taken.values.chosen().get(Channel.HEADING)
     result = NmeaResult(
-        lines=text.lines,
+        lines=text.lines.number,
         sentences=taken.count,
         rejected=rejected,
         not_used=dict(not_used.most_common()),
@@ -381,19 +323,29 @@ def read_nmea(
         shift_days=clock.shift_days,
         days_early=_days_early(taken),
         log_attached=whole is not None,
-        damage=text.damage,
-        checksums=checksum is Checksum.REQUIRED,
+        damage=text.lines.damage,
+        checksums=not bare,
         **taken.values.about(block, log),
     )
     about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
-    about |= {'checksum': checksum.value, **asdict(result)}
-    log.attach(ATTACHMENT, strict_yaml.dump(about))
+    about |= {'checksum': 'optional' if bare else 'required', **asdict(result)}
+    log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     return result
+
+
+def _whole(path: Path) -> str | None:
+    """Return the whole log, or None if it is long or no text in UTF-8."""
+    with opened(path) as (_, file):
+        try:
+            raw = file.read(LOG_LIMIT_BYTES + 1)
+            return None if len(raw) > LOG_LIMIT_BYTES else raw.decode()
+        except (*BROKEN, UnicodeDecodeError):
+            return None
 
 
 def _clock(log: NmeaLog, taken: TakenSentences, day: date | None) -> SentenceClock:
     """Return the clock at the start of the log; ImportDataError where nothing states it."""
-    name, first = repr(str(log.path)), taken.first
+    name, first = repr(str(log.lines.path)), taken.first
     if not taken.count:
         reasons = ', '.join(
             f'{reason} {rejected.count} times, {rejected.first[0]}'
@@ -402,7 +354,7 @@ def _clock(log: NmeaLog, taken: TakenSentences, day: date | None) -> SentenceClo
         bare = 'without checksum' in log.rejected
         hint = '; for sentences without give --no-checksum' if bare else ''
         raise ImportDataError(
-            f'{name} holds no sentence of NMEA 0183 in {log.lines} line(s): '
+            f'{name} holds no sentence of NMEA 0183 in {log.lines.number} line(s): '
             f'{reasons or "all are blank"}{hint}; for a table give --map and --time'
         )
     if first is not None and first.day is not None:
@@ -469,25 +421,12 @@ def _without_checksums(head: format.Head) -> bool:
     return len(found) > 1 and not any(match[1] for match in found)
 
 
-def _open(job: format.Job, log: Log) -> NmeaResult:
-    checksum = job.options.get('no_checksum')
-    cut_off = checksum is None and _without_checksums(format.head_of(job.source))
-    return read_nmea(
-        job.source,
-        log,
-        day=job.options.get('date'),
-        transducer_m=job.options.get('transducer'),
-        checksum=Checksum.OPTIONAL if checksum or cut_off else Checksum.REQUIRED,
-        progress=job.progress,
-    )
-
-
 FORMAT = format.Format(
     name='nmea',
     kind='an NMEA 0183 log',
     about=__doc__,
     score=_score,
-    read=_open,
+    read=read_nmea,
     options=(
         format.DATE,
         format.TRANSDUCER,

@@ -27,7 +27,7 @@ from shipdrag_ros.nmea.sentences import (
     days_of,
 )
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
-from shipdrag_ros.sources.log import Rejected
+from shipdrag_ros.sources.log import Refused, Rejected
 from shipdrag_ros.sources.stream import SourcedValues
 
 GAP_NS = 10 * SECOND_NS
@@ -113,23 +113,11 @@ class SentenceClock:
         return day * DAY_NS + of_day_ns
 
 
-Refused = dict[str, dict[str, Rejected]]
 TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]
 
 _NONE = -1  # no time of receipt, no date
 _GAP, _BEFORE = 'in a gap of the time', 'before the first time'
 _SHOWN = 3  # rejected sentences of a reason whose text is shown
-
-
-class _Times(NamedTuple):
-    """Of each sentence that states a time, or should."""
-
-    place: array[int]
-    receive_ns: array[int]
-    of_day_ns: array[int]
-    day: array[int]
-    trusted: array[int]
-    address: array[int]
 
 
 class TakenSentences:
@@ -144,8 +132,6 @@ class TakenSentences:
         Number of sentences by talker and kind.
     received
         Whether any has a time of receipt.
-    timed
-        Whether any states a time.
     first, first_received_ns
         The first time with a date that its source calls valid, and when it was received.
     """
@@ -153,13 +139,12 @@ class TakenSentences:
     def __init__(self) -> None:
         self.addresses: Counter[tuple[str, str]] = Counter()
         self.received = False
-        self.timed = False
         self.first: SentenceTime | None = None
         self.first_received_ns: int | None = None
         self.values: SourcedValues[SentenceSource] = SourcedValues()
         self._received = array('q')  # of the values
         self._reasons: dict[tuple[str, str], int] = {}
-        self._times = _Times(*(array('q') for _ in _Times._fields))
+        self._times = array('q')  # six of each sentence that states one, or should
         self._rejected = array('q'), array('i')  # places and reasons by number
         self._without_time = array('q')
         self._texts: dict[int, tuple[int, str]] = {}
@@ -199,25 +184,25 @@ class TakenSentences:
         moment = sentence.time
         if isinstance(moment, NoValue):
             self._without_time.append(place)
-            self._reject('time', f'{sentence.talker}{sentence.kind}: {moment.reason}', place)
+            self._reject('time', f'{sentence.talker}{sentence.kind}: {moment}', place)
             return
         assert moment is not None
-        self.timed = True
         if self.first is None and moment.trusted and moment.day is not None:
             self.first, self.first_received_ns = moment, None if received == _NONE else received
         known, address = self._addresses, sentence.talker + sentence.kind
-        times, day = self._times, _NONE if moment.day is None else moment.day
-        times.place.append(place)
-        times.receive_ns.append(received)
-        times.of_day_ns.append(moment.of_day_ns)
-        times.day.append(day)
-        times.trusted.append(moment.trusted)
-        times.address.append(known.setdefault(address, len(known)))
+        day = _NONE if moment.day is None else moment.day
+        number = known.setdefault(address, len(known))
+        self._times.extend((place, received, moment.of_day_ns, day, moment.trusted, number))
 
     def _reject(self, name: str, reason: str, place: int) -> None:
         places, reasons = self._rejected
         places.append(place)
         reasons.append(self._reasons.setdefault((name, reason), len(self._reasons)))
+
+    @property
+    def timed(self) -> bool:
+        """Whether any states a time."""
+        return bool(self._times)
 
     @property
     def count(self) -> int:
@@ -248,26 +233,24 @@ class TakenSentences:
 
     def _resolve(self, clock: SentenceClock) -> _Moments:
         """Follow the clock through the sentences that state a time."""
-        stated, steps = [array('q') for _ in range(2)], [array('q') for _ in range(3)]
+        stated, steps = array('q'), array('q')
         addresses = list(self._addresses)
-        for place, received, of_day_ns, day, trusted, address in zip(*self._times, strict=True):
+        for place, received, of_day_ns, day, trusted, address in zip(*6 * [iter(self._times)]):
             moment = SentenceTime(of_day_ns, None if day == _NONE else day, bool(trusted))
             receive_ns = None if received == _NONE else received
             try:
                 time_ns = clock.resolve(moment, receive_ns)
             except NoValue as reason:
                 self._without_time.append(place)
-                self._reject('time', f'{addresses[address]}: {reason.reason}', place)
+                self._reject('time', f'{addresses[address]}: {reason}', place)
                 continue
             now_ns = clock.now_ns
             # a little earlier: sentences of one fix, or of two receivers, out of order
             if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:
                 clock.now_ns = time_ns
-                for column, value in zip(steps, (place, time_ns, received), strict=True):
-                    column.append(value)
-            for column, value in zip(stated, (place, time_ns), strict=True):
-                column.append(value)
-        return _Moments(*(np.array(each, np.int64) for each in (*stated, *steps)))
+                steps.extend((place, time_ns, received))
+            stated.extend((place, time_ns))
+        return _Moments(*_columns(stated, 2), *_columns(steps, 3))
 
     def rejected(self, texts: TextsAt) -> Refused:
         """
@@ -298,6 +281,11 @@ class TakenSentences:
                         rejected.add(*found[place])
                     rejected.count = counts[of, reason]
         return made
+
+
+def _columns(values: array[int], width: int) -> Int64:
+    """Return what stands one row behind the other as columns (width, n)."""
+    return np.array(values, np.int64).reshape(-1, width).T.copy()
 
 
 class _Moments(NamedTuple):

@@ -41,7 +41,7 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.sources.table import read_numbers
+from shipdrag_ros.sources.formats.csv.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.baseline import with_residual

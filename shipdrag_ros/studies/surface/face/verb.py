@@ -36,7 +36,7 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.report.drawing import BLUE, VERMILION, one_axis
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.sources.table import read_numbers
+from shipdrag_ros.sources.formats.csv.table import read_numbers
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
 

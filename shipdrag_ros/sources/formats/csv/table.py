@@ -195,17 +195,14 @@ class LogTable:
 
     def _layout(self, lines: Sequence[str]) -> _Layout:
         """Find the delimiter that makes rows of the lines, and the first of these."""
-        best: tuple[tuple[int, int], _Layout] | None = None
+        layouts = []
         for mark in DELIMITERS:
             rows = [self._cells(line, mark) for line in lines]
             start = _first_row(rows)
-            if start is None:
-                continue
-            score = (-start, len(rows[start]))
-            if best is None or score > best[0]:
-                best = (score, _Layout(start, mark, rows[start]))
-        if best is not None:
-            return best[1]
+            if start is not None:
+                layouts.append(_Layout(start, mark, rows[start]))
+        if layouts:
+            return max(layouts, key=lambda each: (-each.titles, len(each.cells)))
         rows = [line.split() for line in lines]
         width = len(rows[-1])
         start = next(place for place, row in enumerate(rows) if len(row) == width)
