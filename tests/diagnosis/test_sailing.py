@@ -109,7 +109,9 @@ def degrees(place: Float64) -> Float64:
 
 def found_in(sailing: Sailing, seed: int = 1, *, units_checked: bool = False) -> DiagnosisResult:
     """Diagnose one record."""
-    return diagnose_sailing([SailingRecord('sailing', sailing.block(seed), units_checked)], PARAMETERS)
+    return diagnose_sailing(
+        [SailingRecord('sailing', sailing.block(seed), units_checked)], PARAMETERS
+    )
 
 
 CASES = {
