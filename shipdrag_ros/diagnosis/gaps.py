@@ -185,7 +185,7 @@ def _channel(found: ComparedHypotheses[Fitted]) -> str:
         for fit in smooth
         if fit.log_evidence > best.log_evidence - _EVEN_NATS
     }
-    if {IN_LOG, QUICK_IN_LOG, IN_GROUND} <= near:
+    if IN_GROUND in near and near & {IN_LOG, QUICK_IN_LOG}:
         return 'log_radar'
     return _CHANNELS.get(best.hypothesis.smooth, FORCE)
 

@@ -68,10 +68,13 @@ class SailingRecord:
         For the user.
     block
         Accepted samples in arrival order.
+    units_checked
+        Whether it is known that its units are right, so that nothing is asked.
     """
 
     name: str
     block: Block
+    units_checked: bool = False
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ def diagnose_sailing(
     parameters: Parameters,
     *,
     no_coastdown: str = 'No coastdown is used.',
-    units_checked: bool = False,
 ) -> DiagnosisResult:
     """
     Name what is wrong between log and way over ground.
@@ -54,8 +53,6 @@ def diagnose_sailing(
         For the convention of the heading.
     no_coastdown
         For the reader: that there is no coastdown, and why.
-    units_checked
-        Whether it is known that the units are right, so that nothing is asked.
 
     Returns
     -------
@@ -74,9 +71,10 @@ def diagnose_sailing(
         if standing is None:
             raise
         return _zeros_alone(standing, str(error), no_coastdown)
-    found = _diagnosed(legs, standing, no_coastdown)
-    ratio = float(np.median(legs.log_m_s / legs.ground_m_s))
-    return found if units_checked else waiting(found, asked(ratio))
+    open_ = ~np.array([record.units_checked for record in records])[legs.record]
+    ratio = legs.log_m_s[open_] / legs.ground_m_s[open_]
+    question = asked(float(np.median(ratio))) if open_.any() else ''
+    return waiting(_diagnosed(legs, standing, no_coastdown), question)
 
 
 def _diagnosed(legs: Legs, standing: StandingLog | None, no_coastdown: str) -> DiagnosisResult:

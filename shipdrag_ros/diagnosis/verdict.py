@@ -217,8 +217,7 @@ def asked(ratio: float) -> str:
     return (
         f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
         'one of them wrong? Import it again with its unit, as in '
-        '--map speed_through_water=COLUMN:kn; if it is right, state the fact '
-        f'{UNITS_CHECKED!r}'
+        f'--map speed_through_water=COLUMN:kn; if it is right, say so with --fact {UNITS_CHECKED}'
     )
 
 

@@ -186,17 +186,15 @@ def _sailing(
     read = []
     for done, (run, _) in enumerate(runs):
         progress(f'reading {run.name}', done, len(runs))
-        read.append((run.name, *accepted_samples(run, ship, zeros=True)))
+        own = run_sheet.find(run.paths)
+        stated = (*facts, *(RunSheet.load(own).facts if own is not None else ()))
+        checked = any(fact.name == UNITS_CHECKED for fact in stated)
+        read.append((run.name, *accepted_samples(run, ship, zeros=True), checked))
     progress('holding the log against the way over ground', 0, 0)
-    records = [SailingRecord(name, block) for name, block, _ in read]
+    records = [SailingRecord(name, block, checked) for name, block, _, checked in read]
     at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)
     try:
-        found = diagnose_sailing(
-            records,
-            read[0][2],
-            no_coastdown=no_coastdown,
-            units_checked=any(fact.name == UNITS_CHECKED for fact in facts),
-        )
+        found = diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
         return replace(found, runs=at)
     except DiagnosisError as error:
         said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)

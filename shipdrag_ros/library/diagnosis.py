@@ -21,7 +21,7 @@ from shipdrag_ros.library import replaying
 from shipdrag_ros.library.diagnosing import coasts_of, diagnose_runs
 from shipdrag_ros.library.record import Record, ShipGiven, ship_of
 from shipdrag_ros.library.resistance import records_of
-from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
+from shipdrag_ros.library.shown import Shown, drawing, in_python, says_it_in_python, writing
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay.playback import StopTime
 from shipdrag_ros.ship import Fact, Ship, parse_fact
@@ -214,7 +214,7 @@ class Diagnosis(Shown):
 def _first(found: DiagnosisResult) -> str:
     """Name the most probable answer, or ask."""
     if found.question:
-        return found.question
+        return in_python(found.question)
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 

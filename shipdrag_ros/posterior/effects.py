@@ -122,7 +122,9 @@ class EffectWay:
         if first.shape is Shape.HALF_NORMAL:
             amount = max(amount, 0.1)
         far = first.shape is Shape.NORMAL and self.start[0] != 0.0
-        if far or (first.shape is Shape.LOG_NORMAL and len(self.unknowns) == 1):
+        if (far and self.unknowns[0].unit == 's') or (
+            first.shape is Shape.LOG_NORMAL and len(self.unknowns) == 1
+        ):
             return tried  # starts stand close
         if first.shape is not Shape.LOG_NORMAL:
             return tried * min(max(amount, -_MOST), _MOST)

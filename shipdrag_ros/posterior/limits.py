@@ -126,7 +126,7 @@ def _modes(ways: Sequence[EffectWay]) -> list[EffectWay]:
     modes: dict[object, list[EffectWay]] = {}
     for way in plain:
         modes.setdefault(way.mode, []).append(way)
-    return [each[len(each) // 2] for each in modes.values()]
+    return [sorted(each, key=lambda way: way.start)[len(each) // 2] for each in modes.values()]
 
 
 def _points(way: EffectWay) -> Float64:

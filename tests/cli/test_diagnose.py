@@ -264,6 +264,11 @@ def bag(path: Path, time_s: Float64, **values: Float64) -> Path:
 @pytest.fixture
 def sailing(tmp_path: Path) -> Path:
     """An hour up and down, at two speeds, with a log that reads 7 % too little."""
+    return sailed(tmp_path / 'sailing.mcap', 0.93)
+
+
+def sailed(path: Path, factor: float) -> Path:
+    """Write an hour up and down, at two speeds, with a log that reads so many times the speed."""
     rng = np.random.default_rng(1)
     time = np.arange(3600.0)
     leg = (time // 600.0).astype(int)
@@ -271,8 +276,21 @@ def sailing(tmp_path: Path) -> Path:
     east = np.where(leg % 2 == 0, speed, -speed)
     place = np.array([np.cumsum(east), np.zeros(len(time))]).T
     place += rng.normal(0.0, 1.0, place.shape)
-    log = 0.93 * speed + rng.normal(0.0, 0.05, len(time))
-    return bag(tmp_path / 'sailing.mcap', time, speed_through_water=log, position=place)
+    log = factor * speed + rng.normal(0.0, 0.05, len(time))
+    return bag(path, time, speed_through_water=log, position=place)
+
+
+def test_a_run_file_answers_the_question_about_a_unit_without_a_coastdown(tmp_path, capsys):
+    path, ship = sailed(tmp_path / 'miles.mcap', 0.868), tmp_path / 'ship.yaml'
+    ship.write_text(MODEL)
+    sheet, asked = tmp_path / 'miles.mcap.run.yaml', 'is the unit of one of them wrong?'
+    for line in (['diagnose', str(path)], ['diagnose', str(path), '--ship', str(ship)]):
+        assert main(line) == 0
+        assert asked in capsys.readouterr().out
+        sheet.write_text('facts: [units_checked]\n')
+        assert main(line) == 0
+        assert asked not in capsys.readouterr().out
+        sheet.unlink()
 
 
 def test_without_coastdown_and_ship_file_log_and_positions_are_compared(sailing, tmp_path, capsys):

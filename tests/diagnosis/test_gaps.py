@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.gaps import gap_of, held_out
+from shipdrag_ros.diagnosis.gaps import _channel, gap_of, held_out
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import Comparing
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, QUICK_IN_LOG, Explanation
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from tests.runs import coasted
@@ -73,3 +74,19 @@ def test_a_held_out_run_is_judged_by_what_the_other_shows(seen, cargo):
 def test_one_run_predicts_nothing(seen: tuple[Observation, ...], cargo: Ship) -> None:
     comparing = Comparing(ship_runs(seen[:1], cargo), cargo, ())
     assert held_out(seen[:1], comparing, comparing.fit_nothing()) is None
+
+
+@pytest.mark.parametrize(
+    ('behind', 'channel'),
+    [
+        ({IN_LOG: 0.0, QUICK_IN_LOG: 30.0, IN_GROUND: 0.1}, 'log_radar'),
+        ({IN_LOG: 30.0, QUICK_IN_LOG: 0.0, IN_GROUND: 0.1}, 'log_radar'),
+        ({IN_LOG: 0.2, QUICK_IN_LOG: 0.0, IN_GROUND: 30.0}, 'log'),
+        ({IN_LOG: 30.0, QUICK_IN_LOG: 30.0, IN_GROUND: 0.0}, 'radar'),
+    ],
+)
+def test_log_and_radar_are_not_told_apart_where_either_explains_as_much(behind, channel):
+    fits = []
+    for smooth, less in behind.items():
+        fits.append(Fitted(Explanation(smooth=smooth), np.zeros(0), log_evidence=-less))
+    assert _channel(ComparedHypotheses((), tuple(fits))) == channel

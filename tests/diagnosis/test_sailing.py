@@ -109,8 +109,9 @@ def degrees(place: Float64) -> Float64:
 
 def found_in(sailing: Sailing, seed: int = 1, *, units_checked: bool = False) -> DiagnosisResult:
     """Diagnose one record."""
-    records = [SailingRecord('sailing', sailing.block(seed))]
-    return diagnose_sailing(records, PARAMETERS, units_checked=units_checked)
+    return diagnose_sailing(
+        [SailingRecord('sailing', sailing.block(seed), units_checked)], PARAMETERS
+    )
 
 
 CASES = {
@@ -176,6 +177,19 @@ def test_a_log_in_another_unit_is_asked_about_and_a_scale_if_the_unit_is_right(
     assert found.candidates[0].names == ('log_scale',)
     checked = found_in(Sailing(scale=scale, geodetic=True), units_checked=True)
     assert (checked.verdict, checked.question) == (Verdict.NAMED, '')
+
+
+def test_units_that_were_checked_in_one_record_are_asked_about_in_the_other() -> None:
+    miles = Sailing(hours=1.0, scale=0.868 - 1.0, geodetic=True)
+    sound = replace(miles, scale=0.0)
+
+    def asked(*records: tuple[Sailing, bool]) -> str:
+        told = [SailingRecord('s', each.block(1), checked) for each, checked in records]
+        return diagnose_sailing(told, PARAMETERS).question
+
+    assert asked((miles, False), (miles, True))
+    assert not asked((miles, True), (sound, False))
+    assert not asked((miles, True), (miles, True))
 
 
 def test_radar_may_be_wrong_where_the_positions_are_not_of_the_globe() -> None:
