@@ -196,11 +196,18 @@ class ComparedHypotheses(Generic[Fit]):
 
     @cached_property
     def probability(self) -> dict[Names, float]:
-        """Of each set of names, most probable first."""
-        return decision.probabilities(
+        """Of each set of names, most probable first; a `DiagnosisError` where none comes near."""
+        weighed = [
             WeighedHypothesis(each.names, each.log_evidence, each.hypothesis.log_odds)
             for each in self.fitted
-        )
+        ]
+        try:
+            return decision.probabilities(weighed)
+        except ValueError as error:
+            raise DiagnosisError(
+                'no explanation comes near what was read: check units and times of the record, '
+                'and length and volume of the ship file'
+            ) from error
 
     @cached_property
     def best(self) -> dict[Names, Fit]:
