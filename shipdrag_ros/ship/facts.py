@@ -83,7 +83,7 @@ KNOWN: Mapping[str, Known] = {
     ),
     UNITS_CHECKED: Known(
         'log and way over ground are in the units that they were imported with',
-        'hold the figures of the record against the display of the instrument',
+        'compare the figures of the record with the display of the instrument',
     ),
 }
 
