@@ -13,13 +13,13 @@ from shipdrag_ros.diagnosis.result import FORCE, Compared, Gap, RunTrace, Where
 from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted, RunResidual
-from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, QUICK_IN_LOG
+from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, place_of
 from shipdrag_ros.samples import Float64, Int64
 
 _PARTS = 12  # of a coastdown, to say where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
 _EVEN_NATS = 3.0  # of evidence by which two channels are not separated
-_CHANNELS = {IN_LOG: 'log', QUICK_IN_LOG: 'log', IN_GROUND: 'radar'}
+_CHANNELS = {IN_LOG: 'log', IN_GROUND: 'radar'}
 
 
 def gap_of(seen: Sequence[Observation], residuals: Sequence[RunResidual]) -> Gap:
@@ -181,13 +181,13 @@ def _channel(found: ComparedHypotheses[Fitted]) -> str:
     smooth = [fit for fit in found.fitted if fit.names == UNKNOWN and not fit.hypothesis.names]
     best = max(smooth, key=lambda fit: fit.log_evidence)
     near = {
-        fit.hypothesis.smooth
+        place_of(fit.hypothesis.smooth)
         for fit in smooth
         if fit.log_evidence > best.log_evidence - _EVEN_NATS
     }
-    if IN_GROUND in near and near & {IN_LOG, QUICK_IN_LOG}:
+    if {IN_LOG, IN_GROUND} <= near:
         return 'log_radar'
-    return _CHANNELS.get(best.hypothesis.smooth, FORCE)
+    return _CHANNELS.get(place_of(best.hypothesis.smooth), FORCE)
 
 
 def traces(

@@ -554,9 +554,10 @@ class ShipRuns:
         found = np.zeros((count, len(rows.time_s)))
         if count == 0:
             return found
-        if where in (IN_TIME, QUICK_IN_TIME):
+        place = place_of(where)
+        if place == IN_TIME:
             return _force_in_time(run, forces, own, count)
-        if where in (IN_LOG, QUICK_IN_LOG):
+        if place == IN_LOG:
             by_log = rows.kind == LOG
             found[:, by_log] = u_0 * bsplines(run.over_run, count)[:, by_log]
             return found
@@ -568,6 +569,13 @@ class ShipRuns:
         for i in range(count):
             found[i, position] = u_0 * np.interp(rows.time_s[position], time, way[i])
         return found
+
+
+def place_of(smooth: str) -> str:
+    """
+    Return where something smooth is, quick or not.
+    """
+    return smooth.partition(',')[0]
 
 
 class _Places(NamedTuple):
