@@ -389,6 +389,23 @@ def test_a_hard_turn_shows_in_the_speed_alone(watch, record) -> None:
     assert shown >= 2
 
 
+@pytest.mark.parametrize('seed', [0, 2])
+@pytest.mark.parametrize('second', [None, 'compass'])
+def test_a_turn_ends_at_the_power_that_it_began_at(watch, record, sensors, second, seed) -> None:
+    block = record(
+        sensors=(sensors['log'], *([sensors[second]] if second else [])),
+        seed=seed,
+        speed_m_s=6.5,
+        lead_in_s=1500.0,
+        duration_s=1900.0,
+        orders=(EngineOrder(0.0, shaft=0.5, thrust=0.25), EngineOrder(1000.0, shaft=0.0, thrust=0.0)),
+        turns=(Turn(400.0, 180.0, 0.014, drag_area_m2=14.0),),
+    )
+    # once it had the power of before the slow-down, and what followed was a coastdown
+    (coastdown,) = [each for each in ended(watch(block)) if not each.withdrawn]
+    assert abs(start_s(coastdown) - 600.0 - 1000.0) < 15.0
+
+
 @pytest.mark.parametrize('thrust', [1.0, 0.5])
 def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float) -> None:
     orders = (STOP, EngineOrder(400.0, shaft=0.8, thrust=thrust))

@@ -276,8 +276,7 @@ def _turns(bank: Histories, i: int, now_s: float, chance: float, regime: int) ->
         if j >= 0:
             if regime == s.TURN:
                 f, x, p = bank.row[j], bank.mean[i], bank.spread[i]
-                leaves_level = bank.row[i].regime == s.LEVEL
-                f.before = f.ramp_from if leaves_level else balance(x, bank.row[i], now_s)[0]
+                f.before = balance(x, bank.row[i], now_s)[0]
                 f.revs = np.nan
                 # what the level before it taught
                 f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
