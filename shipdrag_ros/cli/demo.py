@@ -202,8 +202,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR')
-    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0, metavar='N')
+    parser.add_argument('--out', type=Path, default=Path('demo'))
+    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0)
 
 
 def run(options: argparse.Namespace) -> int:

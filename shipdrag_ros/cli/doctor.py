@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
-from shipdrag_ros.cli.arguments import add_json
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.imports import EXTRA_OF, pip_name
@@ -84,9 +84,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('--out', type=Path, default=Path(), metavar='DIR')
+    parser.add_argument('--out', type=Path, default=Path())
     parser.add_argument('--run', dest='sails', action='store_true')
-    add_json(parser)
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -39,7 +39,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.cli.arguments import add_ship, number
+from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.nmea.live import parse_addresses
 from shipdrag_ros.ship import Ship
@@ -53,13 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, required=True)
-    parser.add_argument('--out', required=True, type=Path, metavar='DIR')
-    parser.add_argument('--nmea', action='append', default=[], metavar='SOURCE')
-    parser.add_argument('--keep-days', type=number(0.0), metavar='N')
-    parser.add_argument('--keep-bytes', type=number(0.0), metavar='N')
+    parser.add_argument('--ship', required=True, type=Path)
+    parser.add_argument('--out', required=True, type=Path)
+    parser.add_argument('--nmea', action='append', default=[])
+    parser.add_argument('--keep-days', type=number(0.0))
+    parser.add_argument('--keep-bytes', type=number(0.0))
     parser.add_argument('--network', action='store_true')
-    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='...')
+    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[])
 
 
 def run(options: argparse.Namespace) -> int:

@@ -82,6 +82,13 @@ def windowed_bag(text: str) -> WindowedBag:
     return WindowedBag(bag(name), span)
 
 
+def add_bags(parser: argparse.ArgumentParser, metavar: str = 'BAG') -> None:
+    """
+    Add one bag or several, each with a window where one is given.
+    """
+    parser.add_argument('bags', nargs='+', type=windowed_bag, metavar=metavar)
+
+
 def open_windowed(
     bags: Sequence[WindowedBag],
     *,
