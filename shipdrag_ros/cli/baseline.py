@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             f'{str(options.out)!r} is the ship file itself, with what was known before; '
             'write to another file'
         )
-    runs = open_windowed(options.bags, remap=options.remap)
+    runs = open_windowed(options.bags, remap=options.remap, output=output)
     refuse_overlaps(runs)
     with stages(output) as progress:
         coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)

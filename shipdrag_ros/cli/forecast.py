@@ -27,6 +27,7 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
+from shipdrag_ros.bags import WindowedRun
 from shipdrag_ros.cli.arguments import add, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import add_bags, open_windowed
@@ -34,7 +35,7 @@ from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.library import forecasts
-from shipdrag_ros.library.replaying import WindowedRun, replay_run
+from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
