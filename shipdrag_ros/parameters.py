@@ -225,9 +225,9 @@ class Parameters:
     )
 
     def __post_init__(self) -> None:
-        problems: list[str] = []
         given = {item.name: getattr(self, item.name) for item in fields(self)}
-        for name, value in read_keys(keys_of(type(self)), given, '', problems).items():
+        accepted, problems = _read(given)
+        for name, value in accepted.items():
             object.__setattr__(self, name, value)  # 60 for 60.0 is taken, and made a float
         if problems:
             raise ParameterError('parameters', problems)
@@ -264,8 +264,7 @@ class Parameters:
         >>> Parameters.from_mapping({'update_s': 10.0}, subject='mine').update_s
         10.0
         """
-        problems: list[str] = []
-        accepted = read_keys(keys_of(cls), dict(values), '', problems, former=FORMER_KEYS)
+        accepted, problems = _read(dict(values))
         if problems:
             raise ParameterError(subject, problems)
         return cls(**accepted)
@@ -300,12 +299,10 @@ class Parameters:
         ParameterError
             If the text holds no parameters at all.
         """
-        known = keys_of(cls)
         accepted: dict[str, object] = {}
         dropped: list[str] = []
         for name, value in _values(text, subject=subject).items():
-            problems: list[str] = []
-            read = read_keys(known, {name: value}, '', problems, former=FORMER_KEYS)
+            read, problems = _read({name: value})
             if problems:
                 dropped.append(f'{subject}: {"; ".join(problems)}: not used')
             else:
@@ -332,6 +329,12 @@ class Parameters:
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         values['forecast_speeds'] = list(self.forecast_speeds)
         return strict_yaml.dump(values)
+
+
+def _read(values: dict[str, object]) -> tuple[dict[str, Any], list[str]]:
+    """Return what of these is known and valid, and what is wrong with the others."""
+    problems: list[str] = []
+    return read_keys(keys_of(Parameters), values, '', problems, former=FORMER_KEYS), problems
 
 
 def _values(text: str, *, subject: str) -> dict[str, object]:

@@ -24,7 +24,7 @@ import numpy as np
 
 from benchmarks._asked import asked
 from shipdrag_ros.live.app import PAGE, LivePage
-from shipdrag_ros.live.serve import CONNECTIONS, listen, serve
+from shipdrag_ros.live.serve import CONNECTIONS, listen, server_of
 from shipdrag_ros.live.source import NodeSource
 from shipdrag_ros.messages.topics import Health, Samples, Status
 from shipdrag_ros.samples import Block, Channel
@@ -141,7 +141,7 @@ def main() -> None:
     page = LivePage(source)
     with listen('127.0.0.1', 0) as found:
         address = found.getsockname()
-        serving = partial(serve, page, [found], until=ended)
+        serving = partial(server_of(page).run, [found])
         for target in (serving, partial(feed, source, ended)):
             threading.Thread(target=target, daemon=True).start()
         time.sleep(2.0)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import zstandard
@@ -36,6 +37,15 @@ from shipdrag_ros.messages import (
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
 from shipdrag_ros.samples import FURTHER, Block
+
+WindowSpan = tuple[float, float]
+
+
+class WindowedRun(NamedTuple):
+    """A run, and the window of it that was given, [s] from its start."""
+
+    run: Run
+    window: WindowSpan | None
 
 
 def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) -> list[Run]:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.cli import arguments
-from shipdrag_ros.cli.arguments import Help, add_effects
+from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected, what_to_install
 from shipdrag_ros.studies import found
@@ -196,7 +196,7 @@ def parser(*of: str) -> argparse.ArgumentParser:
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name != 'effect':  # each of its parts has what it needs
-                add_effects(added)
+                arguments.add(added, '--effects')
             added.set_defaults(run=module.run)
             _explain(added, _helps(arguments) | _helps(module))
     return top
@@ -208,20 +208,27 @@ def _sections(module: ModuleType) -> dict[str, str]:
     return dict(zip(parts[::2], parts[1::2])) if module.__doc__ else {}
 
 
-def _helps(module: ModuleType) -> dict[str, str]:
-    """Return what the docstring of a module says of arguments, names of the module filled in."""
+def _helps(module: ModuleType) -> dict[str, tuple[list[str], str]]:
+    """
+    Return what the docstring of a module says of arguments, names of the module filled in: what
+    the values of an option are called, and its help.
+    """
     text = _sections(module).get('Options', '')
     with suppress(LookupError, ValueError):  # a study of another package may write braces
         text = text.format_map(vars(arguments) | vars(module))
-    found = re.findall(r'^(\S+).*\n((?: .*\n?)+)', text, re.MULTILINE)
-    return {name: ' '.join(lines.split()) for name, lines in found}
+    found = re.findall(r'^(\S+)(.*)\n((?: .*\n?)+)', text, re.MULTILINE)
+    return {name: (values.split(), ' '.join(lines.split())) for name, values, lines in found}
 
 
-def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, str]) -> None:
+def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, tuple[list[str], str]]) -> None:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for below in action.choices.values():
                 _explain(below, helps)
         elif action.help is None:
             names = (*action.option_strings, str(action.metavar), action.dest)
-            action.help = next((helps[name] for name in names if name in helps), None)
+            values, action.help = next(
+                (helps[name] for name in names if name in helps), ([], None)
+            )
+            if action.option_strings and values and action.metavar is None:
+                action.metavar = values[0] if len(values) == 1 else tuple(values)

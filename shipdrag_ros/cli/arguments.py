@@ -55,13 +55,6 @@ class Help(argparse.ArgumentDefaultsHelpFormatter):
         return super()._fill_text(text, width, indent)
 
 
-def add_json(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--json [FILE]`.
-    """
-    parser.add_argument('--json', nargs='?', const=STDOUT, type=_json_file, metavar='FILE')
-
-
 def stop_time(text: str) -> float | datetime:
     """
     Read a time: s from the start of the bag, or ISO 8601 with its zone.
@@ -82,59 +75,6 @@ def stop_time(text: str) -> float | datetime:
             '2026-06-01T08:05:00Z'
         )
     return at
-
-
-def add_settings(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--ship FILE` and `--parameters FILE`, in place of what is attached to a bag.
-    """
-    add_ship(parser)
-    parser.add_argument('--parameters', type=Path, metavar='FILE')
-
-
-def add_ship(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
-    """
-    Add `--ship FILE`, with what its help says.
-    """
-    parser.add_argument('--ship', required=required, type=Path, metavar='FILE')
-
-
-def add_out(parser: argparse.ArgumentParser, kind: Callable[[str], Path], metavar: str) -> None:
-    """
-    Add `-o`, `--out`, which must be given: what is written.
-    """
-    parser.add_argument('-o', '--out', required=True, type=kind, metavar=metavar)
-
-
-def add_bags(
-    parser: argparse.ArgumentParser, kind: Callable[[str], Any], metavar: str = 'BAG'
-) -> None:
-    """
-    Add one bag or several, each read by `kind`.
-    """
-    parser.add_argument('bags', nargs='+', type=kind, metavar=metavar)
-
-
-def add_store(parser: argparse.ArgumentParser) -> None:
-    """
-    Add the store of a fleet.
-    """
-    parser.add_argument('store', type=Path, metavar='STORE')
-
-
-def add_window(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--window START END`.
-    """
-    ends = ('START', 'END')
-    parser.add_argument('--window', nargs=2, type=number(0.0, unit='s'), metavar=ends)
-
-
-def add_stop(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--stop TIME`.
-    """
-    parser.add_argument('--stop', type=stop_time, metavar='TIME')
 
 
 def number(
@@ -177,13 +117,6 @@ def whole(low: int, high: float = math.inf) -> Callable[[str], int]:
     return read
 
 
-def add_remap(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--remap FROM:=TO`.
-    """
-    parser.add_argument('--remap', action=_Remap, default={}, type=remap, metavar='FROM:=TO')
-
-
 class _Remap(argparse.Action):
     """Collects remappings by name, of which none takes the place of another unseen."""
 
@@ -194,15 +127,6 @@ class _Remap(argparse.Action):
         if pair[0] in found:
             parser.error(f'argument --remap: {pair[0]!r} is remapped twice; give it once')
         setattr(namespace, self.dest, found | dict([pair]))
-
-
-def add_effects(parser: argparse.ArgumentParser) -> None:
-    """
-    Add `--effects DIR`.
-    """
-    parser.add_argument(
-        '--effects', dest='effects_from', action='append', default=[], type=Path, metavar='DIR'
-    )
 
 
 def remap(text: str) -> tuple[str, str]:
@@ -258,23 +182,6 @@ def checked(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return reader
 
 
-def add_report(parser: argparse.ArgumentParser, *, of: str) -> None:
-    """
-    Add `--report FILE.html`.
-
-    Parameters
-    ----------
-    of
-        What it shows, in a word.
-    """
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help=f'write the {of} with its pictures to one HTML file',
-    )
-
-
 def unused_file(ending: str) -> Callable[[str], Path]:
     """
     Return a reader of the path of a file to write that does not exist yet.
@@ -308,3 +215,24 @@ def _json_file(text: str) -> str:
         )
     _check_folder(path)
     return text
+
+
+_SHARED: dict[str, dict[str, Any]] = {
+    '--json': {'nargs': '?', 'const': STDOUT, 'type': _json_file},
+    '--ship': {'type': Path},
+    '--parameters': {'type': Path},
+    '--window': {'nargs': 2, 'type': number(0.0, unit='s')},
+    '--stop': {'type': stop_time},
+    '--remap': {'action': _Remap, 'default': {}, 'type': remap},
+    '--report': {'type': new_file('.html')},
+    '--effects': {'dest': 'effects_from', 'action': 'append', 'default': [], 'type': Path},
+    'store': {'type': Path, 'metavar': 'STORE'},
+}
+
+
+def add(parser: argparse.ArgumentParser, *names: str) -> None:
+    """
+    Add arguments that several verbs share, by their names.
+    """
+    for name in names:
+        parser.add_argument(name, **_SHARED[name])

@@ -29,9 +29,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_bags, add_json, add_out, add_remap, add_ship, new_file
+from shipdrag_ros.cli.arguments import add, new_file
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import add_bags, open_windowed
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Ship
@@ -44,11 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag)
-    add_ship(parser, required=True)
-    add_out(parser, new_file('.yaml'), 'FILE')
-    add_remap(parser)
-    add_json(parser)
+    add_bags(parser)
+    parser.add_argument('--ship', required=True, type=Path)
+    parser.add_argument('-o', '--out', required=True, type=new_file('.yaml'))
+    add(parser, '--remap', '--json')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             f'{str(options.out)!r} is the ship file itself, with what was known before; '
             'write to another file'
         )
-    runs = open_windowed(options.bags, remap=options.remap)
+    runs = open_windowed(options.bags, remap=options.remap, output=output)
     refuse_overlaps(runs)
     with stages(output) as progress:
         coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)

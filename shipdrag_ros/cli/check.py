@@ -23,7 +23,7 @@ from typing import Any
 
 from shipdrag_ros.bags.check import FileCheck, check
 from shipdrag_ros.bags.records import Damage
-from shipdrag_ros.cli.arguments import add_bags, add_json, bag
+from shipdrag_ros.cli.arguments import add, bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 
@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, bag)
-    add_json(parser)
+    parser.add_argument('bags', nargs='+', type=bag, metavar='BAG')
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add what the verb takes.
     """
     parser.add_argument('shell', choices=SHELLS)
-    parser.add_argument('-o', '--out', type=Path, metavar='FILE')
+    parser.add_argument('-o', '--out', type=Path)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -31,7 +31,7 @@ from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NamedTuple, NoReturn, Self
+from typing import TYPE_CHECKING, NoReturn, Self
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import number
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import CheckResult, CheckState, Output
 from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, show_run, write_results
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation.result import Estimate
@@ -173,7 +173,7 @@ def sail(
     with ended_by_sigterm(), node, Rehearsal(show) as rehearsal:
         rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
         begins()
-        rehearsal.play(block, speed=speed_up, progress=lambda _: node.check())
+        rehearsal.player.play(block, speed=speed_up, progress=lambda _: node.check())
         # the answers to the last samples are on their way
         rehearsal.listen(timeout_s=_ANSWER_S)
         node.interrupt()
@@ -202,8 +202,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('--out', type=Path, default=Path('demo'), metavar='DIR')
-    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0, metavar='N')
+    parser.add_argument('--out', type=Path, default=Path('demo'))
+    parser.add_argument('--speed-up', type=number(1.0, 200.0), default=60.0)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -296,16 +296,13 @@ _SIGMAS = 4.0  # no figure of the run may be further from the truth
 _REPORT = 'send the folder to the maintainers, it holds log and bag'
 
 
-class RunStep(NamedTuple):
-    """A part of the way: whether it works, what was seen, and what to do where it does not."""
-
-    what: str
-    works: bool
-    seen: str
-    do: str = ''
+def _step(what: str, works: bool, seen: str, do: str = _REPORT) -> CheckResult:
+    """Return whether a part of the way works, what was seen, and what to do where it does not."""
+    state = CheckState.FINE if works else CheckState.BROKEN
+    return CheckResult(f'run: {what}', state, seen, '' if works else do)
 
 
-def run_through() -> Iterator[RunStep]:
+def run_through() -> Iterator[CheckResult]:
     """
     Sail a simulated ship past the node, and yield each part of the way until one fails.
 
@@ -315,48 +312,48 @@ def run_through() -> Iterator[RunStep]:
     works = True
     try:
         for step in _way(folder):
-            works = works and step.works
-            yield step if step.works else step._replace(seen=f'{step.seen}; files in {folder}')
+            works = step.state is CheckState.FINE
+            yield step if works else step._replace(found=f'{step.found}; files in {folder}')
             if not works:
                 return
     except (ShipdragError, ModuleNotFoundError) as error:
         works = False
         missing = what_to_install(error) if isinstance(error, ModuleNotFoundError) else None
         do = 'look at the log above; is another ROS with the same domain in the way?'
-        yield RunStep('run: node', False, f'{missing or error}; files in {folder}', do)
+        yield _step('node', False, f'{missing or error}; files in {folder}', do)
     finally:
         if works:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _way(folder: Path) -> Iterator[RunStep]:
+def _way(folder: Path) -> Iterator[CheckResult]:
     need('rclpy')
     ship_file = folder / SHIP
     ship_file.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
     block, truth = simulated.make(Ship.load(ship_file), _TRIAL)
-    yield RunStep('run: simulated ship', True, f'{len(block)} readings')
+    yield _step('simulated ship', True, f'{len(block)} readings')
     node = OnboardNode(ship_file, folder, folder / 'node.log', *TRIAL_SETTINGS)
     live = sail(node, block, show=lambda _: None, speed_up=_TRIAL_SPEED_UP)
-    yield RunStep('run: node', True, f'{live} estimates over ROS topics')
+    yield _step('node', True, f'{live} estimates over ROS topics')
     bags = sorted(folder.glob('*.mcap'))
     if not bags:
-        yield RunStep('run: bag', False, 'nothing was recorded', 'see node.log')
+        yield _step('bag', False, 'nothing was recorded', 'see node.log')
         return
-    yield RunStep('run: bag', True, f'{bags[0].stat().st_size / 1e3:.0f} kB')
+    yield _step('bag', True, f'{bags[0].stat().st_size / 1e3:.0f} kB')
     (run,) = open_runs(bags)
     result = replay(run)
     recorded = result.recorded
     same = 0 < recorded.compared == recorded.identical
-    yield RunStep('run: replay', same, words.recorded_sentence(recorded), _REPORT)
+    yield _step('replay', same, words.recorded_sentence(recorded))
     yield _figures([each.estimate for each in result.coastdowns], truth)
 
 
-def _figures(estimates: list[Estimate | None], truth: TrueCurve) -> RunStep:
-    what = 'run: figures'
+def _figures(estimates: list[Estimate | None], truth: TrueCurve) -> CheckResult:
+    what = 'figures'
     if len(estimates) != 1 or estimates[0] is None:
-        return RunStep(what, False, f'{len(estimates)} coastdowns, expected one', _REPORT)
+        return _step(what, False, f'{len(estimates)} coastdowns, expected one')
     curve = estimates[0].valid_curve
     off = (curve.resistance_m_s2 - truth.at(curve.speed_m_s)) / curve.sigma_m_s2
     worst = float(np.nanmax(np.abs(off)))
     seen = f'at most {worst:.1f} standard deviations from the truth'
-    return RunStep(what, worst <= _SIGMAS, seen, _REPORT)
+    return _step(what, worst <= _SIGMAS, seen)

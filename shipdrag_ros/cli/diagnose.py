@@ -19,6 +19,12 @@ BAG
 --window START END
     the coastdown [s from the start of each bag without a window of its own], without looking for
     one; what in it is no coastdown is cut
+--report FILE.html
+    write the diagnosis with its pictures to one HTML file
+--fact NAME[=VALUE][,rate=RATE]
+    what a log book knows of all runs, again for each: {FACTS}; evidence that is wrong with
+    probability RATE (default {RATE:g}). What is known of one run stands in run.yaml beside its
+    bag, or in BAG.run.yaml
 --earlier FILE
     what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: what was found
     of hull and instruments counts, less the longer ago it was; water and weather do not
@@ -36,39 +42,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli import arguments
+from shipdrag_ros.cli.arguments import add, unused_file
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import add_bags, open_windowed
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Fact, Ship, parse_fact
-from shipdrag_ros.ship.facts import RATE, usage
+from shipdrag_ros.ship.facts import RATE as RATE
+from shipdrag_ros.ship.facts import usage
 
 if TYPE_CHECKING:
     from shipdrag_ros.diagnosis.result import DiagnosisResult
+
+FACTS = usage()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    arguments.add_bags(parser, windowed_bag)
-    arguments.add_ship(parser)
-    parser.add_argument('--write', type=arguments.unused_file('.yaml'), metavar='FILE')
-    arguments.add_report(parser, of='diagnosis')
-    arguments.add_window(parser)
-    arguments.add_stop(parser)
-    parser.add_argument(
-        '--fact',
-        action='append',
-        default=[],
-        metavar='NAME[=VALUE][,rate=RATE]',
-        help='what a log book knows of all runs, again for each: '
-        f'{usage()}; evidence that is wrong with probability RATE (default {RATE:g}). What is '
-        'known of one run stands in run.yaml beside its bag, or in BAG.run.yaml',
-    )
-    parser.add_argument('--earlier', type=Path, action='append', default=[], metavar='FILE')
-    arguments.add_remap(parser)
-    arguments.add_json(parser)
+    add_bags(parser)
+    add(parser, '--ship')
+    parser.add_argument('--write', type=unused_file('.yaml'))
+    add(parser, '--report', '--window', '--stop')
+    parser.add_argument('--fact', action='append', default=[])
+    parser.add_argument('--earlier', type=Path, action='append', default=[])
+    add(parser, '--remap', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -27,13 +27,11 @@ import shutil
 import socket
 import sys
 from collections.abc import Iterator
-from enum import Enum
 from pathlib import Path
-from typing import NamedTuple
 
 from shipdrag_ros import __version__
-from shipdrag_ros.cli.arguments import add_json
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.arguments import add
+from shipdrag_ros.cli.output import CheckResult, CheckState, Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.imports import EXTRA_OF, pip_name
 
@@ -60,33 +58,16 @@ _OPTIONAL = {  # module: what does not work without it
 }
 
 
-class CheckState(Enum):
-    """How a thing is."""
-
-    FINE = 'fine'
-    LOOK = 'look'
-    BROKEN = 'BROKEN'
-
-
 _FINE, _LOOK, _BROKEN = CheckState
-
-
-class CheckResult(NamedTuple):
-    """What was looked at, how it is, and what to do; '' where nothing is to be done."""
-
-    what: str
-    state: CheckState
-    found: str
-    do: str = ''
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    parser.add_argument('--out', type=Path, default=Path(), metavar='DIR')
+    parser.add_argument('--out', type=Path, default=Path())
     parser.add_argument('--run', dest='sails', action='store_true')
-    add_json(parser)
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -97,7 +78,9 @@ def run(options: argparse.Namespace) -> int:
     found = list(findings(options.out))
     if options.sails:
         output.log('sailing a simulated ship past the node; a first start compiles for minutes')
-        found += _sailed()
+        from shipdrag_ros.cli.demo import run_through  # only who asks pays for it
+
+        found += run_through()
     rows = tuple((each.what, each.state.value, each.found, each.do or '-') for each in found)
     output.table(Table(('what', 'state', 'found', 'what to do'), rows))
     wrong = [each for each in found if each.state is _BROKEN]
@@ -110,14 +93,6 @@ def run(options: argparse.Namespace) -> int:
     ]
     output.json({'works': not wrong, 'findings': documents})
     return BROKEN if wrong else 0
-
-
-def _sailed() -> Iterator[CheckResult]:
-    from shipdrag_ros.cli.demo import run_through  # only who asks pays for it
-
-    for step in run_through():
-        state = _FINE if step.works else _BROKEN
-        yield CheckResult(step.what, state, step.seen, '' if step.works else step.do)
 
 
 def findings(out: Path) -> Iterator[CheckResult]:

@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_effects, add_json
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import EffectFileError
@@ -38,10 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     check = verbs.add_parser('check', help='may a file be used, and if not, why')
     check.add_argument('files', nargs='+', type=Path, metavar='FILE')
-    add_json(check)
+    add(check, '--json')
     every = verbs.add_parser('list', help='the effects of the library, and those learnt')
-    add_effects(every)
-    add_json(every)
+    add(every, '--effects', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -35,7 +35,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_json, add_out, whole
+from shipdrag_ros.cli.arguments import add, whole
 from shipdrag_ros.cli.output import Output, ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
@@ -54,11 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('folders', nargs='+', metavar='DIR_OR_URL')
-    add_out(parser, Path, 'STORE')
+    parser.add_argument('-o', '--out', required=True, type=Path)
     engine = parser.add_mutually_exclusive_group()
-    engine.add_argument('--workers', type=whole(1, 1024), metavar='N')
-    engine.add_argument('--scheduler', metavar='ADDRESS')
-    add_json(parser)
+    engine.add_argument('--workers', type=whole(1, 1024))
+    engine.add_argument('--scheduler')
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

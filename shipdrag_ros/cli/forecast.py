@@ -8,6 +8,8 @@ Options
 -------
 BAG
     bag; {PART}
+--after S
+    when forecasts are made, from each stop on [s] (default: {AFTER})
 --if-stopped-now
     the glide that would begin at the end of the last bag, from the hull as last known: the last
     coastdown in the bags, or else the ship file; of BAG@START:END, now is END
@@ -25,43 +27,36 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from shipdrag_ros.cli import arguments
+from shipdrag_ros.bags import WindowedRun
+from shipdrag_ros.cli.arguments import add, number
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import add_bags, open_windowed
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.library import forecasts
-from shipdrag_ros.library.replaying import WindowedRun, replay_run
+from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+
+AFTER = ' '.join(f'{each:g}' for each in forecasts.AFTER_S)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    arguments.add_bags(parser, windowed_bag)
-    arguments.add_settings(parser)
+    add_bags(parser)
+    add(parser, '--ship', '--parameters')
     when = parser.add_mutually_exclusive_group()
-    when.add_argument(
-        '--after',
-        nargs='+',
-        type=_after,
-        default=forecasts.AFTER_S,
-        metavar='S',
-        help='when forecasts are made, from each stop on [s] (default: '
-        f'{" ".join(f"{each:g}" for each in forecasts.AFTER_S)})',
-    )
+    when.add_argument('--after', nargs='+', type=_after, default=forecasts.AFTER_S)
     when.add_argument('--if-stopped-now', action='store_true')
-    arguments.add_stop(parser)
-    arguments.add_remap(parser)
-    arguments.add_json(parser)
+    add(parser, '--stop', '--remap', '--json')
 
 
 def _after(text: str) -> float:
     try:
-        return arguments.number(0.0, unit='s', above=True)(text)
+        return number(0.0, unit='s', above=True)(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(
             f'{error}; a bag stands before --after or behind --, as in --after 60 300 -- BAG'

@@ -6,6 +6,9 @@ is ever repaired. `replay` and `diagnose` read such files directly, where no opt
 
 Options
 -------
+SOURCE
+    {KINDS}; text also packed as .gz. Several are joined; where two hold the same input for the
+    same time, the first file is taken
 --out BAG
     MCAP file to make; an existing one is not overwritten
 --ship FILE
@@ -28,7 +31,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked
+from shipdrag_ros.cli.arguments import add, checked
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
@@ -37,24 +40,19 @@ from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.log import new_bag
 from shipdrag_ros.sources.reading import format_of, read_joined
 
+KINDS = ', '.join(each.kind for each in formats.found())
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
     known = formats.found()
-    parser.add_argument(
-        'sources',
-        nargs='+',
-        type=Path,
-        metavar='SOURCE',
-        help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are '
-        'joined; where two hold the same input for the same time, the first file is taken',
-    )
-    add_out(parser, Path, 'BAG')
-    add_ship(parser)
+    parser.add_argument('sources', nargs='+', type=Path, metavar='SOURCE')
+    parser.add_argument('-o', '--out', required=True, type=Path)
+    add(parser, '--ship')
     parser.add_argument('--format', choices=[each.name for each in known])
-    add_json(parser)
+    add(parser, '--json')
     added: set[str] = set()
     for each in known:
         group = parser.add_argument_group(f'{each.kind} ({each.name})', each.about)

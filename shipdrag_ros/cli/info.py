@@ -22,9 +22,9 @@ from dataclasses import asdict
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import BagInfo, info
-from shipdrag_ros.cli.arguments import add_bags, add_json, add_remap
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import open_parts, windowed_bag
+from shipdrag_ros.cli.windowed import add_bags, open_parts
 from shipdrag_ros.display import Table
 
 
@@ -32,9 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_bags(parser, windowed_bag)
-    add_remap(parser)
-    add_json(parser)
+    add_bags(parser)
+    add(parser, '--remap', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

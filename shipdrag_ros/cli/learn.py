@@ -14,6 +14,8 @@ BAG_OR_STORE
     ship file with a baseline (default: the one attached to the first bag, or kept in the store)
 --out FILE
     file of the effect, where one is learnt; an existing one is not overwritten
+--report FILE.html
+    write the result with its pictures to one HTML file
 --name NAME
     what the effect is called, small letters, digits and _ (default: that of the file)
 
@@ -29,9 +31,9 @@ import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli import arguments
+from shipdrag_ros.cli.arguments import add, unused_file
 from shipdrag_ros.cli.output import Output, stages
-from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import WindowedBag, add_bags, open_windowed
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
@@ -42,13 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    arguments.add_bags(parser, windowed_bag, metavar='BAG_OR_STORE')
-    arguments.add_ship(parser)
-    arguments.add_out(parser, arguments.unused_file('.yaml'), 'FILE')
-    parser.add_argument('--name', metavar='NAME')
-    arguments.add_report(parser, of='result')
-    arguments.add_remap(parser)
-    arguments.add_json(parser)
+    add_bags(parser, 'BAG_OR_STORE')
+    add(parser, '--ship')
+    parser.add_argument('-o', '--out', required=True, type=unused_file('.yaml'))
+    parser.add_argument('--name')
+    add(parser, '--report', '--remap', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -39,9 +39,10 @@ from itertools import pairwise
 from pathlib import Path
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.cli.arguments import add_ship, number
+from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.nmea.live import parse_addresses
+from shipdrag_ros.node.settings import sections
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import checked
 
@@ -53,13 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, required=True)
-    parser.add_argument('--out', required=True, type=Path, metavar='DIR')
-    parser.add_argument('--nmea', action='append', default=[], metavar='SOURCE')
-    parser.add_argument('--keep-days', type=number(0.0), metavar='N')
-    parser.add_argument('--keep-bytes', type=number(0.0), metavar='N')
+    parser.add_argument('--ship', required=True, type=Path)
+    parser.add_argument('--out', required=True, type=Path)
+    parser.add_argument('--nmea', action='append', default=[])
+    parser.add_argument('--keep-days', type=number(0.0))
+    parser.add_argument('--keep-bytes', type=number(0.0))
     parser.add_argument('--network', action='store_true')
-    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='...')
+    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[])
 
 
 def run(options: argparse.Namespace) -> int:
@@ -156,18 +157,8 @@ def _stated(ros_arguments: Sequence[str]) -> Iterator[tuple[str, str, object]]:
             yield flag, name.rpartition(':')[2], _yaml(text)
         elif flag == '--params-file' and Path(word).is_file():
             tree = _yaml(Path(word).read_text(encoding='utf-8', errors='replace'))
-            for name, value in _parameters(tree):
-                yield word, name, value
-
-
-def _parameters(tree: object) -> Iterator[tuple[str, object]]:
-    if not isinstance(tree, dict):
-        return
-    for key, branch in tree.items():
-        if key == 'ros__parameters' and isinstance(branch, dict):
-            yield from branch.items()
-        else:
-            yield from _parameters(branch)
+            for _, values in sections(tree):
+                yield from ((word, name, value) for name, value in values.items())
 
 
 def _yaml(text: str) -> object:

@@ -8,8 +8,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -228,3 +229,20 @@ def _console(stream: TextIO) -> _Console:
     width = None if stream.isatty() else _PIPE_WIDTH
     # names from outside are text, whatever brackets and colons they hold
     return _Console(file=stream, width=width, markup=False, highlight=False, emoji=False)
+
+
+class CheckState(Enum):
+    """How a thing is."""
+
+    FINE = 'fine'
+    LOOK = 'look'
+    BROKEN = 'BROKEN'
+
+
+class CheckResult(NamedTuple):
+    """What was looked at, how it is, and what to do; '' where nothing is to be done."""
+
+    what: str
+    state: CheckState
+    found: str
+    do: str = ''

@@ -4,6 +4,11 @@ Stopping without engine, from the store of `shipdrag fleet`: time and way from s
 with bands of 90 %, of all runs of each ship. One page to print, beside the wheelhouse poster
 of IMO Resolution A.601(15), Appendix 2.
 
+Options
+-------
+--report FILE.html
+    write the page with its pictures to one HTML file
+
 Examples
 --------
 shipdrag poster store --report poster.html
@@ -14,7 +19,7 @@ from __future__ import annotations
 
 import argparse
 
-from shipdrag_ros.cli.arguments import add_json, add_report, add_store
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import Ship
@@ -26,9 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_store(parser)
-    add_report(parser, of='page')
-    add_json(parser)
+    add(parser, 'store', '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

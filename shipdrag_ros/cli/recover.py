@@ -27,7 +27,7 @@ from typing import Any
 
 from shipdrag_ros.bags.check import FileCheck, check
 from shipdrag_ros.bags.recover import Recovery, recover
-from shipdrag_ros.cli.arguments import add_json, add_out, bag, new_file
+from shipdrag_ros.cli.arguments import add, bag, new_file
 from shipdrag_ros.cli.check import damage_table
 from shipdrag_ros.cli.output import Output
 
@@ -37,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('source', type=bag, metavar='SOURCE')
-    add_out(parser, new_file('.mcap'), 'BAG')
-    add_json(parser)
+    parser.add_argument('-o', '--out', required=True, type=new_file('.mcap'))
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

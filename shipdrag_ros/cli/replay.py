@@ -13,6 +13,8 @@ BAG
     each bag without a window of its own; what in it is no coastdown is cut
 --compare
     rank the hulls, one a bag, by the Froude number of the steepest rise of r
+--report FILE.html
+    write the report with its pictures to one HTML file
 --out DIR
     write {REPORT}, {JSON} and {CURVES} there; made if missing
 
@@ -28,10 +30,10 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli import arguments
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import add_bags, open_windowed
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -53,15 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    arguments.add_bags(parser, windowed_bag)
-    arguments.add_settings(parser)
-    arguments.add_window(parser)
-    arguments.add_stop(parser)
-    arguments.add_remap(parser)
+    add_bags(parser)
+    add(parser, '--ship', '--parameters', '--window', '--stop', '--remap')
     parser.add_argument('--compare', action='store_true')
-    parser.add_argument('--out', type=Path, metavar='DIR')
-    arguments.add_report(parser, of='report')
-    arguments.add_json(parser)
+    parser.add_argument('--out', type=Path)
+    add(parser, '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -18,12 +18,17 @@ Options
     steady sailing before the stop [s]
 --heading RAD
     heading [rad], anticlockwise from east as in REP-103: 1.5708 is north
+--effect NAME=VALUE[,PARAM=VALUE]...
+    add an effect that the ship file does not state; may be repeated. Known: {KNOWN}.
+    docs/effects.md says what each does
 --first-heading RAD
     heading of the first run [rad], to which current, wind and waves are stated; give it to
     simulate another run of the same day (default: this run is the first)
 --start DATE
     date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or
     2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)
+--inputs INPUT[,INPUT]...
+    sensors on board, of {SENSORS}
 --rate HZ
     readings of each sensor [Hz]
 --noise FACTOR
@@ -48,7 +53,7 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_out, add_ship, checked, number, whole
+from shipdrag_ros.cli.arguments import add, checked, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.library import simulated
 from shipdrag_ros.samples import Channel
@@ -61,55 +66,36 @@ from shipdrag_ros.simulation import (
 from shipdrag_ros.simulation.effects import LIBRARY, effects_of, find, parse, values_of
 
 
+def _form(name: str) -> str:
+    """Return how an effect is given."""
+    first, *others = find(name).parameters
+    unit = f' [{first.unit}]' if first.unit else ''
+    return f'{name}={first.name}{unit}' + ''.join(f',{other.name}=' for other in others)
+
+
+KNOWN = '; '.join(map(_form, LIBRARY))
+SENSORS = ', '.join(channel.input for channel in STANDARD_SD)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_ship(parser, required=True)
-    add_out(parser, Path, 'BAG')
-    parser.add_argument('--speed', type=number(0.0, 40.0, unit='m/s', above=True), metavar='M_S')
-    parser.add_argument(
-        '--duration',
-        type=number(0.0, 1e6, unit='s', above=True),
-        default=1500.0,
-        metavar='S',
-    )
-    parser.add_argument('--lead-in', type=number(0.0, 1e6, unit='s'), default=600.0, metavar='S')
-    parser.add_argument(
-        '--heading', type=number(-2 * math.pi, 2 * math.pi, unit='rad'), default=0.0, metavar='RAD'
-    )
-    _add_day(parser)
-    _add_sensors(parser)
-    add_json(parser)
-
-
-def _add_day(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--effect',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE[,PARAM=VALUE]...',
-        help='add an effect that the ship file does not state; may be repeated. Known: '
-        + '; '.join(_form(name) for name in LIBRARY)
-        + '. docs/effects.md says what each does',
-    )
-    parser.add_argument(
-        '--first-heading', type=number(-2 * math.pi, 2 * math.pi, unit='rad'), metavar='RAD'
-    )
-    parser.add_argument('--start', type=checked(simulated.moment_ns), metavar='DATE')
-
-
-def _add_sensors(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--inputs',
-        type=_inputs,
-        default=','.join(STANDARD_INPUTS),
-        metavar='INPUT[,INPUT]...',
-        help=f'sensors on board, of {", ".join(channel.input for channel in STANDARD_SD)}',
-    )
-    parser.add_argument('--rate', type=number(0.001, 1000.0, unit='Hz'), default=1.0, metavar='HZ')
-    parser.add_argument('--noise', type=number(0.0, 1000.0), default=1.0, metavar='FACTOR')
-    parser.add_argument('--seed', type=whole(0), default=0, metavar='N')
+    course = number(-2 * math.pi, 2 * math.pi, unit='rad')
+    parser.add_argument('--ship', required=True, type=Path)
+    parser.add_argument('-o', '--out', required=True, type=Path)
+    parser.add_argument('--speed', type=number(0.0, 40.0, unit='m/s', above=True))
+    parser.add_argument('--duration', type=number(0.0, 1e6, unit='s', above=True), default=1500.0)
+    parser.add_argument('--lead-in', type=number(0.0, 1e6, unit='s'), default=600.0)
+    parser.add_argument('--heading', type=course, default=0.0)
+    parser.add_argument('--effect', action='append', default=[])
+    parser.add_argument('--first-heading', type=course)
+    parser.add_argument('--start', type=checked(simulated.moment_ns))
+    parser.add_argument('--inputs', type=_inputs, default=','.join(STANDARD_INPUTS))
+    parser.add_argument('--rate', type=number(0.001, 1000.0, unit='Hz'), default=1.0)
+    parser.add_argument('--noise', type=number(0.0, 1000.0), default=1.0)
+    parser.add_argument('--seed', type=whole(0), default=0)
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -160,16 +146,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _form(name: str) -> str:
-    """Return how an effect is given."""
-    first, *others = find(name).parameters
-    unit = f' [{first.unit}]' if first.unit else ''
-    return f'{name}={first.name}{unit}' + ''.join(f',{other.name}=' for other in others)
-
-
 def _inputs(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(','))
-    known = [channel.input for channel in STANDARD_SD]
-    if unknown := [name for name in names if name not in known]:
-        raise argparse.ArgumentTypeError(f'{unknown}, expected some of {", ".join(known)}')
+    if unknown := [name for name in names if name not in SENSORS.split(', ')]:
+        raise argparse.ArgumentTypeError(f'{unknown}, expected some of {SENSORS}')
     return names

@@ -42,7 +42,7 @@ import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.cli.arguments import add_json, add_out, number, whole
+from shipdrag_ros.cli.arguments import add, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.ship import Ship
@@ -66,17 +66,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_out(parser, Path, 'DIR')
-    parser.add_argument('--ships', type=whole(1, 1000), default=3, metavar='N')
-    parser.add_argument(
-        '--months', type=number(0.0, 600.0, unit='months', above=True), default=12.0, metavar='M'
-    )
-    parser.add_argument(
-        '--every', type=number(0.1, 1000.0, unit='days'), default=28.0, metavar='DAYS'
-    )
-    parser.add_argument('--seed', type=whole(0), default=0, metavar='S')
+    months = number(0.0, 600.0, unit='months', above=True)
+    parser.add_argument('-o', '--out', required=True, type=Path)
+    parser.add_argument('--ships', type=whole(1, 1000), default=3)
+    parser.add_argument('--months', type=months, default=12.0)
+    parser.add_argument('--every', type=number(0.1, 1000.0, unit='days'), default=28.0)
+    parser.add_argument('--seed', type=whole(0), default=0)
     parser.add_argument('--sound', action='store_true')
-    add_json(parser)
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -13,6 +13,8 @@ Options
     write a row a coastdown, for a spreadsheet
 --parquet FILE.parquet
     the same as Parquet, for a data frame
+--report FILE.html
+    write the trend with its pictures to one HTML file
 --pages DIR
     with --report: write a page a coastdown there, to which the rows of the report lead
 
@@ -31,7 +33,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from shipdrag_ros.cli.arguments import add_json, add_report, add_store, new_file
+from shipdrag_ros.cli.arguments import add, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
@@ -52,13 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
-    add_store(parser)
-    parser.add_argument('--sql', metavar='QUERY')
-    parser.add_argument('--csv', type=new_file('.csv'), metavar='FILE.csv')
-    parser.add_argument('--parquet', type=new_file('.parquet'), metavar='FILE.parquet')
-    add_report(parser, of='trend')
-    parser.add_argument('--pages', type=Path, metavar='DIR')
-    add_json(parser)
+    add(parser, 'store')
+    parser.add_argument('--sql')
+    parser.add_argument('--csv', type=new_file('.csv'))
+    parser.add_argument('--parquet', type=new_file('.parquet'))
+    add(parser, '--report')
+    parser.add_argument('--pages', type=Path)
+    add(parser, '--json')
 
 
 def run(options: argparse.Namespace) -> int:

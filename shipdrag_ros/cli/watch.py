@@ -48,7 +48,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_remap, add_ship, number, whole
+from shipdrag_ros.cli.arguments import add, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_parts, windowed_bag
 from shipdrag_ros.errors import ShipdragError
@@ -69,23 +69,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.add_argument('bags', nargs='*', type=windowed_bag, metavar='BAG')
-    _add_server(parser)
-    parser.add_argument(
-        '--speed', type=number(0.0, FASTEST, above=True), default=10.0, metavar='X'
-    )
-    add_ship(parser)
-    parser.add_argument('--earlier', type=Path, metavar='DIR')
-    parser.add_argument('--node', default='', metavar='NAME')
-    parser.add_argument('--signal-k', type=whole(0, 65535), metavar='PORT')
-    parser.add_argument('--store', type=Path, metavar='STORE')
-    parser.add_argument('--allow-marks', action='store_true')
-    add_remap(parser)
-
-
-def _add_server(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--port', type=whole(0, 65535), default=8088)
-    parser.add_argument('--listen', default=LOOPBACK, metavar='ADDRESS')
-    parser.add_argument('--token-file', type=Path, metavar='FILE')
+    parser.add_argument('--listen', default=LOOPBACK)
+    parser.add_argument('--token-file', type=Path)
+    parser.add_argument('--speed', type=number(0.0, FASTEST, above=True), default=10.0)
+    add(parser, '--ship')
+    parser.add_argument('--earlier', type=Path)
+    parser.add_argument('--node', default='')
+    parser.add_argument('--signal-k', type=whole(0, 65535))
+    parser.add_argument('--store', type=Path)
+    parser.add_argument('--allow-marks', action='store_true')
+    add(parser, '--remap')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,15 +7,12 @@ import argparse
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags import Run, WindowedRun, WindowSpan, open_runs
 from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
-
-if TYPE_CHECKING:
-    from shipdrag_ros.library.replaying import WindowedRun, WindowSpan
 
 
 def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, str]) -> list[Run]:
@@ -40,11 +37,7 @@ def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, s
         return open_runs(paths, remap=remap)
     from shipdrag_ros.sources.reading import read_any  # a bag needs no importer
 
-    def show(lines: list[str]) -> None:
-        for line in lines:
-            output.log(line)
-
-    return read_any(paths, remap=remap, show=show)
+    return read_any(paths, remap=remap, show=lambda lines: output.log('\n'.join(lines)))
 
 
 class WindowedBag(NamedTuple):
@@ -82,12 +75,19 @@ def windowed_bag(text: str) -> WindowedBag:
     return WindowedBag(bag(name), span)
 
 
+def add_bags(parser: argparse.ArgumentParser, metavar: str = 'BAG') -> None:
+    """
+    Add one bag or several, each with a window where one is given.
+    """
+    parser.add_argument('bags', nargs='+', type=windowed_bag, metavar=metavar)
+
+
 def open_windowed(
     bags: Sequence[WindowedBag],
     *,
     remap: Mapping[str, str],
+    output: Output,
     window: WindowSpan | None = None,
-    output: Output | None = None,
 ) -> list[WindowedRun]:
     """
     Open bags in the order given.
@@ -99,10 +99,10 @@ def open_windowed(
         again with another window; parts of one recording are joined among the others.
     remap
         Recorded topic -> input.
+    output
+        Called with what was understood of a log that is no bag.
     window
         Of the bags without a window of their own.
-    output
-        Called with what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------
@@ -111,10 +111,18 @@ def open_windowed(
     ImportDataError
         If nothing in a log can be used.
     """
-    from shipdrag_ros.library.replaying import WindowedRun  # who only reads bags needs no replay
-
-    opened = _opened(bags, output or Output(), remap)
-    return [WindowedRun(run, own or window) for run, own in opened]
+    whole = [each.path for each in bags if each.window is None]
+    left = open_sources(whole, output, remap=remap) if whole else []
+    found: list[WindowedRun] = []
+    for each in bags:
+        if each.window is not None:
+            runs = open_sources([each.path], output, remap=remap)
+        else:
+            files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
+            runs = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
+            left = [run for run in left if run not in runs]
+        found += [WindowedRun(run, each.window or window) for run in runs]
+    return found + [WindowedRun(run, window) for run in left]
 
 
 def open_parts(
@@ -123,21 +131,5 @@ def open_parts(
     """
     Open bags as `open_windowed` does; of one with a window, this part alone.
     """
-    return [run.part(*own) if own else run for run, own in _opened(bags, output, remap)]
-
-
-def _opened(
-    bags: Sequence[WindowedBag], output: Output, remap: Mapping[str, str]
-) -> list[tuple[Run, WindowSpan | None]]:
-    whole = [each.path for each in bags if each.window is None]
-    left = open_sources(whole, output, remap=remap) if whole else []
-    found: list[tuple[Run, WindowSpan | None]] = []
-    for each in bags:
-        if each.window is not None:
-            runs = open_sources([each.path], output, remap=remap)
-        else:
-            files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
-            runs = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
-            left = [run for run in left if run not in runs]
-        found += [(run, each.window) for run in runs]
-    return found + [(run, None) for run in left]
+    found = open_windowed(bags, remap=remap, output=output)
+    return [run.part(*own) if own else run for run, own in found]

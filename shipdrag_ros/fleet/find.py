@@ -374,17 +374,13 @@ def find(places: Sequence[str], *, without: Path | None = None) -> FoundBags:
     FleetError
         If one of the places does not exist, cannot be reached or lies in the store.
     """
-    sources: list[BagToRead] = []
-    skipped: list[Skipped] = []
-    notes: list[str] = []
-    left_alone = 0
-    for place in places:
-        search = _Search(Tree(place), without)
-        sources += search.sources()
-        skipped += search.skipped
-        left_alone += search.left_alone
-        notes += search.notes
-    return FoundBags(tuple(sources), tuple(skipped), left_alone, tuple(notes))
+    searches = [_Search(Tree(place), without) for place in places]
+    return FoundBags(
+        tuple(source for each in searches for source in each.sources()),
+        tuple(skipped for each in searches for skipped in each.skipped),
+        sum(each.left_alone for each in searches),
+        tuple(note for each in searches for note in each.notes),
+    )
 
 
 class _Search:

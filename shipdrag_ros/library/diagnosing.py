@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-from shipdrag_ros.bags import Run
+from shipdrag_ros.bags import Run, WindowedRun, WindowSpan
 from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarli
 from shipdrag_ros.errors import DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.library.replaying import Listener, WindowedRun, WindowSpan, refuse_two_ships
+from shipdrag_ros.library.replaying import Listener, refuse_two_ships
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (

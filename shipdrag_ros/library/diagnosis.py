@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from shipdrag_ros.bags import WindowedRun, WindowSpan
 from shipdrag_ros.diagnosis import tables, with_effects
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.document import document
@@ -233,7 +234,7 @@ def diagnose(
     ship: ShipGiven = None,
     facts: Sequence[str] = (),
     earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
-    window: replaying.WindowSpan | None = None,
+    window: WindowSpan | None = None,
     stop: StopTime | None = None,
 ) -> Diagnosis:
     """
@@ -287,7 +288,7 @@ def diagnose(
     'none'
     """
     parts = records_of(records)
-    runs = [replaying.WindowedRun(run, window) for record in parts for run in record.runs]
+    runs = [WindowedRun(run, window) for record in parts for run in record.runs]
     replaying.refuse_overlaps(runs)
     if ship is None:
         replaying.refuse_two_ships((run, record.given) for record in parts for run in record.runs)
@@ -346,13 +347,13 @@ def learn(
     None
     """
     parts = records_of(records)
-    runs = [replaying.WindowedRun(run, None) for record in parts for run in record.runs]
+    runs = [WindowedRun(run, None) for record in parts for run in record.runs]
     return learn_from(replaying.Notes(), runs, ship_of(ship) or parts[0].given, name)
 
 
 def learn_from(
     listener: replaying.Listener,
-    runs: Sequence[replaying.WindowedRun],
+    runs: Sequence[WindowedRun],
     given: Ship | None,
     name: str,
     progress: Progress = silent,

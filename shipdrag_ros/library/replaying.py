@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from shipdrag_ros.bags import Run
+from shipdrag_ros.bags import Run, WindowedRun, WindowSpan
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
@@ -21,7 +21,6 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
-WindowSpan = tuple[float, float]
 _LATE_S = 10.0
 _MOVING_M_S = 0.5
 
@@ -64,13 +63,6 @@ class Notes:
         Show nothing.
         """
         return nullcontext(lambda done, total: None)
-
-
-class WindowedRun(NamedTuple):
-    """A run, and the window of it that was given, [s] from its start."""
-
-    run: Run
-    window: WindowSpan | None
 
 
 def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from shipdrag_ros.bags import WindowSpan
 from shipdrag_ros.display import Table, dated
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -15,7 +16,7 @@ from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.record import Coastdown, Record, ShipGiven, force_columns, ship_of
-from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
+from shipdrag_ros.library.replaying import Notes, replay_run
 from shipdrag_ros.library.shown import ShownResistance, says_it_in_python, writing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words

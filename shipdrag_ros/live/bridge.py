@@ -141,7 +141,7 @@ class Bridge:
         self.past: list[outputs.PastRun] = []
         self.ship = ship
         self._heard_s: float | None = None
-        self._health: topics.Health | None = None
+        self._health = topics.Health(())
         self._recent = Recent()
         self._courses: deque[tuple[int, float]] = deque()
         self._course_at_stop: float | None = None
@@ -256,13 +256,12 @@ class Bridge:
 
     def _age_s(self, now_s: float, *kinds: str) -> float | None:
         """Return how long ago the node received any of some kinds; None if that is not known."""
-        if self._health is None or self._heard_s is None:
-            return None
         names = [name for name in ALL_MOTION if kind_of(name) in kinds]
-        each = [self._health.of(f'input {name}') for name in names]
-        ages = [one.number('age') for one in each if one is not None]
+        ages = [self._health.of(f'input {name}').number('age') for name in names]
         age_s = min((age for age in ages if age is not None), default=None)
-        return None if age_s is None else age_s + now_s - self._heard_s
+        if age_s is None or self._heard_s is None:
+            return None
+        return age_s + now_s - self._heard_s
 
     def _note_course(self) -> None:
         second, course = self._now_s, self._recent.direction(self._now_s)
@@ -274,9 +273,8 @@ class Bridge:
     def _take_health(self, health: topics.Health) -> None:
         self._health = health
         state = health.of('state')
-        since = None if state is None else state.number('coastdown since')
-        coasting = state is not None and state.values.get('monitor') == 'coastdown'
-        lead_s = None if state is None else state.number('steady lead')
+        since, lead_s = state.number('coastdown since'), state.number('steady lead')
+        coasting = state.values.get('monitor') == 'coastdown'
         if lead_s and not coasting:
             self._lead_at_stop = lead_s
         if coasting and self._coast_ns is None and since:
@@ -284,7 +282,7 @@ class Bridge:
         elif not coasting:
             self._coast_ns = None
         found = health.of('diagnosis')
-        if found is not None:
+        if found.values:
             self.show_verdict(found.values.get('state', ''), found.message)
 
     def _take_output(self, name: str, payload: bytes) -> None:
@@ -380,21 +378,19 @@ class Bridge:
         return self._found is not None and self._verdict['state'] == 'done'
 
     def _situation(self, now_s: float) -> Situation:
-        state = None if self._health is None else self._health.of('state')
-        values = {} if state is None else state.values
+        state = self._health.of('state')
         coast_s = None
         if self._coast_ns is not None and self._now_s:
             coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
-        trouble = state.message if state is not None and state.level >= topics.ERROR else ''
-        lead = None if self._health is None else self._health.lead
+        lead_s, ready_s = self._health.lead
         return Situation(
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
-            lifecycle=values.get('lifecycle', ''),
-            monitor=values.get('monitor', ''),
-            trouble=trouble,
+            lifecycle=state.values.get('lifecycle', ''),
+            monitor=state.values.get('monitor', ''),
+            trouble=state.message if state.level >= topics.ERROR else '',
             doubt=self._doubt(),
-            lead_s=None if lead is None else lead[0],
-            ready_s=None if lead is None else lead[1],
+            lead_s=lead_s,
+            ready_s=ready_s,
             coast_s=coast_s,
             band=self._bands[-1][1] if self._bands else None,
             to_go_s=to_go_s(self._bands, GOAL),
@@ -405,10 +401,9 @@ class Bridge:
 
     def _doubt(self) -> str:
         """Say which sources of the motion are not well; '' where all are."""
-        inputs = () if self._health is None else self._health.inputs
         return '; '.join(
             f'{status.input.replace("_", " ")}: {status.message}'
-            for status in inputs
+            for status in self._health.inputs
             if status.input in ALL_MOTION
             and status.level != topics.OK
             and status.number('messages')
@@ -449,8 +444,8 @@ class Bridge:
             }
         if self.resistance is not None:
             figures |= {'r': self.resistance.value, 'r_sigma': self.resistance.sigma}
-        estimate = None if self._health is None else self._health.of('estimate')
-        if estimate is not None and topics.OF_CONDITIONS in estimate.values:
+        estimate = self._health.of('estimate')
+        if topics.OF_CONDITIONS in estimate.values:
             figures['r_of'] = estimate.values[topics.OF_CONDITIONS]
         ended = [run for run in self.past if run.curve is not None]
         if self._curve is not None:
@@ -462,15 +457,12 @@ class Bridge:
         return figures
 
     def _inputs(self, silent_s: float) -> _AnyPart:
-        if self._health is None:
-            return []
         silent = silent_s > SILENT_S  # what the node said last is no health of now
         since_s = silent_s if silent else 0.0
-        statuses = [status for status in self._health.statuses if status.input]
         others = ('nmea ', 'recording')  # a sentence that is not used shows in no input
-        statuses += [each for each in self._health.statuses if each.part.startswith(others)]
+        besides = (each for each in self._health.statuses if each.part.startswith(others))
         rows = []
-        for status in statuses:
+        for status in (*self._health.inputs, *besides):
             age_s = status.number('age')
             rejected = {
                 key.removeprefix('rejected '): int(status.number(key) or 0)
@@ -519,8 +511,8 @@ class Bridge:
 
     def _unless_silent(self, check: Check) -> Check:
         name = _CHECKED.get(check.name, '')
-        status = None if self._health is None else self._health.of(f'input {name}')
-        if status is None or status.level != topics.STALE:
+        status = self._health.of(f'input {name}')
+        if status.level != topics.STALE:
             return check
         return replace(check, held=Held.SILENT, text=status.message)
 

@@ -8,9 +8,7 @@ import json
 import resource
 import signal
 import socket
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from time import monotonic
 from types import FrameType
 from typing import Any
@@ -34,7 +32,6 @@ _FULL = (
 _FILES = 4096
 _BACKLOG = 4096
 _GOODBYE_S = 0  # a stream has no end to wait for
-_LOOK_S = 0.05
 LISTENERS = 20
 EVERY_S = 1.0
 _BEHIND_BYTES = 65536  # a listener who is further behind is let go
@@ -116,14 +113,10 @@ def listen(address: str, port: int) -> socket.socket:
 
 
 def serve(
-    page: LivePage,
-    sockets: list[socket.socket],
-    *,
-    deltas: socket.socket | None = None,
-    until: threading.Event | None = None,
+    page: LivePage, sockets: list[socket.socket], *, deltas: socket.socket | None = None
 ) -> None:
     """
-    Serve until a signal.
+    Serve until a signal, in the main thread.
 
     Parameters
     ----------
@@ -131,8 +124,32 @@ def serve(
         That listen, for the page.
     deltas
         The same for Signal K; None for none.
-    until
-        Ends it too, for a caller in another thread.
+    """
+    server = server_of(page)
+
+    async def run() -> None:
+        sending = None
+        if deltas is not None:
+            sending = asyncio.create_task(serve_deltas(page.deltas, deltas))
+        await server.serve(sockets=sockets)
+        if sending is not None:
+            sending.cancel()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        server.should_exit = True
+
+    # a signal ends the server and returns; uvicorn raises it again for whoever was before
+    before = {kind: signal.signal(kind, end) for kind in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        asyncio.run(run())
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
+
+
+def server_of(page: LivePage) -> uvicorn.Server:
+    """
+    Return the server of a page, to be run on sockets that listen.
     """
     _allow_files()
     config = uvicorn.Config(
@@ -145,44 +162,7 @@ def serve(
         timeout_graceful_shutdown=_GOODBYE_S,
         timeout_keep_alive=5,
     )
-    server = uvicorn.Server(config)
-
-    async def run() -> None:
-        sending = None
-        if deltas is not None:
-            sending = asyncio.create_task(serve_deltas(page.deltas, deltas))
-        if until is not None:
-            asyncio.create_task(_end_when(until, server))  # noqa: RUF006
-        await server.serve(sockets=sockets)
-        if sending is not None:
-            sending.cancel()
-
-    with _signals_to(server):
-        asyncio.run(run())
-
-
-@contextmanager
-def _signals_to(server: uvicorn.Server) -> Iterator[None]:
-    """Let a signal end the server and return; uvicorn raises it again for whoever was before."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def end(number: int, frame: FrameType | None) -> None:
-        server.should_exit = True
-
-    before = {kind: signal.signal(kind, end) for kind in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)
-
-
-async def _end_when(event: threading.Event, server: uvicorn.Server) -> None:
-    while not event.is_set():
-        await asyncio.sleep(_LOOK_S)
-    server.should_exit = True
+    return uvicorn.Server(config)
 
 
 def _allow_files() -> None:

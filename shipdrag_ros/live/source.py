@@ -39,6 +39,10 @@ class Moment(NamedTuple):
     heard: tuple[Heard, ...]
 
 
+def _unheard(coastdown: EndedCoastdown, window: Window) -> None:
+    """Inform nobody."""
+
+
 class Timeline:
     """
     All moments of a bag as a node would have shown it, as far as it has been read.
@@ -65,7 +69,7 @@ class Timeline:
     """
 
     def __init__(
-        self, run: Run, ship: Ship, parameters: Parameters, *, ended: OnCoastdown | None = None
+        self, run: Run, ship: Ship, parameters: Parameters, *, ended: OnCoastdown = _unheard
     ) -> None:
         self.start_ns, last_ns = run.span_ns or (0, 0)
         self.end_ns = last_ns + 1  # after the last message: what ends with the record
@@ -147,7 +151,7 @@ class Timeline:
         for event in events:
             for message in outputs(event):
                 heard.append(NodeMessage(message.topic.rpartition('/')[2], message.payload))
-            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
+            if isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, monitor.ended_window(event))
         return heard
 

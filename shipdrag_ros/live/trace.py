@@ -7,7 +7,6 @@ Memory is bounded, whatever the rates of the sensors.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import islice
@@ -111,32 +110,23 @@ class Trace:
         """
         self._bin(stamp_ns // 1_000_000_000, _ESTIMATE, speed_m_s, 1)
 
-    def closed(self, *, all_of_it: bool = False) -> list[TraceRow]:
+    def closed(self) -> list[TraceRow]:
         """
         Return the rows that no more reading is waited for, each once.
-
-        Parameters
-        ----------
-        all_of_it
-            Close the newest second too.
         """
-        last = math.inf if all_of_it else self.newest_s
-        ready = sorted(second for second in self._open if second < last)
+        ready = sorted(second for second in self._open if second < self.newest_s)
         rows = [self._open.pop(second).row(second) for second in ready]
         for row in rows:
             self._keep(row)
         return rows
 
     @property
-    def latest(self) -> TraceRow | None:
-        """The last row, None before the first."""
-        return self._fine[-1] if self._fine else None
-
-    @property
     def current(self) -> TraceRow | None:
         """The newest second as far as it has been read, None before the first reading."""
         found = self._open.get(self.newest_s)
-        return self.latest if found is None else found.row(self.newest_s)
+        if found is not None:
+            return found.row(self.newest_s)
+        return self._fine[-1] if self._fine else None
 
     def newest(self, column: int) -> float | None:
         """

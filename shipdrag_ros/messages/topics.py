@@ -399,20 +399,20 @@ class Health:
 
     statuses: tuple[Status, ...]
 
-    def of(self, part: str) -> Status | None:
+    def of(self, part: str) -> Status:
         """
-        Return the status of a part.
+        Return the status of a part; one that says nothing where there is none.
         """
-        return next((status for status in self.statuses if status.part == part), None)
+        blank = Status.of(part, OK, '', {})
+        return next((status for status in self.statuses if status.part == part), blank)
 
     @property
-    def lead(self) -> tuple[float, float] | None:
+    def lead(self) -> tuple[float, float] | tuple[None, None]:
         """How long the ship has been steady, and from when the record is ready [s]."""
         state = self.of('state')
-        steady_s = None if state is None else state.number('steady lead')
-        most_s = None if state is None else state.number('steady lead used at most')
+        steady_s, most_s = state.number('steady lead'), state.number('steady lead used at most')
         if steady_s is None or most_s is None:
-            return None
+            return None, None
         return steady_s, min(READY_S, most_s)
 
     @property

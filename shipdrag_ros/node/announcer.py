@@ -17,7 +17,7 @@ from shipdrag_ros.display import duration, utc
 from shipdrag_ros.estimation.words import specific
 from shipdrag_ros.messages.topics import ERROR, OK, WARN, Status
 from shipdrag_ros.node.background import Compiling
-from shipdrag_ros.node.health import InputState
+from shipdrag_ros.node.health import InputFacts
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 
 SILENCE_SAID_AFTER_S = 10.0
@@ -144,7 +144,7 @@ class Announcer:
         else:
             self._say(status.message, warning=status.level == WARN)
 
-    def inputs(self, states: Sequence[InputState]) -> None:
+    def inputs(self, states: Sequence[InputFacts]) -> None:
         """
         Report an input that was heard and is worse or better than before.
         """
@@ -152,12 +152,12 @@ class Announcer:
         for state in states:
             name, finding = state.name, state.finding
             before, said_s = self._inputs.get(name, (OK, -AGAIN_S))
-            if state.facts.age_s is None or finding.level == before or now_s < said_s + AGAIN_S:
+            if state.age_s is None or finding.level == before or now_s < said_s + AGAIN_S:
                 continue
             self._inputs[name] = (finding.level, now_s)
             self._say(f'{name}: {finding.text}', warning=finding.level != OK)
 
-    def silence(self, states: Sequence[InputState], candidates: str) -> None:
+    def silence(self, states: Sequence[InputFacts], candidates: str) -> None:
         """
         Say, once, that no input of the motion is heard, and that one is again.
 

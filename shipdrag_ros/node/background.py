@@ -158,13 +158,8 @@ class DiagnosisStatus:
         return f'{said[0].upper()}{said[1:]}. {_GOES_ON}' if said else ''
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What a process is given."""
-
-    window: Window
-    ship: Ship
-    parameters: Parameters
+_Task = tuple[Window, Ship, Parameters]
+"""What a process is given."""
 
 
 class Diagnosing:
@@ -209,7 +204,7 @@ class Diagnosing:
             self.status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
             return
         self.status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
-        task = _Task(window, self._ship, self._parameters)
+        task = window, self._ship, self._parameters
         self._queue.submit(self._diagnose, task, self.status)
 
     def close(self) -> None:
@@ -270,11 +265,10 @@ def main() -> None:
     from shipdrag_ros.diagnosis import CoastRun, diagnose
     from shipdrag_ros.diagnosis.document import document
 
-    task = pickle.load(sys.stdin.buffer)
-    assert isinstance(task, _Task)
-    run = CoastRun('the coastdown', task.window)
+    window, ship, parameters = pickle.load(sys.stdin.buffer)
+    run = CoastRun('the coastdown', window)
     try:
-        answer = document(diagnose([run], task.ship, task.parameters), task.ship)
+        answer = document(diagnose([run], ship, parameters), ship)
     except ShipdragError as error:
         answer = {'state': DiagnosisState.IMPOSSIBLE.value, 'reason': str(error)}
     sys.stdout.write(json_text(answer))

@@ -127,7 +127,7 @@ class Recently:
 @dataclass(frozen=True)
 class InputFacts:
     """
-    What is known of one input.
+    What is known of one input, and what is to be said of it.
 
     Attributes
     ----------
@@ -162,6 +162,10 @@ class InputFacts:
         What else is odd about it, '' if nothing is.
     about
         What else is to be shown of it, by key.
+    rate_hz
+        Messages a second of steady time, before the last tick.
+    finding
+        What is to be said, once it is judged.
     """
 
     name: str
@@ -184,11 +188,32 @@ class InputFacts:
     behind: tuple[str, float] | None = None
     doubt: str = ''
     about: Mapping[str, object] = field(default_factory=dict)
+    rate_hz: float = 0.0
+    finding: Finding = Finding(OK, '')
 
     @property
     def fresh(self) -> bool:
         """Whether it was received lately."""
         return self.age_s is not None and self.age_s < SILENT_S
+
+    @property
+    def status(self) -> Status:
+        """The same for others."""
+        values: dict[str, object] = {**self.about, 'rate [Hz]': self.rate_hz}
+        values['age [s]'] = self.age_s
+        if self.type is not None and not self.stamped:
+            values['time'] = 'of arrival: the type holds none'
+        if self.total.unstamped:
+            values['unstamped'] = self.total.unstamped
+        if self.active:
+            values['used'] = self.total.used
+            values |= {f'rejected {reason}': n for reason, n in self.total.rejected.items()}
+            if self.recent.readings:
+                values['share used lately [1]'] = self.recent.used / self.recent.readings
+        text = self.finding.text
+        if 'fed by' in self.about:
+            text = f'{text}, from {self.about["fed by"]}'
+        return Status.of(f'input {self.name}', self.finding.level, text, values)
 
 
 def judge(facts: InputFacts) -> Finding:
@@ -378,56 +403,6 @@ def behind_others(
 _SHOWN = 6  # candidates of an input
 
 
-@dataclass(frozen=True)
-class InputState:
-    """
-    One input, judged.
-
-    Attributes
-    ----------
-    facts
-        What it was judged by.
-    finding
-        What is to be said.
-    rate_hz
-        Messages a second of steady time, before the last tick.
-    """
-
-    facts: InputFacts
-    finding: Finding
-    rate_hz: float
-
-    @property
-    def name(self) -> str:
-        """Of the input."""
-        return self.facts.name
-
-    @property
-    def fresh(self) -> bool:
-        """Whether it was received lately."""
-        return self.facts.fresh
-
-    @property
-    def status(self) -> Status:
-        """The same for others."""
-        facts = self.facts
-        values: dict[str, object] = {**facts.about, 'rate [Hz]': self.rate_hz}
-        values['age [s]'] = facts.age_s
-        if facts.type is not None and not facts.stamped:
-            values['time'] = 'of arrival: the type holds none'
-        if facts.total.unstamped:
-            values['unstamped'] = facts.total.unstamped
-        if facts.active:
-            values['used'] = facts.total.used
-            values |= {f'rejected {reason}': n for reason, n in facts.total.rejected.items()}
-            if facts.recent.readings:
-                values['share used lately [1]'] = facts.recent.used / facts.recent.readings
-        text = self.finding.text
-        if 'fed by' in facts.about:
-            text = f'{text}, from {facts.about["fed by"]}'
-        return Status.of(f'input {facts.name}', self.finding.level, text, values)
-
-
 class InputStates:
     """Judges the inputs, once a tick."""
 
@@ -436,7 +411,7 @@ class InputStates:
 
     def tick(
         self, facts: Iterable[InputFacts], *, simulated: bool, now_s: float | None = None
-    ) -> tuple[InputState, ...]:
+    ) -> tuple[InputFacts, ...]:
         """
         Look at all inputs again.
 
@@ -465,8 +440,9 @@ class InputStates:
                 seconds=recently.seconds,
                 offset_s=None if simulated else each.offset_s,
                 behind=behind.get(each.name),
+                rate_hz=recently.rate_hz,
             )
-            states.append(InputState(judged, judge(judged), recently.rate_hz))
+            states.append(replace(judged, finding=judge(judged)))
         return tuple(states)
 
 
@@ -513,7 +489,7 @@ class Standing:
     namesakes: int = 0
 
 
-def state_status(standing: Standing, inputs: Sequence[InputState]) -> Status:
+def state_status(standing: Standing, inputs: Sequence[InputFacts]) -> Status:
     """
     Say where the node stands, what keeps it from estimating, and whether its name is another's.
     """
@@ -538,7 +514,7 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Status:
     return Status.of('state', level, text, values)
 
 
-def _state(standing: Standing, inputs: Sequence[InputState]) -> tuple[int, str]:
+def _state(standing: Standing, inputs: Sequence[InputFacts]) -> tuple[int, str]:
     if standing.sim_time and standing.clock_ns == 0:
         return ERROR, 'use_sim_time is true but no /clock: messages are not used'
     if standing.monitor is None:
@@ -555,7 +531,7 @@ def _state(standing: Standing, inputs: Sequence[InputState]) -> tuple[int, str]:
         hint = standing.candidates or standing.hint
         return ERROR, f'no data: nothing on any of {names}; {hint}'
     # one good input is enough to estimate, but nothing is there to compare it with
-    unwell = [each for each in motion if each.facts.age_s is not None and each.finding.level != OK]
+    unwell = [each for each in motion if each.age_s is not None and each.finding.level != OK]
     said = '; '.join(f'{each.name}: {each.finding.text}' for each in unwell)
     if fresh and all(each.finding.level == ERROR for each in fresh):
         return ERROR, f'no input can be used: {said}'

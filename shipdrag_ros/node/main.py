@@ -56,21 +56,20 @@ def line(health: Health) -> str:
     Return a node's health in a line.
     """
     state, estimate = health.of('state'), health.of('estimate')
-    monitor = '' if state is None else state.values.get('monitor', '')
+    monitor = state.values.get('monitor', '')
     said = [monitor or 'not active']
-    if monitor == 'steady' and health.lead is not None:
-        lead_s, ready_s = health.lead
+    lead_s, ready_s = health.lead
+    if monitor == 'steady' and lead_s is not None and ready_s is not None:
         enough = 'min: record ready' if lead_s >= ready_s else f'of {ready_s / 60.0:.0f} min'
         said[0] = f'steady {lead_s // 60.0:.0f} {enough}'
-    if state is not None and state.level != OK and not state.message.startswith(f'{monitor};'):
+    if state.level != OK and not state.message.startswith(f'{monitor};'):
         said[0] = state.message  # inputs that are not well are named behind it
-    if estimate is not None:
-        speed = estimate.number('speed through water')
-        r = estimate.number('specific resistance')
-        sigma = estimate.number('standard deviation of it')
-        if speed is not None and r is not None and sigma is not None:
-            band = f' ± {200.0 * sigma / r:.0f} %' if r > 0.0 else ''
-            said.append(f'last at {speed / M_S_PER_KNOT:.1f} kn: r {r:.4f} m/s²{band}')
+    speed = estimate.number('speed through water')
+    r = estimate.number('specific resistance')
+    sigma = estimate.number('standard deviation of it')
+    if speed is not None and r is not None and sigma is not None:
+        band = f' ± {200.0 * sigma / r:.0f} %' if r > 0.0 else ''
+        said.append(f'last at {speed / M_S_PER_KNOT:.1f} kn: r {r:.4f} m/s²{band}')
     heard = [status for status in health.inputs if status.number('messages')]
     bad = [status.input for status in heard if status.level != OK]
     said.append(f'{len(heard)} inputs' + (f', not well: {", ".join(bad)}' if bad else ''))
@@ -198,8 +197,7 @@ def _shown(terminal: Callable[[Health], None] | None) -> Callable[[Health], None
     """Return what takes the health each second: it shows that the executor goes round."""
 
     def show(health: Health) -> None:
-        state = health.of('state')
-        notify('WATCHDOG=1' + ('' if state is None else f'\nSTATUS={state.message}'))
+        notify(f'WATCHDOG=1\nSTATUS={health.of("state").message}')
         if terminal is not None:
             terminal(health)
 

@@ -39,7 +39,7 @@ from shipdrag_ros.messages.topics import ERROR, Health, Status, diagnosis_messag
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.health import (
-    InputState,
+    InputFacts,
     InputStates,
     Standing,
     candidates,
@@ -52,10 +52,17 @@ from shipdrag_ros.node.health import (
 from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.requests import NodeParameters, add_services, check_sections, guard_services
+from shipdrag_ros.node.requests import (
+    NodeParameters,
+    add_services,
+    check_sections,
+    limit_services,
+    refuse_illegal,
+)
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import carrying, checked
@@ -79,7 +86,7 @@ class CoastdownNode(LifecycleNode):
     Attributes
     ----------
     shown
-        Called with the health every second, for a terminal; None: nobody looks.
+        Called with the health every second, for a terminal.
 
     Raises
     ------
@@ -106,16 +113,18 @@ class CoastdownNode(LifecycleNode):
         self._nmea: NmeaFeed | None = None
         self._input_states = InputStates()
         self._mailbox = Mailbox((), ahead=False)
-        self._watching: Watching | None = None
+        self._watching = Watching((), Parameters(), simulated=False)
         self._outputs: dict[str, Publisher] = {}
-        self.shown: Callable[[Health], None] | None = None
+        self.shown: Callable[[Health], None] = lambda health: None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
         self._first = self.create_timer(FIRST_S, self._publish_first, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
         add_services(self, lambda: self._session)
-        guard_services(self.services, self._service_change_state, self.get_logger().warning)
+        change, warn = self._service_change_state, self.get_logger().warning
+        refuse_illegal(change, warn)
+        limit_services((*self.services, change), warn)  # rclpy does not list it among them
 
     def declare_parameters(
         self, namespace: str, parameters: list[Any], ignore_override: bool = False
@@ -324,7 +333,6 @@ class CoastdownNode(LifecycleNode):
             source = Source(topic.name, type_name)
             if self._nmea is not None and not self._nmea.admits(source, data, now_ns):
                 continue
-            assert self._watching is not None
             self._watching.watch_clock(self._session, now_ns)
             count = partial(topic.count, received_ns=0 if self._simulated else received_ns)
             # by the clock of the node, and not when it comes to it: what waited is no younger
@@ -349,7 +357,7 @@ class CoastdownNode(LifecycleNode):
         now_ns = self._now_ns()
         session = self._session
         health = {} if session is None else session.monitor.health()
-        if session is not None and self._watching is not None:
+        if session is not None:
             self._watching.tick(session, health, now_ns)
             session.note_removed(now_ns, self.get_logger().warning)
         doubts = self._doubts()
@@ -380,8 +388,7 @@ class CoastdownNode(LifecycleNode):
         message = DiagnosticArray(status=[self._labelled(each) for each in statuses])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
-        if self.shown is not None:
-            self.shown(Health(tuple(statuses)))
+        self.shown(Health(tuple(statuses)))
         if self._compiling is not None:
             self._compiling.begin()
 
@@ -406,7 +413,7 @@ class CoastdownNode(LifecycleNode):
         else:
             self._session.note_diagnosis(message, now_ns)
 
-    def _rebind(self, states: Sequence[InputState], now_ns: int) -> None:
+    def _rebind(self, states: Sequence[InputFacts], now_ns: int) -> None:
         """Give up a type that is no use where another is published; said and recorded."""
         if self._session is None or self._compiling_s is not None:
             return  # nothing was judged yet
@@ -426,7 +433,7 @@ class CoastdownNode(LifecycleNode):
 
     def _doubts(self) -> dict[str, str]:
         """Say what is odd about inputs besides what became of their readings."""
-        if self._session is None or self._watching is None or self._compiling_s is not None:
+        if self._session is None or self._compiling_s is not None:
             return {}
         return self._session.monitor.doubts() | self._watching.doubts()
 
@@ -434,7 +441,7 @@ class CoastdownNode(LifecycleNode):
         own = (self.get_name(), self.get_namespace())
         return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
 
-    def _standing(self, states: Sequence[InputState], now_ns: int) -> Standing:
+    def _standing(self, states: Sequence[InputFacts], now_ns: int) -> Standing:
         session, settings = self._session, self._settings
         hint = ''
         if not any(each.fresh for each in states if each.name in ALL_MOTION):

@@ -14,10 +14,11 @@ import threading
 import time
 import zlib
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import Enum
+from itertools import chain
 from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
@@ -41,14 +42,12 @@ class _Segment(NamedTuple):
 
 class RawRing:
     """
-    Messages in arrival order, bounded by time and by bytes.
+    Messages in arrival order, bounded by time and by bytes when packed; the oldest go first.
 
     Parameters
     ----------
     keep_ns
         Age at which a message may be forgotten [ns].
-    limit_bytes
-        Memory for packed messages; the oldest go first.
 
     Attributes
     ----------
@@ -56,9 +55,8 @@ class RawRing:
         Whether the limit of bytes, rather than age, took messages away.
     """
 
-    def __init__(self, keep_ns: int, *, limit_bytes: int = LIMIT_BYTES) -> None:
+    def __init__(self, keep_ns: int) -> None:
         self._keep_ns = keep_ns
-        self._limit_bytes = limit_bytes
         self._segments: deque[_Segment] = deque()
         self._open: list[EncodedMessage] = []
         self._open_bytes = 0
@@ -86,7 +84,8 @@ class RawRing:
 
     def __iter__(self) -> Iterator[EncodedMessage]:
         """Give the messages of this moment, whatever is added while they are read."""
-        return _unpack(tuple(self._segments), tuple(self._open))
+        packed = map(_unpack, tuple(self._segments))  # one after the other, as they are read
+        return chain(chain.from_iterable(packed), tuple(self._open))
 
     def _pack(self) -> None:
         plain = [tuple(message) for message in self._open]
@@ -98,19 +97,15 @@ class RawRing:
 
     def _forget(self, now_ns: int) -> None:
         while self._segments:
-            too_many = self._packed_bytes > self._limit_bytes
+            too_many = self._packed_bytes > LIMIT_BYTES
             if not too_many and now_ns - self._segments[0].newest_ns <= self._keep_ns:
                 return
             self.cut = self.cut or too_many
             self._packed_bytes -= len(self._segments.popleft().packed)
 
 
-def _unpack(
-    segments: Iterable[_Segment], behind: Iterable[EncodedMessage]
-) -> Iterator[EncodedMessage]:
-    for segment in segments:
-        yield from map(EncodedMessage._make, pickle.loads(zlib.decompress(segment.packed)))
-    yield from behind
+def _unpack(segment: _Segment) -> Iterator[EncodedMessage]:
+    return map(EncodedMessage._make, pickle.loads(zlib.decompress(segment.packed)))
 
 
 # the ring is cut by arrival, the monitor's memory by stamps

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from time import monotonic
 from types import SimpleNamespace
@@ -33,7 +33,7 @@ from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.fields import parse, text_of
 from shipdrag_ros.node.recorder import RecordingState
 from shipdrag_ros.node.session import Session
-from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, about
+from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, about, sections
 
 LONGEST = 1000  # names or parameters of a request
 # whose requests begin with a sequence
@@ -161,25 +161,6 @@ class RateLimit:
         return True
 
 
-def guard_services(
-    services: Iterable[Service], change_state: Service, warn: Callable[[str], object]
-) -> None:
-    """
-    Guard all services of a managed node.
-
-    Parameters
-    ----------
-    services
-        Of the node.
-    change_state
-        The one that is asked for transitions, which rclpy does not list among them.
-    warn
-        Called with each refusal.
-    """
-    _refuse_illegal(change_state, warn)
-    limit_services((*services, change_state), warn)
-
-
 def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
     """
     Let each service refuse what comes too often or is too long.
@@ -197,8 +178,17 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
         service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
-def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
-    """Refuse transitions that are not there; rclpy would raise out of the executor."""
+def refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
+    """
+    Refuse transitions that are not there; rclpy would raise out of the executor.
+
+    Parameters
+    ----------
+    change_state
+        The service that is asked for transitions.
+    warn
+        Called with each refusal.
+    """
     change = change_state.callback
 
     def refuse_or_change(request: Any, response: Any) -> Any:
@@ -403,22 +393,12 @@ def check_sections(arguments: Sequence[str], node: Node) -> None:
         if flag != '--params-file':
             continue
         text = text_of(path, what='a parameter file', error=ParameterError)
-        sections = list(_sections(parse(text, subject=path, error=ParameterError), ''))
-        if not any(_pattern(section).fullmatch(name) for section in sections):
+        found = [where for where, _ in sections(parse(text, subject=path, error=ParameterError))]
+        if not any(_pattern(section).fullmatch(name) for section in found):
             raise ParameterError(
                 path,
-                [f'sections are {sections!r}, expected one for {name!r}; "/**" is for any node'],
+                [f'sections are {found!r}, expected one for {name!r}; "/**" is for any node'],
             )
-
-
-def _sections(tree: object, path: str) -> Iterator[str]:
-    if not isinstance(tree, dict):
-        return
-    for key, branch in tree.items():
-        if key == 'ros__parameters':
-            yield path
-        else:
-            yield from _sections(branch, f'{path}/{str(key).strip("/")}')
 
 
 def _pattern(section: str) -> re.Pattern[str]:

@@ -83,8 +83,8 @@ class Session:
         *,
         publish: Publish,
         node: str,
-        ended: OnCoastdown | None = None,
-        on_event: OnEvent | None = None,
+        ended: OnCoastdown = lambda coastdown, window: None,
+        on_event: OnEvent = lambda event: None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
@@ -112,7 +112,7 @@ class Session:
         return len(self._waiting) > WAITING_MOST or self._waiting_bytes > WAITING_BYTES
 
     def receive(
-        self, source: Source, payload: bytes, now_ns: int, count: Count | None = None
+        self, source: Source, payload: bytes, now_ns: int, count: Count = lambda decoded: None
     ) -> None:
         """
         Take one message.
@@ -137,8 +137,7 @@ class Session:
                 stamps = decoded.block.stamp_ns
                 self.recorder.input(keep(int(stamps[0]) if len(stamps) else arrival_ns))
             self._report(self.monitor.update(decoded.block))
-            if count is not None:
-                count(decoded)
+            count(decoded)
 
         self._in_turn(use, len(payload))
 
@@ -305,11 +304,10 @@ class Session:
             if isinstance(event, Update | EndedCoastdown) and event.estimate is not None:
                 self.latest = event.estimate
             self.why_none = event.reason if isinstance(event, NoEstimate) else ''
-            if self._on_event is not None:
-                self._on_event(event)
+            self._on_event(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
-            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
+            if isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, self.monitor.ended_window(event))
 
     def _send(self, message: OutputMessage) -> None:

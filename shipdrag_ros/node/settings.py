@@ -10,7 +10,7 @@ prints `config/parameters.yaml`.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -199,6 +199,17 @@ def about(name: str) -> str:
     """
     key = KEYS[name]
     return f'{key.text} [{key.kind.unit}]' if key.kind.unit else key.text
+
+
+def sections(tree: object, path: str = '') -> Iterator[tuple[str, Mapping[str, object]]]:
+    """
+    Yield the sections of a parameter file of ROS: the node that each is for, and its parameters.
+    """
+    for key, branch in tree.items() if isinstance(tree, dict) else ():
+        if key == 'ros__parameters':
+            yield path, branch if isinstance(branch, dict) else {}
+        else:
+            yield from sections(branch, f'{path}/{str(key).strip("/")}')
 
 
 def parameters_file() -> str:

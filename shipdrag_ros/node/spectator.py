@@ -371,6 +371,8 @@ class Rehearsal:
     ----------
     estimates
         How many were heard.
+    player
+        Sends samples to the node.
     """
 
     def __init__(self, heard: Callable[[LiveEstimate], None]) -> None:
@@ -384,7 +386,7 @@ class Rehearsal:
         self._node = rclpy.create_node('rehearsal', context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._player = Player(self._node, self._executor)
+        self.player = Player(self._node, self._executor)
         self._ready = False
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
         for topic, callback in (
@@ -413,7 +415,7 @@ class Rehearsal:
         while True:
             alive()
             try:
-                self._player.connect(block, timeout_s=1.0)
+                self.player.connect(block, timeout_s=1.0)
             except ShipdragError:
                 if time.monotonic() > end_s:
                     raise
@@ -422,19 +424,6 @@ class Rehearsal:
         while not self._ready:  # a first start compiles, which ends by itself
             alive()
             self._executor.spin_once(timeout_sec=0.1)
-
-    def play(self, block: Block, *, speed: float, progress: Callable[[float], None]) -> None:
-        """
-        Send samples under simulated time.
-
-        Parameters
-        ----------
-        speed
-            Seconds of data in a second of life.
-        progress
-            Called with the fraction done.
-        """
-        self._player.play(block, speed=speed, progress=progress)
 
     def listen(self, *, until: Callable[[], bool] = lambda: False, timeout_s: float) -> None:
         """
@@ -454,10 +443,8 @@ class Rehearsal:
 
     def _hear_health(self, message: DiagnosticArray) -> None:
         for health in topics.health_of(message.status):
-            state = health.of('state')
-            assert state is not None  # by which a node is known
-            compiling = 'compiling [s]' in state.values
-            self._ready = state.values['lifecycle'] == 'active' and not compiling
+            values = health.of('state').values
+            self._ready = values['lifecycle'] == 'active' and 'compiling [s]' not in values
 
     def _hear_speed(self, message: Any) -> None:
         self._speeds[stamp_ns(message)] = message.twist.twist.linear.x

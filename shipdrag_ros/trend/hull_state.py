@@ -69,15 +69,12 @@ class Runs:
         Added resistance over the clean hull's, and its repeatable standard deviation.
     covariates : (n, k)
         What else moves the resistance, each about 0 on average.
-    clean_sd
-        Of the clean hull that all are compared with.
     """
 
     years: Float64
     added: Float64
     sd: Float64
     covariates: Float64
-    clean_sd: float = CLEAN_SD
 
     def __len__(self) -> int:
         return len(self.years)
@@ -294,8 +291,7 @@ class HullState:
     def _sd(self) -> Float64:
         """Return the prior standard deviations of the columns."""
         change = np.full(len(self.steps), GROWTH_CHANGE_SD)
-        clean = self.runs.clean_sd
-        first = (clean, math.sqrt(LEVEL_SD**2 - clean**2), self.growth.sd)
+        first = (CLEAN_SD, math.sqrt(LEVEL_SD**2 - CLEAN_SD**2), self.growth.sd)
         return np.concatenate([first, self.steps.sd, change])
 
     def _prior(self, years: Float64, covariates: Float64) -> tuple[Float64, Float64]:

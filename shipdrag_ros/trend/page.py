@@ -11,9 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from shipdrag_ros import display
 from shipdrag_ros.diagnosis.words import quantity_text
@@ -21,7 +19,7 @@ from shipdrag_ros.diagnosis.words import size as size_text
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.report.document import page_text
-from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION, picture
+from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, one_axis, picture
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.simulation.effects import find
 from shipdrag_ros.trend import words
@@ -153,9 +151,8 @@ def added_resistance(trend: ShipTrend) -> display.Picture:
     trend
         With a curve.
     """
-    with rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout='constrained')
-        draw_added_resistance(figure.add_subplot(), trend)
+    with one_axis(*_SIZE) as (figure, axes):
+        draw_added_resistance(axes, trend)
     return picture(
         figure,
         'Each point is a coastdown. Where the line rises, the hull fouls; where it drops at a '
@@ -231,25 +228,21 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> dis
         Of the ship.
     """
     unit, name = display.force_unit(mass_kg)
-    with rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout='constrained')
-        axes = figure.add_subplot()
-        knots = np.asarray(row['speed_m_s'], dtype=float) / display.M_S_PER_KNOT
-        force = mass_kg / unit * np.asarray(row['resistance_m_s2'], dtype=float)
-        spread = 2.0 * mass_kg / unit * np.asarray(row['sigma_m_s2'], dtype=float)
-        axes.fill_between(
-            knots[known],
-            (force - spread)[known],
-            (force + spread)[known],
-            color=BLUE,
-            alpha=0.2,
-            lw=0,
-            label='±2 standard deviations',
-        )
-        axes.plot(knots[known], force[known], color=BLUE, label='this run')
+
+    def at_known(column: str) -> Float64:
+        return np.asarray(row[column], dtype=float)[known]
+
+    with one_axis(*_SIZE) as (figure, axes):
+        knots = at_known('speed_m_s') / display.M_S_PER_KNOT
+        force = mass_kg / unit * at_known('resistance_m_s2')
+        spread = 2.0 * mass_kg / unit * at_known('sigma_m_s2')
+        band = force - spread, force + spread
+        label = '±2 standard deviations'
+        axes.fill_between(knots, *band, color=BLUE, alpha=0.2, lw=0, label=label)
+        axes.plot(knots, force, color=BLUE, label='this run')
         if row['clean_m_s2'] is not None:
-            clean = mass_kg / unit * np.asarray(row['clean_m_s2'], dtype=float)
-            axes.plot(knots[known], clean[known], color=VERMILION, ls='--', label='clean hull')
+            clean = mass_kg / unit * at_known('clean_m_s2')
+            axes.plot(knots, clean, color=VERMILION, ls='--', label='clean hull')
         axes.set(xlabel='speed through water [knots]', ylabel=f'resistance [{name}]')
         axes.set_ylim(bottom=0.0)
         axes.legend(loc='upper left')

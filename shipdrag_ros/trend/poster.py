@@ -24,6 +24,7 @@ from shipdrag_ros.forecast.words import clock, way
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.trend.series import known
 
 _STEP_KN, _STEP_M_S = 2.0, 0.1  # from speed to speed, of a ship and of a model
 _FINE = 40  # parts of a step
@@ -92,11 +93,8 @@ def poster(ship: Ship, rows: Sequence[Mapping[str, Any]]) -> Poster:
 
 
 def _known(row: Mapping[str, Any]) -> tuple[Float64, Float64, Float64]:
-    speed, r, sigma = (
-        np.array(row[key], np.float64) for key in ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2')
-    )
-    inside = np.isfinite(r) & (r > 0.0)
-    return speed[inside], r[inside], sigma[inside]
+    speed, r, sigma = known(row, 'resistance_m_s2', 'sigma_m_s2')
+    return speed[r > 0.0], r[r > 0.0], sigma[r > 0.0]
 
 
 def _passage(

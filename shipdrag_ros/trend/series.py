@@ -112,7 +112,7 @@ def series_of(
     """
     rows = sorted(rows, key=lambda row: (row['time_ns'], row['bag']))
     speed, notes = _reference_speed(rows, service_speed_m_s)
-    with_baseline = [_at(row['clean_m_s2'], row, speed) for row in rows]
+    with_baseline = [_at('clean_m_s2', row, speed) for row in rows]
     baseline = any(np.isfinite(value) for value in with_baseline)
     points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
     points = _of_one_hull(points, [row['length_m'] for row in rows])
@@ -163,13 +163,21 @@ def _reference_speed(
     )
 
 
+def known(row: CoastdownRow, *names: str) -> tuple[Float64, ...]:
+    """
+    Return the speeds of a row at which curves of it are known, and the curves there.
+    """
+    curves = [np.array(row[name], float) for name in ('speed_m_s', *names)]
+    if any(not curve.ndim for curve in curves):  # a curve that is not there
+        return (np.zeros(0),) * len(curves)
+    inside = np.isfinite(curves).all(axis=0)
+    return tuple(curve[inside] for curve in curves)
+
+
 def _range(row: CoastdownRow) -> tuple[float, float] | None:
     """Return the lowest and highest speed at which a row has r."""
-    if row['resistance_m_s2'] is None or row['speed_m_s'] is None:
-        return None
-    speed, r = _floats(row['speed_m_s']), _floats(row['resistance_m_s2'])
-    known = np.isfinite(speed) & np.isfinite(r)
-    return (float(speed[known].min()), float(speed[known].max())) if known.any() else None
+    speed, _ = known(row, 'resistance_m_s2')
+    return (float(speed.min()), float(speed.max())) if len(speed) else None
 
 
 def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Point:
@@ -180,7 +188,7 @@ def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Poi
     if plain.time_ns < _EARLIEST_NS:
         return replace(plain, reason='its clock was not set: the date is before 1990')
     found = _range(row)
-    r = _at(row['resistance_m_s2'], row, speed)
+    r = _at('resistance_m_s2', row, speed)
     if found is None:
         return replace(plain, reason='no estimate of r(v)')
     if not np.isfinite(r):
@@ -192,8 +200,8 @@ def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Poi
     if baseline and not np.isfinite(clean):
         return replace(plain, reason='its ship file has no baseline at the reference speed')
     unit = clean if baseline else 1.0
-    sd = _at(row['sigma_m_s2'], row, speed) / unit
-    repeatable = _at(row['sigma_repeatable_m_s2'], row, speed) / unit
+    sd = _at('sigma_m_s2', row, speed) / unit
+    repeatable = _at('sigma_repeatable_m_s2', row, speed) / unit
     return replace(
         plain, value=r / unit - (1.0 if baseline else 0.0), sd=sd, sd_repeatable=repeatable
     )
@@ -281,13 +289,7 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
 def _with_covariates(points: Sequence[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
     """Set displacement and water temperature, each against its mean over the used runs."""
     volume = np.array([np.log(row['displaced_volume_m3']) for row in rows])
-    temperature = np.array(
-        [
-            np.nan if row['water_temperature_c'] is None else row['water_temperature_c']
-            for row in rows
-        ],
-        float,
-    )
+    temperature = np.array([row['water_temperature_c'] for row in rows], float)
     warmth = (temperature - _NOMINAL_TEMPERATURE_C) / 10.0 * _TEMPERATURE_SCALE
     return [
         replace(point, covariates=(each, other))
@@ -303,16 +305,9 @@ def _centred(values: Float64) -> Float64:
     return np.where(known, values - values[known].mean(), 0.0)
 
 
-def _at(values: Sequence[float] | None, row: CoastdownRow, speed: float) -> float:
+def _at(name: str, row: CoastdownRow, speed: float) -> float:
     """Return what a curve of a row is at a speed; NaN outside of what is known."""
-    if values is None or row['speed_m_s'] is None or not np.isfinite(speed):
+    speeds, curve = known(row, name)
+    if not len(speeds) or not speeds.min() <= speed <= speeds.max():
         return np.nan
-    speeds, curve = _floats(row['speed_m_s']), _floats(values)
-    known = np.isfinite(speeds) & np.isfinite(curve)
-    if not known.any() or not speeds[known].min() <= speed <= speeds[known].max():
-        return np.nan
-    return float(np.interp(speed, speeds[known], curve[known]))
-
-
-def _floats(values: Sequence[float | None]) -> Float64:
-    return np.array([np.nan if value is None else value for value in values], float)
+    return float(np.interp(speed, speeds, curve))

@@ -215,9 +215,19 @@ class ShipTrend:
     costs: Costs | None = None
     usd_per_unit: float = np.nan
     cleaning: CleaningDate | None = None
-    cleaning_from_ns: int | None = None
     rank: int | None = None
     notes: tuple[str, ...] = ()
+
+    def after_last_run(self, years: float) -> int:
+        """
+        Return the time so long after the last run that is used [ns].
+        """
+        return self.series.used[-1].time_ns + round(years * YEAR_NS)
+
+    @property
+    def cleaning_from_ns(self) -> int | None:
+        """From when cleaning pays; None where that cannot be said."""
+        return None if self.cleaning is None else self.after_last_run(self.cleaning.years)
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -356,7 +366,7 @@ def ship_trend(
         state.scatter,
         notes=(*series.notes, *_outside(known, inside)),
     )
-    return _with_costs(result, state, economics, used[-1].time_ns)
+    return _with_costs(result, state, economics)
 
 
 def _runs(used: Sequence[Point]) -> Runs:
@@ -404,9 +414,7 @@ def _outside(known: Sequence[HullEvent], inside: Sequence[HullEvent]) -> tuple[s
     return (f'{len(left)} event(s) of events.csv lie outside the time of the runs: not used',)
 
 
-def _with_costs(
-    result: ShipTrend, state: HullState, economics: Economics | None, last_ns: int
-) -> ShipTrend:
+def _with_costs(result: ShipTrend, state: HullState, economics: Economics | None) -> ShipTrend:
     """Add what the added resistance costs, and when cleaning pays."""
     if economics is None:
         why = 'no date of a cleaning: the ship file has no `economics`'
@@ -431,8 +439,7 @@ def _with_costs(
     if date is None:
         why = 'no date of a cleaning: growth and state are not known well enough for one'
         return replace(result, notes=(*result.notes, why))
-    from_ns = last_ns + round(date.years * YEAR_NS)
-    return replace(result, cleaning=date, cleaning_from_ns=from_ns)
+    return replace(result, cleaning=date)
 
 
 def _times(figure: Parameter, unit: float) -> Parameter:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from shipdrag_ros.display import M_S_PER_KNOT, Table, day, decimals_of
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.trend.series import YEAR_NS
 from shipdrag_ros.trend.ship_trend import ShipTrend, are_priced
 
 _SPREAD = '; ± is two standard deviations'
@@ -92,15 +91,11 @@ def lines(trend: ShipTrend) -> list[str]:
             f'It costs {amount(trend.costs.usd_per_year)} USD a year as it is now; since the '
             f'first run {amount(trend.costs.usd_so_far)} USD.'
         )
-    if trend.cleaning is not None and trend.cleaning_from_ns is not None:
-        base = trend.cleaning_from_ns - round(trend.cleaning.years * YEAR_NS)
-        early, late = (
-            day(base + round(years * YEAR_NS))
-            for years in (trend.cleaning.earliest, trend.cleaning.latest)
+    if trend.cleaning is not None:
+        middle, early, late = (
+            day(trend.after_last_run(years)) for years in vars(trend.cleaning).values()
         )
-        found.append(
-            f'Cleaning pays from {day(trend.cleaning_from_ns)} (80 %: {early} to {late}).'
-        )
+        found.append(f'Cleaning pays from {middle} (80 %: {early} to {late}).')
     left = [point for point in trend.points if not point.used]
     if left:
         found.append(f'{len(left)} run(s) are not used or given little weight:')
@@ -169,8 +164,7 @@ def _plus_minus(found: Parameter, unit: float) -> str:
 
 
 def _cleaning(trend: ShipTrend) -> str:
-    if trend.cleaning_from_ns is None:
+    if trend.cleaning is None:
         return 'cannot be said'
-    if trend.cleaning is not None and trend.cleaning.years == 0.0:
-        return 'now'
-    return day(trend.cleaning_from_ns)
+    years = trend.cleaning.years
+    return day(trend.after_last_run(years)) if years else 'now'

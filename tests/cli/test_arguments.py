@@ -42,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument('--ship', help='ship file')
     parser.add_argument('--node', default='', help='name (default: the first)')
     parser.add_argument('bags', nargs='*')
-    arguments.add_json(parser)
+    arguments.add(parser, '--json')
     return parser
 
 
@@ -73,7 +73,7 @@ def test_json_does_not_overwrite_what_is_no_json(parser, tmp_path, capsys):
 
 def test_no_remapping_takes_the_place_of_another(capsys: pytest.CaptureFixture[str]) -> None:
     parser = argparse.ArgumentParser()
-    arguments.add_remap(parser)
+    arguments.add(parser, '--remap')
     assert parser.parse_args([]).remap == {}
     line = ['--remap', 'depth:=/a', '--remap', '/b:=heading']
     assert parser.parse_args(line).remap == {'depth': '/a', '/b': 'heading'}

@@ -99,7 +99,7 @@ def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(ship_file, tmp
     with BagWriter(tmp_path / 'slow.mcap') as bag:
         bag.write_samples(replace(block, stamp_ns=block.stamp_ns - slow_ns))
     bag = WindowedBag(tmp_path / 'slow.mcap', None)
-    (coast,), _, _ = coasts_of(Output(), open_windowed([bag], remap={}), ship)
+    (coast,), _, _ = coasts_of(Output(), open_windowed([bag], remap={}, output=Output()), ship)
     assert len(coast.window.speed_through_water.value) > 350
     assert 'the clock of speed_through_water is too slow or too fast' in capsys.readouterr().err
 

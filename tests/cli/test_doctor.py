@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import demo, doctor, main
-from shipdrag_ros.cli.doctor import CheckState, findings
+from shipdrag_ros.cli.doctor import findings
+from shipdrag_ros.cli.output import CheckState
 
 
 def by_name(out: Path) -> dict[str, doctor.CheckResult]:

@@ -100,6 +100,17 @@ def test_each_option_is_explained(verb: str) -> None:
             assert '[' in action.help, action.option_strings
 
 
+def test_values_of_options_are_called_as_the_docstring_of_the_verb_calls_them() -> None:
+    (verbs,) = [
+        item
+        for item in cli.parser('replay')._actions
+        if isinstance(item, argparse._SubParsersAction)
+    ]
+    called = {action.dest: action.metavar for action in verbs.choices['replay']._actions}
+    assert (called['ship'], called['window']) == ('FILE', ('START', 'END'))
+    assert called['compare'] is None
+
+
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert stopped(['--version']) == 0
     assert capsys.readouterr().out.startswith('shipdrag_ros 0.')

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from shipdrag_ros.bags import WindowedRun
 from shipdrag_ros.cli import main, watch
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import WindowedBag, open_parts, open_windowed, windowed_bag
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.library.replaying import WindowedRun, refuse_overlaps
+from shipdrag_ros.library.replaying import refuse_overlaps
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -61,7 +62,7 @@ def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> No
     shutil.copy(coastdown_bag, other)
     given = [WindowedBag(other, (400.0, 900.0)), WindowedBag(coastdown_bag, None)]
     given.append(WindowedBag(other, (500.0, 1000.0)))
-    found = open_windowed(given, remap={}, window=(450.0, 800.0))
+    found = open_windowed(given, remap={}, window=(450.0, 800.0), output=Output())
     assert [(run.name, window) for run, window in found] == [
         (str(other), (400.0, 900.0)),
         (str(coastdown_bag), (450.0, 800.0)),
@@ -106,7 +107,7 @@ def test_a_part_that_is_given_twice_is_no_second_run(verb, coastdown_bag, tmp_pa
 
 
 def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
-    ((run, _),) = open_windowed([WindowedBag(coastdown_bag, None)], remap={})
+    ((run, _),) = open_windowed([WindowedBag(coastdown_bag, None)], remap={}, output=Output())
     part = WindowedRun(run, (430.0, 900.0))
     with pytest.raises(BagError, match='given twice'):
         refuse_overlaps([WindowedRun(run, None), part])

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.serve import listen, serve
+from shipdrag_ros.live.serve import listen, server_of
 
 START_S = 240.0  # the first start of a machine compiles the kernels
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
@@ -146,15 +146,13 @@ def start(tmp_path, own_domain):
 def _serving(page: LivePage) -> Iterator[str]:
     """Serve a page from a thread of this process, at an address."""
     with listen('127.0.0.1', 0) as found:
-        ended = threading.Event()
-        thread = threading.Thread(
-            target=serve, args=(page, [found]), kwargs={'deltas': None, 'until': ended}
-        )
+        server = server_of(page)
+        thread = threading.Thread(target=server.run, args=([found],))
         thread.start()
         try:
             yield f'http://127.0.0.1:{found.getsockname()[1]}/'
         finally:
-            ended.set()
+            server.should_exit = True
             thread.join()
 
 

@@ -81,15 +81,15 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(start: Any, view: Any, t
         rehearsal.wait_for_node(block, alive=lambda: None, timeout_s=240.0)
         # a node that compiles is silent for some seconds: steady sailing is waited for
         stop_ns = int(block.stamp_ns[0]) + 410 * 10**9
-        rehearsal.play(block[block.stamp_ns < stop_ns], speed=140.0, progress=note)
+        rehearsal.player.play(block[block.stamp_ns < stop_ns], speed=140.0, progress=note)
         viewer.wait_for('#headline', 'STEADY')
         note(0.0)
         slowly_ns = int(block.stamp_ns[-1]) - 15 * 10**9
         glide = block[(block.stamp_ns >= stop_ns) & (block.stamp_ns < slowly_ns)]
-        rehearsal.play(glide, speed=140.0, progress=note)
+        rehearsal.player.play(glide, speed=140.0, progress=note)
         viewer.wait_for('#headline', 'COASTDOWN COMPLETE')
         # a busy page loses readings of best effort at 140 times, the shaft's may be all of them
-        rehearsal.play(block[block.stamp_ns >= slowly_ns], speed=2.0, progress=note)
+        rehearsal.player.play(block[block.stamp_ns >= slowly_ns], speed=2.0, progress=note)
         # on a busy machine they may come after the last sample
         rehearsal.listen(until=lambda: rehearsal.estimates > 10, timeout_s=240.0)
         assert rehearsal.estimates > 10

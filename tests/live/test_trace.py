@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.live.trace import COARSE_S, FINE_S, LONGEST_S, Trace
+from shipdrag_ros.live.trace import COARSE_S, FINE_S, LONGEST_S, Trace, TraceRow
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 START_S = 1_700_000_000
@@ -14,6 +14,12 @@ START_S = 1_700_000_000
 
 def readings(channel: Channel, seconds: np.ndarray, value: float) -> Block:
     return Block.of(channel, (seconds * 1e9).astype(np.int64), np.full(len(seconds), value))
+
+
+def rest_of(trace: Trace) -> list[TraceRow]:
+    """Close the newest second too, as a later reading would."""
+    trace.newest_s += 1
+    return trace.closed()
 
 
 def test_a_row_is_the_mean_of_its_second_and_is_given_once() -> None:
@@ -25,7 +31,7 @@ def test_a_row_is_the_mean_of_its_second_and_is_given_once() -> None:
     trace.add_estimate(START_S * 10**9, 2.5)
     assert trace.closed() == [(START_S, 1.0, 5.0, 2.5, None), (START_S + 1, 3.0, None, None, None)]
     assert trace.closed() == []
-    assert trace.closed(all_of_it=True) == [(START_S + 2, 4.0, None, None, None)]
+    assert rest_of(trace) == [(START_S + 2, 4.0, None, None, None)]
 
 
 def test_the_first_instrument_that_speaks_in_a_second_is_drawn() -> None:
@@ -35,7 +41,7 @@ def test_the_first_instrument_that_speaks_in_a_second_is_drawn() -> None:
     trace.add(readings(Channel.SPEED_THROUGH_WATER, seconds[1:2], 5.0))
     trace.add(readings(Channel.SPEED_THROUGH_WATER_3, seconds[:2], 9.0))
     trace.add(Block.of(Channel.SPEED_OVER_GROUND_3, [START_S * 10**9], [[3.0, 4.0]]))
-    assert [row[1:3] for row in trace.closed(all_of_it=True)] == [
+    assert [row[1:3] for row in rest_of(trace)] == [
         (7.0, 5.0),
         (5.0, None),
         (7.0, None),
@@ -64,7 +70,7 @@ def test_one_clock_that_is_off_is_left_out(off_s: int) -> None:
         bad = readings(Channel.SHAFT, np.array([second + off_s]), 9.0)
         trace.add(in_arrival_order([good]))
         trace.add(bad)
-    rows = trace.closed(all_of_it=True)
+    rows = rest_of(trace)
     assert len(rows) == 100
     assert {row[1:] for row in rows} == {(8.0, None, None, None)}
     assert not trace.restarted
@@ -76,7 +82,7 @@ def test_where_all_clocks_go_back_it_starts_over() -> None:
     trace.closed()
     trace.add(readings(Channel.SHAFT, START_S - 10_000 + np.arange(100), 8.0))
     assert trace.restarted
-    trace.closed(all_of_it=True)
+    rest_of(trace)
     assert {row[4] for row in trace.rows()} == {8.0}
 
 
@@ -89,6 +95,6 @@ def test_the_newest_second_is_read_as_far_as_it_has_come() -> None:
         found = trace.current
         assert found is not None
         assert found[:2] == (START_S, 8.0 + 0.5 * tenth)
-    assert trace.latest is None
-    trace.closed(all_of_it=True)
-    assert trace.current == trace.latest == (START_S, 9.0, None, None, None)
+    assert trace.rows() == []
+    rest_of(trace)
+    assert trace.current == trace.rows()[-1] == (START_S, 9.0, None, None, None)

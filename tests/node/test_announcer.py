@@ -11,12 +11,12 @@ from rclpy.logging import get_logger
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
 from shipdrag_ros.messages.topics import ERROR, OK, WARN
 from shipdrag_ros.node.announcer import Announcer, line_of
-from shipdrag_ros.node.health import Finding, InputFacts, InputState
+from shipdrag_ros.node.health import Finding, InputFacts
 
 
-def seen(name: str, level: int, text: str, *, age_s: float | None = 0.1) -> InputState:
+def seen(name: str, level: int, text: str, *, age_s: float | None = 0.1) -> InputFacts:
     """Return an input as it was judged."""
-    return InputState(InputFacts(name, age_s=age_s), Finding(level, text), rate_hz=1.0)
+    return InputFacts(name, age_s=age_s, finding=Finding(level, text))
 
 
 def test_an_input_that_is_worse_is_logged_once(capfd: pytest.CaptureFixture[str]) -> None:

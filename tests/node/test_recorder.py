@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 
+import pytest
+
 from shipdrag_ros.bags.durable import LiveFile, PartLimits
 from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
@@ -276,8 +278,9 @@ def test_forgets_by_age_but_not_too_early() -> None:
     assert not ring.cut
 
 
-def test_forgets_by_bytes_and_says_so() -> None:
-    ring = RawRing(10**9 * SECOND_NS, limit_bytes=10_000)
+def test_forgets_by_bytes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('shipdrag_ros.node.recorder.LIMIT_BYTES', 10_000)
+    ring = RawRing(10**9 * SECOND_NS)
     fill(ring, 50_000, size=1000)
     kept = [item.publish_ns for item in ring]
     assert kept == list(range(kept[0], 50_000))

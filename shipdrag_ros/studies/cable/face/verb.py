@@ -6,6 +6,8 @@ diameter, unless --rough or --c0 is given.
 
 Options
 -------
+--report FILE.html
+    write the result with its pictures to one HTML file
 --rough
     C0 of a very rough cylinder (a log) in place of a smooth one
 --c0 X
@@ -25,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_json, add_report, number
+from shipdrag_ros.cli.arguments import add, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, one_axis, styled
@@ -158,8 +160,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--density', type=number(900.0, 1100.0, unit='kg/m^3'), default=1025.0, metavar='RHO'
     )
-    add_report(parser, of='result')
-    add_json(parser)
+    add(parser, '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

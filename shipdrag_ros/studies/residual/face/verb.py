@@ -8,6 +8,8 @@ Fr, and C_B or slenderness (L / V^(1/3)), the other follows; lcb (x_c / L) for S
 
 Options
 -------
+--report FILE.html
+    write the fit with its pictures to one HTML file
 DATA.csv
     table with a header
 --form
@@ -35,7 +37,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
+from shipdrag_ros.cli.arguments import add, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
@@ -65,8 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--ship', type=Path, metavar='FILE')
     parser.add_argument('--lcb', type=number(-0.2, 0.2), metavar='X')
     parser.add_argument('--write', type=unused_file('.yaml'), metavar='FILE')
-    add_report(parser, of='fit')
-    add_json(parser)
+    add(parser, '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

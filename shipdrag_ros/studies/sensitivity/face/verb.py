@@ -8,6 +8,8 @@ coastdown to be judged right, and which effect a wrong one is taken for.
 
 Options
 -------
+--report FILE.html
+    write the result with its pictures to one HTML file
 --model
     manoeuvring model (default: {_MODEL})
 --ship FILE
@@ -27,7 +29,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json, add_report
+from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
@@ -56,8 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     subject.add_argument('--ship', type=Path, metavar='FILE')
     parser.add_argument('--manoeuvre', metavar='NAME')
     parser.add_argument('--keep', type=int, metavar='N')
-    add_report(parser, of='result')
-    add_json(parser)
+    add(parser, '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:

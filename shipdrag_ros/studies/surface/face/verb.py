@@ -6,6 +6,8 @@ order of a coastdown fit. Inputs are scaled inside; the coefficients are those o
 
 Options
 -------
+--report FILE.html
+    write the surface with its pictures to one HTML file
 DATA.csv
     table with a header
 --inputs COLUMN[,COLUMN]...
@@ -30,7 +32,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
+from shipdrag_ros.cli.arguments import add, new_file, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
@@ -131,8 +133,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--max-degree', type=whole(LOWEST), default=MAX_DEGREE, metavar='N')
     parser.add_argument('--predict', type=Path, metavar='NEW.csv')
     parser.add_argument('--export', type=new_file('.py'), metavar='FILE.py')
-    add_report(parser, of='surface')
-    add_json(parser)
+    add(parser, '--report', '--json')
 
 
 def run(options: argparse.Namespace) -> int:
