@@ -25,13 +25,12 @@ from shipdrag_ros.inference.decision import (
     Names,
     WeighedHypothesis,
 )
-from shipdrag_ros.inference.learning import learn
+from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import SizePosterior
 from shipdrag_ros.inference.linear import Families, products_of, solve, whitened_products
 from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG
-from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
