@@ -27,6 +27,7 @@ from shipdrag_ros.diagnosis.context import Context, Measured
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
+from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
@@ -40,9 +41,10 @@ from shipdrag_ros.inference.decision import (
     names_one,
     probabilities,
 )
+from shipdrag_ros.inference.linear import inverse_of
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
@@ -141,7 +143,7 @@ def of_another_run(
     for fit, hypothesis, begun, place, table in zip(fits, hypotheses, at, places, tables):
         family = comparing.prior_of(fit)[0]
         matrix = np.diag(runs.priors(hypothesis, begun).precision[family])
-        learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
+        learnt = np.sum(comparing.equations(fit), axis=0)[1:, 1:]
         matrix[np.ix_(place, place)] += learnt
         covariance = inverse_of(matrix)[np.ix_(table.place, table.place)]
         alike = table._replace(white=tables[0].white)  # each reads what any of them draws
@@ -177,8 +179,7 @@ def of_instrument(
     for fit, tables in zip(fits, every, strict=True):
         if tables is None:
             return [], []
-        learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
-        precision = learnt + np.diag(comparing.prior_of(fit)[2])
+        precision = comparing.information(fit)
         slope = []
         for table in tables:
             whole = np.zeros((len(fit.at), table.rest.shape[1]))
@@ -244,12 +245,6 @@ def _of_old_runs(hypothesis: Explanation) -> Explanation:
     return replace(hypothesis, ways=ways)
 
 
-def inverse_of(matrix: Float64) -> Float64:
-    """Return the inverse of a positive definite matrix whose unknowns have many units."""
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    return np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
-
-
 def probability_of_naming(
     settings: Sequence[Sequence[PredictedOutcome]],
     setting: Sequence[int],
@@ -312,16 +307,13 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
 @dataclass(frozen=True)
-class Undecided:
+class Undecided(ComparedRuns):
     """
     Runs that cannot be decided.
 
     Attributes
     ----------
     ship
-    seen
-    comparing, found
-        Of these runs.
     facts
         That are stated.
     candidates
@@ -329,9 +321,6 @@ class Undecided:
     """
 
     ship: Ship
-    seen: Sequence[Observation]
-    comparing: Comparing
-    found: ComparedHypotheses[Fitted]
     facts: Facts
     candidates: Sequence[Candidate]
 

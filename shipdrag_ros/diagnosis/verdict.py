@@ -58,6 +58,15 @@ _RIVALS = 40  # likeliest effects of which it is found from what size on they ar
 
 
 @dataclass(frozen=True)
+class ComparedRuns:
+    """Runs with hypotheses about them compared."""
+
+    seen: tuple[Observation, ...]
+    comparing: Comparing
+    found: ComparedHypotheses[Fitted]
+
+
+@dataclass(frozen=True)
 class Judgement(Generic[Fit]):
     """
     A verdict, and what it rests on.

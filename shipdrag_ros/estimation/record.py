@@ -202,16 +202,9 @@ def _edges(time_s: Float64, length_s: float, fine_s: float) -> Int64:
 @compiled
 def _parts(time_s: Float64, length_s: float) -> Int64:
     """Return where each part of a length begins, and the end of the last."""
-    edges = np.zeros(len(time_s) + 1, np.int64)
-    last, number = 0, 0.0
-    for i in range(len(time_s)):
-        here = np.floor((time_s[i] - time_s[0]) / length_s)
-        if here != number:
-            number = here
-            last += 1
-            edges[last] = i
-    edges[last + 1] = len(time_s)
-    return edges[: last + 2]
+    cell = np.floor((time_s - time_s[0]) / length_s)
+    inner = np.flatnonzero(cell[1:] != cell[:-1]) + 1
+    return np.concatenate((np.zeros(1, np.int64), inner, np.array([len(time_s)])))
 
 
 LEAST_STAMPS = 12  # of an input: fewer do not show its noise

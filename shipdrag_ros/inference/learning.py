@@ -385,15 +385,10 @@ def settings_at(seen: Seen, speed_m_s: float, points: Float64) -> Settings:
     return _settings(points, np.full(len(points), 1.0 / len(points)), _prior(seen, speed_m_s))
 
 
-def _points_of(prior: SizePrior) -> Float64:
+def _of_prior(prior: SizePrior) -> NoisePosterior:
     points = spread_points(len(prior.which))[: 1 + KEPT]
     z = np.zeros((len(points), SIZE))
     z[:, prior.which] = points
-    return z
-
-
-def _of_prior(prior: SizePrior) -> NoisePosterior:
-    z = _points_of(prior)
     return NoisePosterior(_settings(z, np.full(len(z), 1.0 / len(z)), prior), False)
 
 

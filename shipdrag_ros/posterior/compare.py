@@ -28,7 +28,13 @@ from shipdrag_ros.inference.decision import (
 from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import SizePosterior
-from shipdrag_ros.inference.linear import Families, products_of, solve, whitened_products
+from shipdrag_ros.inference.linear import (
+    Families,
+    products_of,
+    solve,
+    solve_scaled,
+    whitened_products,
+)
 from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameter import Shape
@@ -333,10 +339,15 @@ class Comparing:
             found.append(total)
         return found
 
+    def information(self, fit: Fitted) -> Float64:
+        """Return the inverse covariance (p, p) of the unknowns, under usual noise."""
+        shown: Float64 = np.sum(self.equations(fit), axis=0)[1:, 1:]
+        return shown + np.diag(self.prior_of(fit)[2])
+
     def prior_of(self, fit: Fitted) -> tuple[int, Float64, Float64]:
         """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
         families = self.runs.priors(fit.hypothesis, fit.at)
-        total = np.asarray(sum(self.equations(fit)), np.float64)
+        total = np.sum(self.equations(fit), axis=0)
         logs, _, _ = solve(total[None], families.mean, families.precision, 0, 0)
         best = int(np.argmax(logs[0] + families.log_chance))
         return best, families.mean[best], families.precision[best]
@@ -532,10 +543,7 @@ class Comparing:
         widest = int(np.argmin(np.log(precision).sum(axis=1)))
         matrix = total[1 : 1 + p, 1 : 1 + p] + np.diag(precision[widest])
         right = total[1 : 1 + p, 0] + precision[widest] * mean[widest]
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        scaled = matrix * np.outer(scale, scale)
-        both = np.column_stack([right, total[1 : 1 + p, 1 + p :]]) * scale[:, None]
-        solved = np.linalg.solve(scaled, both) * scale[:, None]
+        solved = solve_scaled(matrix, np.column_stack([right, total[1 : 1 + p, 1 + p :]]))
         cross = total[1 + p :, 1 : 1 + p]
         score: Float64 = total[1 + p :, 0] - cross @ solved[:, 0]
         return score, total[1 + p :, 1 + p :] - cross @ solved[:, 1:]
