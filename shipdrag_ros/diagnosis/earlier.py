@@ -39,7 +39,7 @@ from shipdrag_ros.fields import (
     show,
     whole_number,
 )
-from shipdrag_ros.inference.decision import UNKNOWN, marginals
+from shipdrag_ros.inference.decision import UNKNOWN, marginals, mixture
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
@@ -559,16 +559,12 @@ class Carried:
         """Return priors of sizes about those found, wider by the time that has passed."""
         lasted = (self.now_ns - source.diagnosis.last_ns) * 1e-9 / effect.lasts_s
         holding = [each for each in source.diagnosis.candidates if effect.name in each.effects]
-        total = math.fsum(each.probability for each in holding)
         sizes_now = []
         for quantity in effect.parameters_of(self.ship):
             sizes = [each.effects[effect.name][quantity.name] for each in holding]
-            shares = [each.probability / total for each in holding]
-            mean = math.fsum(p * size.value for p, size in zip(shares, sizes))
-            variance = math.fsum(
-                p * (_sd(size) ** 2 + (size.value - mean) ** 2) for p, size in zip(shares, sizes)
-            )
-            sd = math.hypot(math.sqrt(variance / _HALF), mean * (priors.EARLIER_SIZE.sd + lasted))
+            shares = [each.probability for each in holding]
+            mean, found = mixture((p, size.value, _sd(size)) for p, size in zip(shares, sizes))
+            sd = math.hypot(found / _HALF**0.5, mean * (priors.EARLIER_SIZE.sd + lasted))
             sizes_now.append(_about(quantity.prior, mean, sd))
         return tuple(sizes_now) if all(each.second > 0.0 for each in sizes_now) else ()
 

@@ -140,15 +140,13 @@ def sized(fit: WeighedFit, probability: float) -> tuple[EffectEstimate, ...]:
 
 def _sizes(fit: WeighedFit) -> list[tuple[EffectWay, dict[str, Parameter]]]:
     """Return the parameters of each way."""
-    found, place = [], 0
+    found = []
     assert fit.z is not None
     assert fit.sd is not None
-    for way in fit.hypothesis.ways:
+    for way, own in fit.hypothesis.placed:
         values = {name: Parameter(value, 0.0) for name, value in way.fixed}
-        for i, q in enumerate(way.unknowns, place):
-            z, sd = float(fit.z[i]), float(fit.sd[i])
+        for q, z, sd in zip(way.unknowns, fit.z[own].tolist(), fit.sd[own].tolist()):
             values[q.name] = Parameter(q.prior.at(z), abs(q.prior.slope(z)) * sd)
-        place += len(way.unknowns)
         found.append((way, {q.name: values[q.name] for q in way.effect.parameters}))
     return found
 
@@ -443,7 +441,7 @@ class _Lines:
         """Keep what a hypothesis leaves open, but the size that is tried; standard normal."""
         comparing, runs = self.comparing, self.comparing.runs
         at = comparing.widened(comparing.nothing, hypothesis)
-        first = runs.size + len(comparing.base.unknowns)
+        first = comparing.first
         if not hypothesis.smooth:
             tried = hypothesis.ways[-1].tried()
             at[first : first + len(tried)] = tried

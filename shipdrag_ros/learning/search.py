@@ -198,7 +198,7 @@ class _LearningCase(ComparedRuns):
     def fitted_ways(self) -> dict[str, list[EffectWay]]:
         """Return the ways of each form, begun where they were fitted."""
         found: dict[str, list[EffectWay]] = {}
-        first = self.comparing.runs.size + len(self.comparing.base.unknowns)
+        first = self.comparing.first
         for fit in self.found.fitted:
             if self.is_form(fit.names):
                 way = fit.hypothesis.ways[-1]

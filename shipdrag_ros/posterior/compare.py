@@ -226,14 +226,12 @@ class ComparedHypotheses(Generic[Fit]):
         """
         found = []
         for names, fit in self.best.items():
-            place = 0
-            for way in fit.hypothesis.ways:
+            for way, own in fit.hypothesis.placed:
                 mine = way.effect.name == name and not way.stated and names != UNKNOWN
                 if mine and fit.z is not None and fit.sd is not None:
                     weight, prior = self.probability[names], way.unknowns[0].prior
-                    z, sd = float(fit.z[place]), float(fit.sd[place])
+                    z, sd = float(fit.z[own.start]), float(fit.sd[own.start])
                     found.append(SizePosterior(weight, z, sd, prior, way.power))
-                place += len(way.unknowns)
         # given that it is there: how improbable that is does not matter
         total = sum(each.weight for each in found)
         return found if total > 0.0 else [each._replace(weight=1.0) for each in found]
@@ -284,6 +282,11 @@ class Comparing:
         }
         for way in kept:
             self.ways[way.effect.name].append(way)
+
+    @property
+    def first(self) -> int:
+        """Place of the first unknown of what may be missing."""
+        return self.runs.size + len(self.base.unknowns)
 
     def compare(self) -> ComparedHypotheses[Fitted]:
         """
@@ -723,9 +726,8 @@ class Comparing:
         top = max(fit.log_weight for fit in fits)
         names = [each for each in found.probability if each not in (NONE, UNKNOWN)][:_PAIRED]
         # as each was found alone, and as it is looked for at first
-        first = self.runs.size + len(self.base.unknowns)
         starts = [
-            replace(way, start=tuple(fit.at[first : first + len(way.start)].tolist()))
+            replace(way, start=tuple(fit.at[self.first : self.first + len(way.start)].tolist()))
             for fit in fits
             if len(fit.hypothesis.names) == 1 and not fit.hypothesis.smooth
             for way in fit.hypothesis.ways[-1:]
@@ -763,11 +765,8 @@ class Comparing:
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
             own[0] = replace(own[0], log_odds=way.log_odds + math.log(odds))
             hypothesis = Explanation((*stated, *own))
-            at = self.widened(self.nothing, hypothesis)
-            first = self.runs.size + len(self.base.unknowns)
-            q = len(way.unknowns)
-            for j in range(count):
-                at[first + j * q : first + (j + 1) * q] = alike.at[first : first + q]
+            at, first, q = self.widened(self.nothing, hypothesis), self.first, len(way.unknowns)
+            at[first : first + count * q] = np.tile(alike.at[first : first + q], count)
             found.append(Fitted(hypothesis, at))
         return found
 
@@ -787,22 +786,19 @@ class Comparing:
 
     def _again(self, fits: list[Fitted]) -> None:
         """Fit single effects from where likely larger hypotheses have them."""
-        first = self.runs.size + len(self.base.unknowns)
         top = max(fit.log_weight for fit in fits)
         alone = self._alone(fits)
         found = []
         for fit in fits:
-            ways = fit.hypothesis.ways[len(self.stated) :]
-            if len(ways) < 2 or fit.log_weight < top - _PAIR_NATS:
+            placed = fit.hypothesis.placed[len(self.stated) :]
+            if len(placed) < 2 or fit.log_weight < top - _PAIR_NATS:
                 continue
-            place = first
-            for way in ways:
-                own = slice(place, place + len(way.unknowns))
-                place = own.stop
+            z = fit.at[self.runs.size :]
+            for way, own in placed:
                 i = alone.get(way.mode, alone.get(replace(way, run=None).mode))
                 if i is not None:
                     single = fits[i].hypothesis
-                    at = np.concatenate([fit.at[:first], fit.at[own]])
+                    at = np.concatenate([fit.at[: self.first], z[own]])
                     beyond = np.zeros(self.runs.width(single) - len(at))
                     found.append(Fitted(single, np.concatenate([at, beyond])))
         self._keep_better(fits, found)
