@@ -36,7 +36,7 @@ from shipdrag_ros.inference.decision import (
     UNKNOWN,
     Names,
     Verdict,
-    WeighedHypothesis,
+    Weighed,
     decide,
     names_one,
     probabilities,
@@ -248,7 +248,7 @@ def _of_old_runs(hypothesis: Explanation) -> Explanation:
 def probability_of_naming(
     settings: Sequence[Sequence[PredictedOutcome]],
     setting: Sequence[int],
-    rivals: Sequence[WeighedHypothesis],
+    rivals: Sequence[Weighed],
     *,
     inseparable: Sequence[frozenset[str]],
 ) -> float:
@@ -273,7 +273,7 @@ def probability_of_naming(
         Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
-    names, probability = [rival.names for rival in rivals], probabilities(rivals)
+    names, probability = [each for each, _ in rivals], probabilities(rivals)
     share = np.cumsum([0.0, *(probability[each] for each in names)])
     counts = np.diff(np.round(_DRAWS * share).astype(int))
     drawn = [
@@ -283,8 +283,8 @@ def probability_of_naming(
     for way in {way for way, _ in drawn}:
         seen = np.concatenate([each for own, each in drawn if own == way])
         after = [
-            rival.log_evidence + rival.log_odds + one.log_density(seen)
-            for rival, one in zip(rivals, settings[way], strict=True)
+            log_weight + one.log_density(seen)
+            for (_, log_weight), one in zip(rivals, settings[way], strict=True)
         ]
         named += int(names_one(names, softmax(after, axis=0), inseparable).sum())
     return named / int(counts.sum())
@@ -361,8 +361,7 @@ def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
     what may be the truth; None where it is not simulated.
     """
     rivals = [
-        WeighedHypothesis(names, math.log(max(case.found.probability[names], 1e-300)), 0.0)
-        for names in case.rivals
+        (names, math.log(max(case.found.probability[names], 1e-300))) for names in case.rivals
     ]
     found: list[Advice] = []
     tried = (*_RUNS, *_INSTRUMENTS)

@@ -23,7 +23,6 @@ from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    WeighedHypothesis,
 )
 from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
@@ -202,10 +201,7 @@ class ComparedHypotheses(Generic[Fit]):
     @cached_property
     def probability(self) -> dict[Names, float]:
         """Of each set of names, most probable first; a `DiagnosisError` where none comes near."""
-        weighed = [
-            WeighedHypothesis(each.names, each.log_evidence, each.hypothesis.log_odds)
-            for each in self.fitted
-        ]
+        weighed = [(each.names, each.log_weight) for each in self.fitted]
         try:
             return decision.probabilities(weighed)
         except ValueError as error:
