@@ -28,6 +28,7 @@ from shipdrag_ros.inference.learning import learn, of_steady
 from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows, bin_means
 from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.law import stated_r
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
@@ -109,10 +110,8 @@ def whitener_of(
 def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     """Return the speed (n,) some time after the stop, by her baseline in calm deep water."""
     speed = speed_m_s * np.geomspace(1.0, _SLOWEST, _SPEEDS)
-    stated = np.clip(speed, *ship.baseline_range_m_s)
-    # beyond what the baseline states, as its square
-    r = ship.resistance_n(stated) / ship.mass_kg * (speed / stated) ** 2
-    glided_s = cumulative_trapezoid((1.0 + ship.n_r(stated)) / r, -speed, initial=0.0)
+    inertia = 1.0 + ship.n_r(np.clip(speed, *ship.baseline_range_m_s))
+    glided_s = cumulative_trapezoid(inertia / stated_r(ship, speed), -speed, initial=0.0)
     return np.interp(after_s, glided_s, speed)
 
 
