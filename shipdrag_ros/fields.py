@@ -11,6 +11,7 @@ pipe, device or endless file can hang or fill the reader.
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import reprlib
 import stat
@@ -265,14 +266,15 @@ def section(cls: type[Any], *, required: Collection[str] = ()) -> Kind:
     return Kind(read, expectation)
 
 
-def list_of(kind: Kind, *, minimum: int = 0) -> Kind:
+def list_of(kind: Kind, *, minimum: int = 0, maximum: float = math.inf) -> Kind:
     """
     Expect a list of one kind.
     """
-    expectation = f'a list, each with {kind.expectation}'
+    most = f' of at most {maximum}' if maximum < math.inf else ''
+    expectation = f'a list{most}, each with {kind.expectation}'
 
     def read(value: object, path: str, problems: Problems) -> tuple[Any, ...] | _Invalid:
-        if not isinstance(value, list) or len(value) < minimum:
+        if not isinstance(value, list) or not minimum <= len(value) <= maximum:
             problems.append(f'{path}: {show(value)}, expected {expectation}')
             return INVALID
         items = tuple(kind.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value))

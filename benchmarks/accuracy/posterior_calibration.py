@@ -19,10 +19,9 @@ import numpy as np
 from benchmarks._asked import asked
 from benchmarks._tables import along
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.inference.learning import settings_at
+from shipdrag_ros.inference.learning import Seen, settings_at
 from shipdrag_ros.inference.noise import SIZE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
-from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.posterior.laplace import infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
 from shipdrag_ros.posterior.motion import damping_of, predict, shapes_at

@@ -23,11 +23,11 @@ from itertools import combinations
 import numpy as np
 from scipy.special import softmax
 
-from shipdrag_ros.diagnosis.context import Context
+from shipdrag_ros.diagnosis.context import Context, Measured
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
+from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
@@ -36,14 +36,15 @@ from shipdrag_ros.inference.decision import (
     UNKNOWN,
     Names,
     Verdict,
-    WeighedHypothesis,
+    Weighed,
     decide,
     names_one,
     probabilities,
 )
+from shipdrag_ros.inference.linear import inverse_of
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
@@ -142,7 +143,7 @@ def of_another_run(
     for fit, hypothesis, begun, place, table in zip(fits, hypotheses, at, places, tables):
         family = comparing.prior_of(fit)[0]
         matrix = np.diag(runs.priors(hypothesis, begun).precision[family])
-        learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
+        learnt = np.sum(comparing.equations(fit), axis=0)[1:, 1:]
         matrix[np.ix_(place, place)] += learnt
         covariance = inverse_of(matrix)[np.ix_(table.place, table.place)]
         alike = table._replace(white=tables[0].white)  # each reads what any of them draws
@@ -178,8 +179,7 @@ def of_instrument(
     for fit, tables in zip(fits, every, strict=True):
         if tables is None:
             return [], []
-        learnt = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:]
-        precision = learnt + np.diag(comparing.prior_of(fit)[2])
+        precision = comparing.information(fit)
         slope = []
         for table in tables:
             whole = np.zeros((len(fit.at), table.rest.shape[1]))
@@ -245,16 +245,10 @@ def _of_old_runs(hypothesis: Explanation) -> Explanation:
     return replace(hypothesis, ways=ways)
 
 
-def inverse_of(matrix: Float64) -> Float64:
-    """Return the inverse of a positive definite matrix whose unknowns have many units."""
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    return np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
-
-
 def probability_of_naming(
     settings: Sequence[Sequence[PredictedOutcome]],
     setting: Sequence[int],
-    rivals: Sequence[WeighedHypothesis],
+    rivals: Sequence[Weighed],
     *,
     inseparable: Sequence[frozenset[str]],
 ) -> float:
@@ -279,7 +273,7 @@ def probability_of_naming(
         Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
-    names, probability = [rival.names for rival in rivals], probabilities(rivals)
+    names, probability = [each for each, _ in rivals], probabilities(rivals)
     share = np.cumsum([0.0, *(probability[each] for each in names)])
     counts = np.diff(np.round(_DRAWS * share).astype(int))
     drawn = [
@@ -289,8 +283,8 @@ def probability_of_naming(
     for way in {way for way, _ in drawn}:
         seen = np.concatenate([each for own, each in drawn if own == way])
         after = [
-            rival.log_evidence + rival.log_odds + one.log_density(seen)
-            for rival, one in zip(rivals, settings[way], strict=True)
+            log_weight + one.log_density(seen)
+            for (_, log_weight), one in zip(rivals, settings[way], strict=True)
         ]
         named += int(names_one(names, softmax(after, axis=0), inseparable).sum())
     return named / int(counts.sum())
@@ -313,16 +307,13 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
 @dataclass(frozen=True)
-class Undecided:
+class Undecided(ComparedRuns):
     """
     Runs that cannot be decided.
 
     Attributes
     ----------
     ship
-    seen
-    comparing, found
-        Of these runs.
     facts
         That are stated.
     candidates
@@ -330,9 +321,6 @@ class Undecided:
     """
 
     ship: Ship
-    seen: Sequence[Observation]
-    comparing: Comparing
-    found: ComparedHypotheses[Fitted]
     facts: Facts
     candidates: Sequence[Candidate]
 
@@ -373,8 +361,7 @@ def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
     what may be the truth; None where it is not simulated.
     """
     rivals = [
-        WeighedHypothesis(names, math.log(max(case.found.probability[names], 1e-300)), 0.0)
-        for names in case.rivals
+        (names, math.log(max(case.found.probability[names], 1e-300))) for names in case.rivals
     ]
     found: list[Advice] = []
     tried = (*_RUNS, *_INSTRUMENTS)

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What is measured besides the motion: wind, depth, shaft, heading.
+What is measured besides the motion along the heading: places to port, wind, depth, shaft, heading.
 
 It strikes hypotheses out, or makes them sure: an anemometer that feels no wind
 speaks against a wind whatever the ship does.
+
+The noise of places to port is that of the steady record before the stop, colour included: what a
+coastdown leaves over a fit would hold the very effect that is sought. Beside it stands
+what a ship wanders by as she glides, which no steady record shows.
 """
 
 from __future__ import annotations
@@ -15,18 +19,141 @@ from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import block_diag
 
-from shipdrag_ros.diagnosis.measured import yaw_wander
 from shipdrag_ros.estimation.run_down import TURNS
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.rows import bin_means
+from shipdrag_ros.inference.learning import learn, of_steady
+from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
+from shipdrag_ros.inference.rows import Rows, bin_means
 from shipdrag_ros.posterior import priors
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.posterior.law import stated_r
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
 from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.surge import turning
+
+_SLOWEST = 0.02  # of the speed at the stop, that a glide is followed to
+_SPEEDS = 200
+
+
+@dataclass(frozen=True)
+class Measured:
+    """
+    Rows along one direction, in ascending time.
+
+    Attributes
+    ----------
+    at : (n,)
+        Places of the rows in the times of the observation.
+    rows
+        `POSITION` rows are distances along the direction [m].
+    variance : (n,)
+        Of the white noise of each.
+    """
+
+    at: Int64
+    rows: Rows
+    variance: Float64
+
+    @classmethod
+    def of(cls, rows: Rows, variance: Float64, times: Float64) -> Measured:
+        """
+        Find rows among the times of all rows of the observation, (m,), ascending [s].
+        """
+        return cls(np.searchsorted(times, rows.time_s), rows, variance)
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+def whitener_of(
+    found: Measured, ship: Ship, speed_m_s: float, lead_in_s: float, margin_s: float
+) -> Float64:
+    """
+    Return the inverse Cholesky factor (n, n) of the noise of rows, by that of their steady part.
+
+    Parameters
+    ----------
+    found
+    ship
+    speed_m_s
+        In the lead-in, roughly.
+    lead_in_s
+        Length of the steady part, the stop at its end.
+    margin_s
+        Before the stop, that is not learnt from.
+    """
+    rows, time = found.rows, found.rows.time_s
+    steady = time < lead_in_s - margin_s
+    damping, inertia = damping_of(ship, np.array([speed_m_s]))
+    seen = of_steady(
+        Rows(time[steady], rows.kind[steady], rows.value[steady]),
+        found.variance[steady],
+        float(damping[0]),
+        float(inertia[0]),
+    )
+    # the engine damps the steady record; behind the stop the hull does
+    learnt = learn(seen, speed_m_s).typical
+    speed = _slowed_m_s(ship, speed_m_s, time - lead_in_s)
+    whitener = np.eye(len(time))
+    white = Noise(found.variance, WHITE, *damping_of(ship, speed))
+    whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
+    shaken = np.linalg.inv(whitener.T)
+    sailed = np.tril(np.broadcast_to(speed * np.diff(time, prepend=time[0]), shaken.shape))
+    wandered = sailed @ yaw_wander(time) @ sailed.T
+    return np.linalg.inv(np.linalg.cholesky(shaken @ shaken.T + wandered))
+
+
+def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
+    """Return the speed (n,) some time after the stop, by her baseline in calm deep water."""
+    speed = speed_m_s * np.geomspace(1.0, _SLOWEST, _SPEEDS)
+    inertia = 1.0 + ship.n_r(np.clip(speed, *ship.baseline_range_m_s))
+    glided_s = cumulative_trapezoid(inertia / stated_r(ship, speed), -speed, initial=0.0)
+    return np.interp(after_s, glided_s, speed)
+
+
+def yaw_wander(time_s: Float64) -> Float64:
+    """
+    Return the covariance (n, n) of what a heading, and the course with it, wanders by.
+
+    A steady record shows it while she is steered with way on, not as she glides.
+
+    Parameters
+    ----------
+    time_s : (n,)
+    """
+    apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
+    return priors.YAW_WANDERS.sd**2 * np.exp(-apart)
+
+
+def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
+    """
+    Return how a ship's speed answers a small force.
+
+    Parameters
+    ----------
+    ship
+        With a baseline.
+    speed_m_s : (n,)
+        Through water.
+
+    Returns
+    -------
+    damping_1_s, inertia : (n,)
+        dr/dv / (1 + n_r) and 1 + n_r of the baseline.
+    """
+    low, high = ship.baseline_range_m_s
+    speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
+    step = 1e-3 * speed
+    above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
+    rise = ship.resistance_n(above) - ship.resistance_n(below)
+    inertia = 1.0 + ship.n_r(speed)
+    damping = np.maximum(rise / (above - below), 0.0) / (ship.mass_kg * inertia)
+    return np.maximum(damping, 1e-6), inertia
+
 
 _BIN_S = 60.0
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin

@@ -21,6 +21,7 @@ from shipdrag_ros.diagnosis.result import (
     SeenRun,
 )
 from shipdrag_ros.diagnosis.verdict import (
+    ComparedRuns,
     asked,
     judge,
     limits_of,
@@ -33,7 +34,7 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.compare import Comparing
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
@@ -161,7 +162,7 @@ def _answer(
     never = inseparable(found.effects)
     judged = judge(found, never)
     verdict = judged.decision.verdict
-    undecided = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
+    undecided = Undecided(seen, comparing, found, ship, case.facts, judged.candidates)
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
@@ -226,15 +227,6 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
             'the ship file has no baseline: the runs are compared with all hulls of her length '
             'and volume; what looks like fouling, a propeller or a cable may be the hull'
         )
-
-
-@dataclass(frozen=True)
-class ComparedRuns:
-    """Runs with hypotheses about them compared."""
-
-    seen: tuple[Observation, ...]
-    comparing: Comparing
-    found: ComparedHypotheses[Fitted]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass
+from functools import cached_property, partial
 from os import PathLike
 from typing import Any, NoReturn
 
@@ -26,8 +26,20 @@ from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.result import CarriedEffect, DiagnosisResult, SeenRun, WeighedEarlier
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import DiagnosisError, EarlierError, SimulationError
-from shipdrag_ros.fields import read_small_text
-from shipdrag_ros.inference.decision import UNKNOWN, marginals
+from shipdrag_ros.fields import (
+    INVALID,
+    Key,
+    Kind,
+    Problems,
+    flag,
+    list_of,
+    number,
+    read_keys,
+    read_small_text,
+    show,
+    whole_number,
+)
+from shipdrag_ros.inference.decision import UNKNOWN, marginals, mixture
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
@@ -248,129 +260,128 @@ def _refuse(word: str) -> NoReturn:
     raise ValueError(f'{word} is no number')
 
 
+def _object(**kinds: Kind) -> Kind:
+    """Expect names with values; those of another version are passed over."""
+    keys = {name: Key(kind, 'of the result', MISSING) for name, kind in kinds.items()}
+    expectation = 'names with values'
+
+    def read(value: object, path: str, problems: Problems) -> Any:
+        if not isinstance(value, dict):
+            problems.append(f'{path or "the document"}: {show(value)}, expected {expectation}')
+            return INVALID
+        before = len(problems)
+        given = {name: value[name] for name in keys if name in value}
+        found = read_keys(keys, given, path, problems)
+        return INVALID if len(problems) > before else found
+
+    return Kind(read, expectation)
+
+
+def _or_null(kind: Kind) -> Kind:
+    def read(value: object, path: str, problems: Problems) -> Any:
+        return None if value is None else kind.read(value, path, problems)
+
+    return Kind(read, kind.expectation)
+
+
+def _read_line(value: object, path: str, problems: Problems) -> Any:
+    if isinstance(value, str) and value.isprintable():
+        return value
+    problems.append(f'{path}: {show(value)}, expected a line of text')
+    return INVALID
+
+
+def _read_name(value: object, path: str, problems: Problems) -> Any:
+    try:
+        return find(str(value)).name
+    except SimulationError:
+        problems.append(f'{path}: {show(value)} is no effect that this version knows')
+        return INVALID
+
+
+def _read_effect(value: object, path: str, problems: Problems) -> Any:
+    """Return name and sizes; what is of its day says nothing today, and may lack them."""
+    found = _object(name=_NAME).read(value, path, problems)
+    if found is INVALID:
+        return INVALID
+    effect = find(found['name'])
+    sizes = {q.name: _SIZE for q in effect.parameters} if effect.lasts_s > 0.0 else {}
+    given = _object(parameters=_object(**sizes)).read(value, path, problems)
+    return INVALID if given is INVALID else (effect.name, given['parameters'])
+
+
+_many = partial(list_of, maximum=_MOST)
+_LINE, _NAME = Kind(_read_line, 'a line of text'), Kind(_read_name, 'the name of an effect')
+_SIZE = _object(value=number(-1e12, 1e12), sd=_or_null(number(0.0, 1e12)))
+_RUNS = _many(_object(bag=_LINE, time_ns=whole_number(0, _LATEST_NS, 'ns since the epoch')))
+_CANDIDATE = _object(
+    probability=number(0.0, 1.0),
+    names=_many(_LINE),
+    effects=_many(Kind(_read_effect, 'name and parameters')),
+)
+_DOCUMENT = _object(
+    runs=_RUNS,
+    ship=_or_null(_object(name=_LINE, length_m=number(1e-3, 1e4), effects=_many(_NAME))),
+    earlier=_many(_object(runs=_RUNS, used=flag())),
+    candidates=_many(_CANDIDATE),
+)
+
+
 def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
-    whole = _mapping(document, 'the document')
-    ship = whole.get('ship')
-    length_m: float | None = None
-    stated: tuple[str, ...] = ()
-    called = ''
-    if ship is not None:
-        of_ship = _mapping(ship, 'ship')
-        called = _text(of_ship.get('name'), 'ship.name')
-        length_m = _number(of_ship.get('length_m'), 'ship.length_m', 1e-3, 1e4)
-        effects = _list(of_ship.get('effects'), 'ship.effects')
-        stated = tuple(_known(each, 'ship.effects') for each in effects)
-    runs = _runs(whole.get('runs'), 'runs')
-    if not runs:
+    problems: Problems = []
+    given = {'ship': None, **document} if isinstance(document, dict) else document
+    found = _DOCUMENT.read(given, '', problems)
+    if problems:
+        raise _Wrong(problems[0])
+    if not found['runs']:
         raise _Wrong('runs: empty, and when it was made is not known')
-    before: list[SeenRun] = []
-    for i, each in enumerate(_list(whole.get('earlier'), 'earlier')):
-        place = f'earlier[{i}]'
-        given = _mapping(each, place)
-        if given.get('used') is True:
-            before += _runs(given.get('runs'), f'{place}.runs')
-    if whole.get('question'):
+    if given.get('question'):
         raise _Wrong('question: its verdict waits for the answer; diagnose its runs again')
-    of_force = whole.get('baseline') == 'stated'
-    candidates = _candidates(whole.get('candidates'), all_sized=of_force)
+    of_force, ship = given.get('baseline') == 'stated', found['ship']
+    before = [run for each in found['earlier'] if each['used'] for run in each['runs']]
     return EarlierDiagnosis(
-        name, called, length_m, runs, tuple(before), candidates, of_force, stated
+        name,
+        ship['name'] if ship else '',
+        ship['length_m'] if ship else None,
+        _seen(found['runs']),
+        _seen(before),
+        _candidates(found['candidates'], all_sized=of_force),
+        of_force,
+        ship['effects'] if ship else (),
     )
 
 
-def _runs(value: Any, path: str) -> tuple[SeenRun, ...]:
-    found = []
-    for i, each in enumerate(_list(value, path)):
-        run = _mapping(each, f'{path}[{i}]')
-        time_ns = run.get('time_ns')
-        if type(time_ns) is not int or not 0 <= time_ns <= _LATEST_NS:
-            raise _Wrong(f'{path}[{i}].time_ns: {_shown(time_ns)}, expected ns since the epoch')
-        found.append(SeenRun(_text(run.get('bag'), f'{path}[{i}].bag'), time_ns))
-    return tuple(found)
+def _seen(runs: Iterable[Mapping[str, Any]]) -> tuple[SeenRun, ...]:
+    return tuple(SeenRun(run['bag'], run['time_ns']) for run in runs)
 
 
-def _candidates(value: Any, *, all_sized: bool) -> tuple[EarlierCandidate, ...]:
+def _candidates(
+    listed: Sequence[Mapping[str, Any]], *, all_sized: bool
+) -> tuple[EarlierCandidate, ...]:
     found = []
-    listed = _list(value, 'candidates')
     for i, each in enumerate(listed):
-        place = f'candidates[{i}]'
-        candidate = _mapping(each, place)
-        probability = _number(candidate.get('probability'), f'{place}.probability', 0.0, 1.0)
-        names = _list(candidate.get('names'), f'{place}.names')
-        sizes = _sizes(candidate.get('effects'), f'{place}.effects')
-        if names == [_UNKNOWN]:
+        names = each['names']
+        sizes = {
+            name: {
+                # null: it could not be found
+                key: Parameter(size['value'], math.nan if size['sd'] is None else size['sd'])
+                for key, size in parameters.items()
+            }
+            for name, parameters in each['effects']
+        }
+        if names == (_UNKNOWN,):
             continue
-        named = set() if names == [_NOTHING] else set(map(str, names))
+        named = set() if names == (_NOTHING,) else set(names)
         # without a baseline, an effect that could not be seen has no size
         if not names or ((sizes or all_sized) and named != set(sizes)):
-            raise _Wrong(f'{place}: the names are {_shown(names)}, and the effects others')
-        found.append(EarlierCandidate(probability, sizes))
+            raise _Wrong(
+                f'candidates[{i}]: the names are {show(list(names))}, and the effects others'
+            )
+        found.append(EarlierCandidate(each['probability'], sizes))
     total = math.fsum(each.probability for each in found)
     if not listed or total > 1.0 + 1e-6:
         raise _Wrong(f'candidates: {len(listed)} of probability {total:g} in all')
     return tuple(found)
-
-
-def _sizes(value: Any, path: str) -> dict[str, dict[str, Parameter]]:
-    found = {}
-    for i, each in enumerate(_list(value, path)):
-        effect = _mapping(each, f'{path}[{i}]')
-        name = _known(effect.get('name'), f'{path}[{i}].name')
-        known = find(name)
-        given = _mapping(effect.get('parameters'), f'{path}[{i}].parameters')
-        sizes = {}
-        # the size of what is of its day says nothing today, and earlier versions may lack it
-        for quantity in known.parameters if known.lasts_s > 0.0 else ():
-            place = f'{path}[{i}].parameters.{quantity.name}'
-            size = _mapping(given.get(quantity.name), place)
-            number = _number(size.get('value'), f'{place}.value', -1e12, 1e12)
-            sd = size.get('sd', 'missing')  # null: it could not be found
-            sizes[quantity.name] = Parameter(
-                number, math.nan if sd is None else _number(sd, f'{place}.sd', 0.0, 1e12)
-            )
-        found[name] = sizes
-    return found
-
-
-def _known(value: Any, path: str) -> str:
-    try:
-        return find(str(value)).name
-    except SimulationError as error:
-        raise _Wrong(f'{path}: {_shown(value)} is no effect that this version knows') from error
-
-
-def _mapping(value: Any, path: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise _Wrong(f'{path}: {_shown(value)}, expected names with values')
-    return value
-
-
-def _list(value: Any, path: str) -> list[Any]:
-    if not isinstance(value, list) or len(value) > _MOST:
-        raise _Wrong(f'{path}: {_shown(value)}, expected a list of at most {_MOST}')
-    return value
-
-
-def _text(value: Any, path: str) -> str:
-    if not isinstance(value, str) or not value.isprintable():
-        raise _Wrong(f'{path}: {_shown(value)}, expected a line of text')
-    return value
-
-
-def _number(value: Any, path: str, low: float, high: float) -> float:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not low <= value <= high:
-        raise _Wrong(f'{path}: {_shown(value)}, expected a number in {low:g}..{high:g}')
-    return float(value)
-
-
-def _shown(value: Any) -> str:
-    if value is None:
-        return 'missing'
-    if isinstance(value, dict | list):
-        return f'{type(value).__name__} of {len(value)}'
-    text = repr(value)
-    return text if len(text) <= 60 else f'{text[:57]}...'
 
 
 _HALF = priors.EARLIER_COUNTS.mean
@@ -548,16 +559,12 @@ class Carried:
         """Return priors of sizes about those found, wider by the time that has passed."""
         lasted = (self.now_ns - source.diagnosis.last_ns) * 1e-9 / effect.lasts_s
         holding = [each for each in source.diagnosis.candidates if effect.name in each.effects]
-        total = math.fsum(each.probability for each in holding)
         sizes_now = []
         for quantity in effect.parameters_of(self.ship):
             sizes = [each.effects[effect.name][quantity.name] for each in holding]
-            shares = [each.probability / total for each in holding]
-            mean = math.fsum(p * size.value for p, size in zip(shares, sizes))
-            variance = math.fsum(
-                p * (_sd(size) ** 2 + (size.value - mean) ** 2) for p, size in zip(shares, sizes)
-            )
-            sd = math.hypot(math.sqrt(variance / _HALF), mean * (priors.EARLIER_SIZE.sd + lasted))
+            shares = [each.probability for each in holding]
+            mean, found = mixture((p, size.value, _sd(size)) for p, size in zip(shares, sizes))
+            sd = math.hypot(found / _HALF**0.5, mean * (priors.EARLIER_SIZE.sd + lasted))
             sizes_now.append(_about(quantity.prior, mean, sd))
         return tuple(sizes_now) if all(each.second > 0.0 for each in sizes_now) else ()
 

@@ -86,7 +86,7 @@ class Facts:
             0 without facts.
         """
         return math.fsum(
-            math.log(_likelihood(*self._so(each, hypothesis))) for each in self.stated
+            math.log(_likelihood(self._so(each, hypothesis), each.fact)) for each in self.stated
         )
 
     def weighed(
@@ -111,9 +111,9 @@ class Facts:
         for each in self.stated:
             shares = {}
             for names, probability in posterior.probability.items():
-                so, fact = self._so(each, posterior.best[names].hypothesis)
-                wrong = (1.0 - so) * _stated_wrongly(fact)
-                shares[names] = probability * wrong / _likelihood(so, fact)
+                so = self._so(each, posterior.best[names].hypothesis)
+                wrong = (1.0 - so) * _stated_wrongly(each.fact)
+                shares[names] = probability * wrong / _likelihood(so, each.fact)
             against = max(shares, key=lambda names: shares[names])
             found.append(
                 WeighedFact(
@@ -153,7 +153,7 @@ class Facts:
                 continue
             so = [
                 {
-                    names: self._so(StatedFact(Fact(name, value), None, 0), one.hypothesis)[0]
+                    names: self._so(StatedFact(Fact(name, value), None, 0), one.hypothesis)
                     for names, one in posterior.best.items()
                     if names in posterior.probability
                 }
@@ -164,13 +164,13 @@ class Facts:
             found[name] = math.fsum(_decided(posterior.probability, each, decides) for each in so)
         return found
 
-    def _so(self, stated: StatedFact, hypothesis: Missing) -> tuple[float, Fact]:
-        """Return how probable it is that a fact is so under a hypothesis, and the fact."""
+    def _so(self, stated: StatedFact, hypothesis: Missing) -> float:
+        """Return how probable it is that a fact is so under a hypothesis."""
         name = stated.fact.name
         effects = [effect for effect in hypothesis.effects_in(stated.run) if name in effect.facts]
         if effects:
-            return min(_goes_with(effect, stated) for effect in effects), stated.fact
-        return self._usual(stated.fact), stated.fact
+            return min(_goes_with(effect, stated) for effect in effects)
+        return self._usual(stated.fact)
 
     def _usual(self, fact: Fact) -> float:
         """Return how probable a fact is where no effect speaks about it."""

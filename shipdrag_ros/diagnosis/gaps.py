@@ -11,6 +11,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import FORCE, Compared, Gap, RunTrace, Where
 from shipdrag_ros.inference.decision import UNKNOWN
+from shipdrag_ros.inference.linear import solve_scaled
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted, RunResidual
 from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, place_of
@@ -83,7 +84,7 @@ def held_out(seen: Sequence[Observation], comparing: Comparing, fit: Fitted) -> 
         return None
     _, mean, precision = comparing.prior_of(fit)
     parts = comparing.equations(fit)
-    everything = np.asarray(sum(parts), np.float64)
+    everything = np.sum(parts, axis=0)
     least = _least(everything, mean, precision)[0]
     chi2, residuals, rows = 0.0, [], 0
     for j in told:
@@ -106,8 +107,7 @@ def _least(products: Float64, mean: Float64, precision: Float64) -> tuple[float,
     """Return the least -2 ln of the posterior density, and where it is (p,)."""
     matrix = products[1:, 1:] + np.diag(precision)
     right = products[1:, 0] + precision * mean
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    at = scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * right)
+    at = solve_scaled(matrix, right)
     return float(products[0, 0] + precision @ mean**2 - right @ at), at
 
 

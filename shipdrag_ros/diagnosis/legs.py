@@ -150,8 +150,8 @@ class Legs:
         left.update(why for _, why in stretches if isinstance(why, Left))
         usual = float(np.median([leg.ground_m_s for _, leg in found])) if found else 0.0
         slowest = _STOPPED * usual
-        record = [j for j, leg in found if min(leg.ground_m_s, leg.log_m_s) > slowest]
-        moving = [leg for _, leg in found if min(leg.ground_m_s, leg.log_m_s) > slowest]
+        kept = [(j, leg) for j, leg in found if min(leg.ground_m_s, leg.log_m_s) > slowest]
+        moving = [leg for _, leg in kept]
         left[Left.STOP] += len(found) - len(moving)
         if len(moving) < LEAST_LEGS:
             names = ', '.join(repr(record.name) for record in records)
@@ -161,18 +161,17 @@ class Legs:
                 'the way over ground: give a longer record'
             )
         known = {leg.direction for leg in moving}
+        columns: dict[str, Any] = {
+            name: np.array([getattr(leg, name) for leg in moving]) for name in _Leg._fields[:-1]
+        }
         return cls(
-            np.array(record),
-            np.array([leg.time_s for leg in moving]),
-            np.array([leg.log_m_s for leg in moving]),
-            np.array([leg.ground_m_s for leg in moving]),
-            np.array([leg.acceleration_m_s2 for leg in moving]),
-            np.array([leg.direction_rad for leg in moving]),
-            known.pop() if len(known) == 1 else Direction.HEADING,
-            max(one.length_s for one in cut),
-            all(one.geodetic for one in cut),
-            {why: count for why, count in left.items() if count},
-            tuple(note for one in cut for note in one.notes),
+            record=np.array([j for j, _ in kept]),
+            **columns,
+            direction=known.pop() if len(known) == 1 else Direction.HEADING,
+            length_s=max(one.length_s for one in cut),
+            geodetic=all(one.geodetic for one in cut),
+            left_out={why: count for why, count in left.items() if count},
+            notes=tuple(note for one in cut for note in one.notes),
         )
 
     def __getitem__(self, part: Int64) -> Legs:
@@ -345,8 +344,9 @@ class _Weights(NamedTuple):
         return complex(weight @ timed.value / weight.sum())
 
 
-@dataclass(frozen=True)
-class _Leg:
+class _Leg(NamedTuple):
+    """As `Legs` has them."""
+
     time_s: float
     log_m_s: float
     ground_m_s: float

@@ -20,12 +20,10 @@ from operator import itemgetter
 import numpy as np
 from scipy.linalg import block_diag
 
-from shipdrag_ros.diagnosis.context import Context, Stop
-from shipdrag_ros.diagnosis.measured import Measured, damping_of, whitener_of
+from shipdrag_ros.diagnosis.context import Context, Measured, Stop, damping_of, whitener_of
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.record import BIN_S, RunRows
 from shipdrag_ros.estimation.run_down import RunDown
-from shipdrag_ros.estimation.steady import BIN_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Input, Rows

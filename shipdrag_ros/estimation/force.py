@@ -10,29 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from shipdrag_ros.display import force_unit, plus_minus, power_unit, ship_speed
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.result import Estimate, ForceCurve
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 
 USUAL_SHARE = 0.75  # of the speed at the stop
-
-
-class ForceCurve(Protocol):
-    """Specific resistance against speed: of one coastdown, or of several together."""
-
-    @property
-    def speed_m_s(self) -> Float64: ...
-    @property
-    def resistance_m_s2(self) -> Float64: ...
-    @property
-    def sigma_m_s2(self) -> Float64: ...
-    @property
-    def sigma_repeatable_m_s2(self) -> Float64: ...
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import force_unit, power_unit, speed_unit, track_label
-from shipdrag_ros.estimation.force import Force, ForceCurve, clean_hull
+from shipdrag_ros.estimation.force import Force, clean_hull
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve, Track
 from shipdrag_ros.estimation.words import speed_name
 from shipdrag_ros.report.drawing import (
     BLUE,

@@ -18,7 +18,7 @@ import numpy as np
 
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve
 from shipdrag_ros.samples import Float64
 
 _POINTS = 101
@@ -27,20 +27,15 @@ _LARGEST_CURRENT = 0.4  # of the lowest speed
 
 
 @dataclass(frozen=True)
-class Combined:
+class Combined(ForceCurve):
     """
-    r(v) from several coastdowns, ascending in speed.
+    r(v) from several coastdowns, inside the valid range of every run.
+
+    The mean is weighted by the repeatable variances; the repeatable sigma is widened where the
+    runs differ by more than it says.
 
     Attributes
     ----------
-    speed_m_s, froude : (m,)
-        Inside the valid range of every run.
-    resistance_m_s2 : (m,)
-        Mean weighted by the repeatable variances.
-    sigma_m_s2 : (m,)
-        Standard deviation with the error of n_r.
-    sigma_repeatable_m_s2 : (m,)
-        The same without it, widened where the runs differ by more than it says.
     scatter_m_s2 : (m,)
         Standard deviation of one run about the mean.
     runs
@@ -52,12 +47,7 @@ class Combined:
 
     __repr__ = short_repr
 
-    speed_m_s: Float64
-    resistance_m_s2: Float64
-    sigma_m_s2: Float64
-    sigma_repeatable_m_s2: Float64
     scatter_m_s2: Float64
-    froude: Float64
     runs: int
     current_m_s: float | None
     current_sigma_m_s: float | None

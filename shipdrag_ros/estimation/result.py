@@ -25,9 +25,9 @@ class FroudeMax(Enum):
 
 
 @dataclass(frozen=True)
-class ResistanceCurve:
+class ForceCurve:
     """
-    Specific resistance against speed, ascending in speed.
+    Specific resistance against speed, ascending in speed, of one coastdown or several together.
 
     Attributes
     ----------
@@ -41,8 +41,6 @@ class ResistanceCurve:
         The same without the error of n_r, which repeats from run to run.
     froude : (m,)
         speed / sqrt(g L).
-    slope, slope_sigma : (m,)
-        dr/dFr and its standard deviation [m/s^2].
     """
 
     __repr__ = short_repr
@@ -52,26 +50,33 @@ class ResistanceCurve:
     sigma_m_s2: Float64
     sigma_repeatable_m_s2: Float64
     froude: Float64
-    slope: Float64
-    slope_sigma: Float64
 
     def __len__(self) -> int:
         return len(self.speed_m_s)
+
+
+@dataclass(frozen=True)
+class ResistanceCurve(ForceCurve):
+    """
+    That of one coastdown.
+
+    Attributes
+    ----------
+    slope, slope_sigma : (m,)
+        dr/dFr and its standard deviation [m/s^2].
+    """
+
+    __repr__ = short_repr
+
+    slope: Float64
+    slope_sigma: Float64
 
     def between(self, froude_min: float, froude_max: float) -> ResistanceCurve:
         """
         Return the part with froude_min <= Fr <= froude_max.
         """
         keep = (self.froude >= froude_min) & (self.froude <= froude_max)
-        return ResistanceCurve(
-            self.speed_m_s[keep],
-            self.resistance_m_s2[keep],
-            self.sigma_m_s2[keep],
-            self.sigma_repeatable_m_s2[keep],
-            self.froude[keep],
-            self.slope[keep],
-            self.slope_sigma[keep],
-        )
+        return ResistanceCurve(**{name: each[keep] for name, each in vars(self).items()})
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.decision import mixture
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.posterior.priors import RUN_DOWN, STOP, TOLD, TOLD_CHANCE
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
@@ -367,8 +368,8 @@ def _dated(window: Window) -> tuple[int, float]:
     right = TOLD_CHANCE.mean * 3600.0 * density
     p = right / (right + 1.0 - TOLD_CHANCE.mean)
     mean, variance = off * STOP.sd**2 / of_both, STOP.sd**2 * TOLD.sd**2 / of_both
-    of_mixture = p * (variance + mean**2) + (1.0 - p) * STOP.sd**2 - (p * mean) ** 2
-    return window.start_ns + round(p * mean * SECOND_NS), math.sqrt(of_mixture)
+    later_s, sd_s = mixture(((p, mean, math.sqrt(variance)), (1.0 - p, 0.0, STOP.sd)))
+    return window.start_ns + round(later_s * SECOND_NS), sd_s
 
 
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:

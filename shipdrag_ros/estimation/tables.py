@@ -10,9 +10,9 @@ import numpy as np
 from shipdrag_ros import display
 from shipdrag_ros.display import Table, force_unit, power_unit, speed_unit, track_label
 from shipdrag_ros.estimation import words
-from shipdrag_ros.estimation.force import Force, ForceCurve
+from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 

@@ -55,6 +55,9 @@ class Series:
     def __len__(self) -> int:
         return len(self.time_ns)
 
+    def __getitem__(self, part: slice) -> Series:
+        return Series(self.time_ns[part], self.value[part], self.variance[part])
+
 
 @dataclass(frozen=True)
 class Window:
@@ -130,8 +133,8 @@ class Window:
             return found
         if name in self.further:
             return self.further[name]
-        none: Series = getattr(self, FURTHER[name])
-        return Series(none.time_ns[:0], none.value[:0], none.variance[:0])
+        first: Series = getattr(self, FURTHER[name])
+        return first[:0]
 
     def each(self, *kinds: str) -> tuple[Series, ...]:
         """
@@ -209,11 +212,7 @@ class Window:
                 int(np.searchsorted(series.time_ns, start_ns)),
                 int(np.searchsorted(series.time_ns, end_ns, side='right')),
             )
-            return Series(
-                series.time_ns[inside].copy(),
-                series.value[inside].copy(),
-                series.variance[inside].copy(),
-            )
+            return Series(*(each.copy() for each in vars(series[inside]).values()))
 
         changes: dict[str, Any] = {
             name: tuple(map(cut, found)) if isinstance(found, tuple) else cut(found)
@@ -228,8 +227,7 @@ class Window:
         """
         Leave out an input, in the record before too; the reason becomes a note.
         """
-        found = self.series(name)
-        none = Series(found.time_ns[:0], found.value[:0], found.variance[:0])
+        none = self.series(name)[:0]
         before = None if self.before is None else self.before.without(name, why)
         changes: dict[str, Any] = {name: none}
         if name in self.further:

@@ -19,6 +19,8 @@ from shipdrag_ros.samples import Float64
 
 Names = tuple[str, ...]
 """Of the effects that a hypothesis holds, sorted."""
+Weighed = tuple[Names, float]
+"""One way in which something may be missing: ln of its evidence times its prior odds."""
 
 NONE: Names = ()
 UNKNOWN: Names = ('unknown',)  # something without a name
@@ -33,26 +35,6 @@ class Verdict(StrEnum):
     NAMED = 'named'
     ONE_OF = 'one_of'
     UNKNOWN = 'unknown'
-
-
-@dataclass(frozen=True)
-class WeighedHypothesis:
-    """
-    One way in which something may be missing; ways exclude each other.
-
-    Attributes
-    ----------
-    names
-        `NONE`, `UNKNOWN`, or the effects; several hypotheses may have the same.
-    log_evidence
-        Logarithm of the marginal likelihood, less a constant of the data.
-    log_odds
-        Logarithm of the prior odds, less a constant of all hypotheses.
-    """
-
-    names: Names
-    log_evidence: float
-    log_odds: float
 
 
 @dataclass(frozen=True)
@@ -74,14 +56,15 @@ class Decision:
     candidates: tuple[tuple[Names, float], ...]
 
 
-def probabilities(hypotheses: Iterable[WeighedHypothesis]) -> dict[Names, float]:
+def probabilities(hypotheses: Iterable[Weighed]) -> dict[Names, float]:
     """
     Return the posterior probability of each set of names.
 
     Parameters
     ----------
     hypotheses
-        All that were compared; an evidence of -inf is none.
+        All that were compared, which exclude each other, less one constant; several may have the
+        same names, and an evidence of -inf is none.
 
     Returns
     -------
@@ -99,12 +82,11 @@ def probabilities(hypotheses: Iterable[WeighedHypothesis]) -> dict[Names, float]
 
     Examples
     --------
-    >>> nothing = WeighedHypothesis(NONE, -3.0, 0.0)
-    >>> fouled = WeighedHypothesis(('fouling',), 0.0, -2.0)
+    >>> nothing, fouled = (NONE, -3.0), (('fouling',), -2.0)
     >>> {names: round(p, 2) for names, p in probabilities([nothing, fouled]).items()}
     {('fouling',): 0.73, (): 0.27}
     """
-    logs = [(each.names, each.log_evidence + each.log_odds) for each in hypotheses]
+    logs = list(hypotheses)
     top = max((log for _, log in logs), default=-math.inf)
     if not math.isfinite(top):
         raise ValueError('no hypothesis has an evidence: nothing can be compared')

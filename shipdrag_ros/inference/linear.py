@@ -127,6 +127,22 @@ def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
     return x
 
 
+def solve_scaled(matrix: Float64, right: Float64) -> Float64:
+    """
+    Solve for right sides (p,) or (p, k) of a positive matrix whose unknowns have many units.
+    """
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    solved = np.linalg.solve(matrix * np.outer(scale, scale), (right.T * scale).T)
+    result: Float64 = (solved.T * scale).T
+    return result
+
+
+def inverse_of(matrix: Float64) -> Float64:
+    """Return the inverse of such a matrix."""
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    return np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
+
+
 class Families(NamedTuple):
     """
     Priors of the unknowns: means and precisions (f, p), and logarithms of probabilities (f,).

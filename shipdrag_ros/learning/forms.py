@@ -132,6 +132,7 @@ def forms(ship: Ship, span: Span) -> tuple[LearnableForm, ...]:
 
 _Declared = tuple[str, str, str, dict[str, Prior]]
 _OF_EARTH = ('heading', 'depth')
+_SIDES = ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)')  # of a speed
 
 
 def _form(
@@ -180,14 +181,13 @@ def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
         yield 'speed', 'constant' if power == 0 else 'power', _as_power(power), size
     for power in (0, 2):
         base = _as_power(power)
-        for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
-            for width in (_NARROW, _BROAD):
-                step = f'step({side}, {width * top:.3g}*sqrt(g*L))'
+        for side in _SIDES:
+            for step in _steps(side, 'sqrt(g*L)', top):
                 yield 'speed', 'step', f'{base}*{step}', turns
         hump = _hump('u', 'u_c', 'sqrt(g*L)', top)
         yield 'speed', 'hump', f'{base}*{hump}', turns | _width(top)
     yield 'speed', 'decay', f'{_as_power(0)}*exp(-u/(u_c*sqrt(g*L)))', turns
-    for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
+    for side in _SIDES:
         for power in (1, 2):
             ramp = f'(max({side}, 0*u)/({_REFERENCE:g}*sqrt(g*L)))**{power}'
             yield 'speed', 'ramp', f'{_as_power(0)}*{ramp}', turns
@@ -198,9 +198,9 @@ def _of_log(ship: Ship, span: Span) -> Iterator[_Declared]:
     top = span.top_m_s / math.sqrt(GRAVITY_M_S2 * ship.length_m)
     turns = {'A': _GAIN, 'u_c': log_normal(_TURNS_AT[0] * top, _TURNS_AT[1])}
     yield 'speed', 'power', 'A*u**2/sqrt(g*L)*4', {'A': _GAIN}
-    for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
-        for width in (_NARROW, _BROAD):
-            yield 'speed', 'step', f'A*u*step({side}, {width * top:.3g}*sqrt(g*L))', turns
+    for side in _SIDES:
+        for step in _steps(side, 'sqrt(g*L)', top):
+            yield 'speed', 'step', f'A*u*{step}', turns
         yield 'speed', 'ramp', f'A*max({side}, 0*u)', turns
     yield 'speed', 'hump', f'A*u*{_hump("u", "u_c", "sqrt(g*L)", top)}', turns | _width(top)
 
@@ -216,8 +216,7 @@ def _over_time(base: str, size: Prior, ship: Ship, span: Span) -> Iterator[_Decl
     yield 'time', 'ramp', f'{base}*min(t/({tau}), 1)', lasts
     yield 'time', 'ramp', f'{base}*max(1 - t/({tau}), 0)', lasts
     for side in (f't - {tau}', f'{tau} - t'):
-        for width in (_NARROW, _BROAD):
-            step = f'step({side}, {width * longest:.3g}*sqrt(L/g))'
+        for step in _steps(side, 'sqrt(L/g)', longest):
             yield 'time', 'step', f'{base}*{step}', lasts
     hump = _hump('t', 'tau', 'sqrt(L/g)', longest)
     yield 'time', 'hump', f'{base}*{hump}', lasts | _width(longest)
@@ -257,6 +256,12 @@ def _by_heading() -> Iterator[_Declared]:
         yield 'heading', 'periodic', _as_power(power).replace('A', both), _two(_SIZE)
     some = _as_power(2) + '*(1 + b*cos(psi) + c*sin(psi))'
     yield 'heading', 'periodic', some, {'A': _SIZE, 'b': normal(0.7), 'c': normal(0.7)}
+
+
+def _steps(side: str, unit: str, whole: float) -> Iterator[str]:
+    """Yield steps at one side of a speed or a time, sharp and not."""
+    for width in (_NARROW, _BROAD):
+        yield f'step({side}, {width * whole:.3g}*{unit})'
 
 
 def _hump(variable: str, at: str, unit: str, whole: float) -> str:

@@ -17,9 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.advice import inverse_of
 from shipdrag_ros.diagnosis.diagnose import (
-    ComparedRuns,
     effects_about,
     observed,
     of_one_day,
@@ -28,9 +26,10 @@ from shipdrag_ros.diagnosis.diagnose import (
 from shipdrag_ros.diagnosis.gaps import held_out, where
 from shipdrag_ros.diagnosis.observation import Observation, day_of, lowest_m_s, ship_runs
 from shipdrag_ros.diagnosis.result import RunSize, Where
-from shipdrag_ros.diagnosis.verdict import runs_differ
+from shipdrag_ros.diagnosis.verdict import ComparedRuns, runs_differ
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
+from shipdrag_ros.inference.linear import inverse_of
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.learning.forms import LearnableForm, Span, forms
 from shipdrag_ros.parameters import Parameters
@@ -199,7 +198,7 @@ class _LearningCase(ComparedRuns):
     def fitted_ways(self) -> dict[str, list[EffectWay]]:
         """Return the ways of each form, begun where they were fitted."""
         found: dict[str, list[EffectWay]] = {}
-        first = self.comparing.runs.size + len(self.comparing.base.unknowns)
+        first = self.comparing.first
         for fit in self.found.fitted:
             if self.is_form(fit.names):
                 way = fit.hypothesis.ways[-1]
@@ -472,10 +471,8 @@ def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:
     assert fit.sd is not None
     count = len(way.unknowns)
     z, sd = fit.z[-count:], fit.sd[-count:]
-    _, _, precision = comparing.prior_of(fit)
-    total = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:] + np.diag(precision)
     first = comparing.runs.size + len(fit.hypothesis.unknowns) - count
-    own = inverse_of(total)[first : first + count, first : first + count]
+    own = inverse_of(comparing.information(fit))[first : first + count, first : first + count]
     spread = np.sqrt(np.diag(own))
     slopes = np.array([q.prior.slope(at) for q, at in zip(way.unknowns, z)]) * sd / spread
     values = np.array([q.prior.at(at) for q, at in zip(way.unknowns, z)])

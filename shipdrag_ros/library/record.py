@@ -18,8 +18,8 @@ from shipdrag_ros.coastdown import events
 from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.display import Table, duration, speed_unit, utc
 from shipdrag_ros.errors import BagError, EstimationError
-from shipdrag_ros.estimation.force import Force, ForceCurve
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.estimation.force import Force
+from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve
 from shipdrag_ros.library.replaying import Notes, refuse_two_ships, replay_run
 from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_in_python
 from shipdrag_ros.replay import tables, words

@@ -12,8 +12,9 @@ from shipdrag_ros.bags import WindowSpan
 from shipdrag_ros.display import Table, dated
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
-from shipdrag_ros.estimation.force import Force, ForceCurve
+from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.estimation.reciprocal import Combined
+from shipdrag_ros.estimation.result import ForceCurve
 from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.record import Coastdown, Record, ShipGiven, force_columns, ship_of
 from shipdrag_ros.library.replaying import Notes, replay_run

@@ -23,15 +23,19 @@ from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    WeighedHypothesis,
 )
-from shipdrag_ros.inference.learning import learn
+from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import SizePosterior
-from shipdrag_ros.inference.linear import Families, products_of, solve, whitened_products
+from shipdrag_ros.inference.linear import (
+    Families,
+    products_of,
+    solve,
+    solve_scaled,
+    whitened_products,
+)
 from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.inference.rows import LOG
-from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
@@ -197,10 +201,7 @@ class ComparedHypotheses(Generic[Fit]):
     @cached_property
     def probability(self) -> dict[Names, float]:
         """Of each set of names, most probable first; a `DiagnosisError` where none comes near."""
-        weighed = [
-            WeighedHypothesis(each.names, each.log_evidence, each.hypothesis.log_odds)
-            for each in self.fitted
-        ]
+        weighed = [(each.names, each.log_weight) for each in self.fitted]
         try:
             return decision.probabilities(weighed)
         except ValueError as error:
@@ -221,14 +222,12 @@ class ComparedHypotheses(Generic[Fit]):
         """
         found = []
         for names, fit in self.best.items():
-            place = 0
-            for way in fit.hypothesis.ways:
+            for way, own in fit.hypothesis.placed:
                 mine = way.effect.name == name and not way.stated and names != UNKNOWN
                 if mine and fit.z is not None and fit.sd is not None:
                     weight, prior = self.probability[names], way.unknowns[0].prior
-                    z, sd = float(fit.z[place]), float(fit.sd[place])
+                    z, sd = float(fit.z[own.start]), float(fit.sd[own.start])
                     found.append(SizePosterior(weight, z, sd, prior, way.power))
-                place += len(way.unknowns)
         # given that it is there: how improbable that is does not matter
         total = sum(each.weight for each in found)
         return found if total > 0.0 else [each._replace(weight=1.0) for each in found]
@@ -279,6 +278,11 @@ class Comparing:
         }
         for way in kept:
             self.ways[way.effect.name].append(way)
+
+    @property
+    def first(self) -> int:
+        """Place of the first unknown of what may be missing."""
+        return self.runs.size + len(self.base.unknowns)
 
     def compare(self) -> ComparedHypotheses[Fitted]:
         """
@@ -334,10 +338,15 @@ class Comparing:
             found.append(total)
         return found
 
+    def information(self, fit: Fitted) -> Float64:
+        """Return the inverse covariance (p, p) of the unknowns, under usual noise."""
+        shown: Float64 = np.sum(self.equations(fit), axis=0)[1:, 1:]
+        return shown + np.diag(self.prior_of(fit)[2])
+
     def prior_of(self, fit: Fitted) -> tuple[int, Float64, Float64]:
         """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
         families = self.runs.priors(fit.hypothesis, fit.at)
-        total = np.asarray(sum(self.equations(fit)), np.float64)
+        total = np.sum(self.equations(fit), axis=0)
         logs, _, _ = solve(total[None], families.mean, families.precision, 0, 0)
         best = int(np.argmax(logs[0] + families.log_chance))
         return best, families.mean[best], families.precision[best]
@@ -533,10 +542,7 @@ class Comparing:
         widest = int(np.argmin(np.log(precision).sum(axis=1)))
         matrix = total[1 : 1 + p, 1 : 1 + p] + np.diag(precision[widest])
         right = total[1 : 1 + p, 0] + precision[widest] * mean[widest]
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        scaled = matrix * np.outer(scale, scale)
-        both = np.column_stack([right, total[1 : 1 + p, 1 + p :]]) * scale[:, None]
-        solved = np.linalg.solve(scaled, both) * scale[:, None]
+        solved = solve_scaled(matrix, np.column_stack([right, total[1 : 1 + p, 1 + p :]]))
         cross = total[1 + p :, 1 : 1 + p]
         score: Float64 = total[1 + p :, 0] - cross @ solved[:, 0]
         return score, total[1 + p :, 1 + p :] - cross @ solved[:, 1:]
@@ -716,9 +722,8 @@ class Comparing:
         top = max(fit.log_weight for fit in fits)
         names = [each for each in found.probability if each not in (NONE, UNKNOWN)][:_PAIRED]
         # as each was found alone, and as it is looked for at first
-        first = self.runs.size + len(self.base.unknowns)
         starts = [
-            replace(way, start=tuple(fit.at[first : first + len(way.start)].tolist()))
+            replace(way, start=tuple(fit.at[self.first : self.first + len(way.start)].tolist()))
             for fit in fits
             if len(fit.hypothesis.names) == 1 and not fit.hypothesis.smooth
             for way in fit.hypothesis.ways[-1:]
@@ -756,11 +761,8 @@ class Comparing:
             own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
             own[0] = replace(own[0], log_odds=way.log_odds + math.log(odds))
             hypothesis = Explanation((*stated, *own))
-            at = self.widened(self.nothing, hypothesis)
-            first = self.runs.size + len(self.base.unknowns)
-            q = len(way.unknowns)
-            for j in range(count):
-                at[first + j * q : first + (j + 1) * q] = alike.at[first : first + q]
+            at, first, q = self.widened(self.nothing, hypothesis), self.first, len(way.unknowns)
+            at[first : first + count * q] = np.tile(alike.at[first : first + q], count)
             found.append(Fitted(hypothesis, at))
         return found
 
@@ -780,22 +782,19 @@ class Comparing:
 
     def _again(self, fits: list[Fitted]) -> None:
         """Fit single effects from where likely larger hypotheses have them."""
-        first = self.runs.size + len(self.base.unknowns)
         top = max(fit.log_weight for fit in fits)
         alone = self._alone(fits)
         found = []
         for fit in fits:
-            ways = fit.hypothesis.ways[len(self.stated) :]
-            if len(ways) < 2 or fit.log_weight < top - _PAIR_NATS:
+            placed = fit.hypothesis.placed[len(self.stated) :]
+            if len(placed) < 2 or fit.log_weight < top - _PAIR_NATS:
                 continue
-            place = first
-            for way in ways:
-                own = slice(place, place + len(way.unknowns))
-                place = own.stop
+            z = fit.at[self.runs.size :]
+            for way, own in placed:
                 i = alone.get(way.mode, alone.get(replace(way, run=None).mode))
                 if i is not None:
                     single = fits[i].hypothesis
-                    at = np.concatenate([fit.at[:first], fit.at[own]])
+                    at = np.concatenate([fit.at[: self.first], z[own]])
                     beyond = np.zeros(self.runs.width(single) - len(at))
                     found.append(Fitted(single, np.concatenate([at, beyond])))
         self._keep_better(fits, found)

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -171,11 +172,17 @@ class Explanation:
         """Of the effects, and of what they leave open."""
         return tuple(q for way in self.ways for q in way.unknowns)
 
+    @cached_property
+    def placed(self) -> tuple[tuple[EffectWay, slice], ...]:
+        """Each way, and where its unknowns stand among those of the effects."""
+        ends = accumulate(len(way.unknowns) for way in self.ways)
+        return tuple(
+            (way, slice(end - len(way.unknowns), end)) for way, end in zip(self.ways, ends)
+        )
+
     def actions(self, frame: Frame, run: int, z: Float64) -> list[Action]:
         """Return what each effect does in a run."""
-        ends = np.cumsum([len(way.unknowns) for way in self.ways], dtype=int)[:-1]
-        each = zip(self.ways, np.split(z, ends))
-        return [way.action(frame, own.tolist(), run) for way, own in each]
+        return [way.action(frame, z[own].tolist(), run) for way, own in self.placed]
 
     @property
     def forms(self) -> list[int]:
@@ -333,11 +340,11 @@ class ShipRuns:
         smooth = size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
         hulls = self._hulls[priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING]
         sizes = np.array(priors.SMOOTH_SIZES if width > smooth else (1.0,))
-        components, place = [], size
-        for way in hypothesis.ways:
-            if way.components:
-                components.append([place + i for i in way.components])
-            place += len(way.unknowns)
+        components = [
+            [size + own.start + i for i in way.components]
+            for way, own in hypothesis.placed
+            if way.components
+        ]
         alike = len(sizes) * 2 ** len(components)
         mean, precision = (np.repeat(each, alike, axis=0) for each in hulls[:2])
         if hypothesis.frozen:
@@ -434,7 +441,7 @@ class ShipRuns:
         return [self._table(j, h, x, plan, shown) for h, x, plan in zip(hypotheses, at, plans)]
 
     def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
-        run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)].tolist()
+        run, z = self.runs[j], at[self.size : self.size + len(hypothesis.unknowns)]
         began = self.began(j, at)
         actions = [began.still, *hypothesis.actions(run.frame, j, z), self.air(j, at)]
         whole = Action.total(*actions)
@@ -446,9 +453,8 @@ class ShipRuns:
             return batch.add(Action.total(*changed), began)
 
         steps: list[tuple[int, int, float]] = []
-        for i, way in enumerate(hypothesis.ways, 1):
-            own = z[len(steps) : len(steps) + len(way.unknowns)]
-            for stepped in (own + _STEP_Z * np.eye(len(own))).tolist():
+        for i, (way, own) in enumerate(hypothesis.placed, 1):
+            for stepped in (z[own] + _STEP_Z * np.eye(len(way.unknowns))).tolist():
                 column = instead(i, way.action(run.frame, stepped, j))
                 steps.append((_LOCAL + len(steps), column, _STEP_Z))
         for line, wind in zip(_AIR, ((_STEP_M_S, 0.0), (0.0, _STEP_M_S))):

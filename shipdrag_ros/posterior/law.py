@@ -163,10 +163,24 @@ def parts_n(ship: Ship, speed_m_s: Float64) -> Float64:
     return (_generic if ship.baseline is None else _stated)(ship, speed_m_s)
 
 
+def _inside(ship: Ship, speed: Float64) -> Float64:
+    """Return the nearest speeds of which the baseline is stated, above 0."""
+    low, high = ship.baseline_range_m_s
+    return np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
+
+
+def stated_r(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return r of a baseline [m/s^2]; outside of what it states with the square of the speed.
+    """
+    inside = _inside(ship, speed_m_s)
+    result: Float64 = ship.resistance_n(inside) / ship.mass_kg * (speed_m_s / inside) ** 2
+    return result
+
+
 def _stated(ship: Ship, speed: Float64) -> Float64:
     """Return friction and wave part [N]; outside the tables with the square of the speed."""
-    low, high = ship.baseline_range_m_s
-    inside = np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
+    inside = _inside(ship, speed)
     total = ship.resistance_n(inside)
     if isinstance(ship.baseline, TableBaseline):
         # a table has no parts: its one scale is that of the friction

@@ -9,8 +9,7 @@ docs/results/priors.md prints this table (`python docs/tables.py`). Those of the
 
 from __future__ import annotations
 
-import math
-
+from shipdrag_ros.inference.decision import mixture
 from shipdrag_ros.parameter import Declared, half_normal, log_normal, normal
 
 _REALITY = 'records of many craft, as a range'
@@ -126,9 +125,7 @@ def any_log_lag() -> tuple[float, float]:
     Return mean and sd of the filter of a log that may have none [s].
     """
     none, some, chance = LOG_UNFILTERED, LOG_LAG, UNFILTERED_CHANCE.mean
-    mean = chance * none.mean + (1.0 - chance) * some.mean
-    within = chance * none.sd**2 + (1.0 - chance) * some.sd**2
-    return mean, math.sqrt(within + chance * (1.0 - chance) * (some.mean - none.mean) ** 2)
+    return mixture(((chance, none.mean, none.sd), (1.0 - chance, some.mean, some.sd)))
 
 
 # the water

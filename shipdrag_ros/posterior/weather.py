@@ -29,6 +29,7 @@ from shipdrag_ros.posterior.law import (
     WIND,
     Influence,
     InfluenceState,
+    stated_r,
     usual_baseline,
 )
 from shipdrag_ros.samples import Float64
@@ -253,7 +254,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
     forces, inertia = _shallow(ship, tuple(prior.at(each) for each in z[:, 0]), speed)
     # its larger n_r too is a force here: the same deceleration
     own = 1.0 + ship.n_r(speed)
-    deep = _deep(ship, speed)
+    deep = stated_r(ship, speed)
     whole = (deep + forces) * own / (own + inertia[:, None]) - deep
     whole = whole * (1.0 + effect.formula_sd * z[:, 1:])
     none = np.zeros((1, len(speed)))
@@ -293,10 +294,3 @@ def _shallow(ship: Ship, depths_m: tuple[float, ...], speed: Float64) -> tuple[F
     inside = np.clip(speed, at[0], at[-1])
     found = np.array([np.interp(inside, at, force) for force in forces])
     return found * (speed / inside) ** 2, inertia
-
-
-def _deep(ship: Ship, speed: Float64) -> Float64:
-    low, high = ship.baseline_range_m_s
-    inside = np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
-    result: Float64 = ship.resistance_n(inside) / ship.mass_kg * (speed / inside) ** 2
-    return result

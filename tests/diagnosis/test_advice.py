@@ -13,8 +13,7 @@ from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.advice import PredictedOutcome, probability_of_naming, with_known
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.inference.decision import CERTAIN, Verdict
-from shipdrag_ros.inference.decision import WeighedHypothesis as Rival
+from shipdrag_ros.inference.decision import CERTAIN, Verdict, Weighed
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.compare import Comparing
@@ -139,7 +138,7 @@ def test_stop_that_is_read_from_a_shaft_is_one_row_more(known_s: float) -> None:
 
 
 DRAWN = 0.06  # twice the sd of a share of 300 draws
-NOTHING = Rival((), -60.0, 0.0)
+NOTHING: Weighed = ((), -60.0)
 HULL, WIND, CABLE = ('fouling',), ('wind',), ('towed_cable',)
 
 
@@ -150,11 +149,11 @@ def prospect(mean: list[float], *, sd: float = 0.0) -> PredictedOutcome:
     return PredictedOutcome(np.array(mean), slope, np.eye(1), np.eye(1))
 
 
-def rivals(share: dict[tuple[str, ...], float]) -> list[Rival]:
-    return [*(Rival(names, math.log(p), 0.0) for names, p in share.items()), NOTHING]
+def rivals(share: dict[tuple[str, ...], float]) -> list[Weighed]:
+    return [*((names, math.log(p)) for names, p in share.items()), NOTHING]
 
 
-def resolved(prospects: list[PredictedOutcome], found: list[Rival]) -> float:
+def resolved(prospects: list[PredictedOutcome], found: list[Weighed]) -> float:
     """With one way in which the measurement is read; nothing predicts what the first does."""
     outcomes = [*prospects, prospects[0]]
     return probability_of_naming([outcomes], [0] * len(outcomes), found, inseparable=())
@@ -205,6 +204,6 @@ def test_what_no_record_tells_apart_is_never_named() -> None:
 
 
 def test_a_name_that_every_rival_holds_is_named_already() -> None:
-    alone, pair = Rival(HULL, math.log(0.6), 0.0), Rival(('fouling', 'wind'), math.log(0.4), 0.0)
+    alone, pair = (HULL, math.log(0.6)), (('fouling', 'wind'), math.log(0.4))
     same = [prospect([0.0]), prospect([0.0]), prospect([0.0])]
     assert probability_of_naming([same], [0, 0, 0], [alone, pair, NOTHING], inseparable=()) == 1.0

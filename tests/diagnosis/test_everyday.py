@@ -11,9 +11,8 @@ import pytest
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.record import RunRows, display_sd, weighted_white_sd
 from shipdrag_ros.estimation.run_down import RunDown
-from shipdrag_ros.estimation.steady import display_sd, weighted_white_sd
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import NONE, Names
 from shipdrag_ros.inference.rows import Rows

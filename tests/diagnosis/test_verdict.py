@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.verdict import asked, judge, runs_differ
+from shipdrag_ros.diagnosis.verdict import _modes, _points, asked, judge, runs_differ
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import ways_of
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.effects import find
+from shipdrag_ros.simulation.effects import LIBRARY, find
 
 SHIP = Ship.example()
 
@@ -94,3 +94,9 @@ def test_a_ratio_of_two_units_is_asked_about(ratio: float, words: str) -> None:
 @pytest.mark.parametrize('ratio', [1.0, 0.8, 1.2, 1.4, 0.4, 2.5, 0.0, -1.94, float('nan')])
 def test_an_error_of_a_wheel_is_none(ratio: float) -> None:
     assert asked(ratio) == ''
+
+
+def test_sizes_of_a_delay_that_are_named_are_of_one_sign_with_none_at_all() -> None:
+    (way,) = _modes(list(ways_of(LIBRARY['time_offset'], SHIP, 600.0, 1)))
+    assert way.start == (0.0,)
+    assert _points(way)[0] > 0.0

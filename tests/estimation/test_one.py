@@ -12,8 +12,8 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.record import weighted_white_sd
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
-from shipdrag_ros.estimation.steady import weighted_white_sd
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.priors import CURRENT
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order

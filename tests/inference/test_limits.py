@@ -10,7 +10,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import halfnorm, norm
 
-from shipdrag_ros.inference.decision import NONE, WeighedHypothesis, decide, probabilities
+from shipdrag_ros.inference.decision import NONE, decide, probabilities
 from shipdrag_ros.inference.limits import (
     Rival,
     SizePosterior,
@@ -136,8 +136,8 @@ def test_nine_of_ten_records_of_that_size_name_it() -> None:
         for _ in range(4000):
             score = traces @ (amount * traces[e] + rng.standard_normal(40))
             gain = 0.5 * score**2 / (own + 1.0) - 0.5 * np.log(own + 1.0)
-            ways = [WeighedHypothesis((f'e{f}',), gain[f], math.log(0.05)) for f in range(3)]
-            found = decide(probabilities([WeighedHypothesis(NONE, 0.0, 0.0), *ways]))
+            ways = [((f'e{f}',), gain[f] + math.log(0.05)) for f in range(3)]
+            found = decide(probabilities([(NONE, 0.0), *ways]))
             named += list(found.effects) == [f'e{e}']
         assert named / 4000 == pytest.approx(0.9, abs=0.04)
 
@@ -212,10 +212,10 @@ def test_nine_of_ten_name_a_size_beside_one_that_leaves_a_shape_open() -> None:
             gain.append(0.5 * (np.sum(explained * records, 1) - np.linalg.slogdet(whole)[1]))
         for first, second in zip(*gain, strict=True):
             ways = [
-                WeighedHypothesis(('e0',), float(first), math.log(0.05)),
-                WeighedHypothesis(('e1',), float(second), math.log(0.05)),
+                (('e0',), float(first) + math.log(0.05)),
+                (('e1',), float(second) + math.log(0.05)),
             ]
-            found = decide(probabilities([WeighedHypothesis(NONE, 0.0, 0.0), *ways]))
+            found = decide(probabilities([(NONE, 0.0), *ways]))
             named += list(found.effects) == [f'e{e}']
         # to first order in the noise
         assert named / 4000 == pytest.approx(0.9, abs=0.07)

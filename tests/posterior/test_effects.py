@@ -11,7 +11,6 @@ import pytest
 from shipdrag_ros.parameter import Shape, log_normal
 from shipdrag_ros.posterior.effects import retardation_of as found_retardation
 from shipdrag_ros.posterior.effects import ways_of
-from shipdrag_ros.posterior.limits import _modes, _points
 from shipdrag_ros.posterior.priors import UNNAMED_ODDS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
@@ -71,9 +70,3 @@ def test_a_pair_begins_with_as_much_of_a_current_as_is_left_beside_the_other() -
     delays = list(ways_of(LIBRARY['time_offset'], Ship.example(), 600.0, 1))
     assert delays[0].start == (0.0,)  # which sailing begins with
     assert {way.resized(0.25) for way in delays[1:]} == {way.start[0] for way in delays[1:]}
-
-
-def test_sizes_of_a_delay_that_are_named_are_of_one_sign_with_none_at_all() -> None:
-    (way,) = _modes(list(ways_of(LIBRARY['time_offset'], Ship.example(), 600.0, 1)))
-    assert way.start == (0.0,)
-    assert _points(way)[0] > 0.0
