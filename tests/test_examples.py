@@ -214,13 +214,13 @@ def run(command: str) -> None:
 @pytest.fixture
 def learnt_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is learnt first is what every further example of `learn` says."""
-    learn_from, found = diagnosis.learn_from, []
+    learn_runs, found = diagnosis.learn_runs, []
 
-    def first(*given: Any) -> Any:
-        found[:] = found or [learn_from(*given)]
+    def first(*given: Any, **more: Any) -> Any:
+        found[:] = found or [learn_runs(*given, **more)]
         return found[0]
 
-    monkeypatch.setattr(diagnosis, 'learn_from', first)
+    monkeypatch.setattr(diagnosis, 'learn_runs', first)
 
 
 @pytest.mark.usefixtures('learnt_once')

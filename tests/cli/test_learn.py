@@ -12,7 +12,6 @@ import pytest
 import shipdrag_ros as sd
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.fleet.store import BagResult, Store, bag_row
 from shipdrag_ros.library import diagnosis
@@ -70,22 +69,22 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def given(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[Path], Ship | None]]:
-    """Bags and ship that the search is given, which is not made."""
+def given(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[str], Ship]]:
+    """Coastdowns and ship that the search is given, which is not made."""
     seen = []
 
-    def note(_: Output, runs: Any, ship: Ship | None, *more: Any) -> None:
-        seen.append(([Path(run.name) for run, _ in runs], ship))
+    def note(coasts: Any, ship: Ship, *_: Any, **__: Any) -> None:
+        seen.append(([coast.name for coast in coasts], ship))
         raise DiagnosisError('enough')
 
-    monkeypatch.setattr(diagnosis, 'learn_from', note)
+    monkeypatch.setattr(diagnosis, 'learn_runs', note)
     return seen
 
 
 def test_the_bags_of_a_store_are_found_from_anywhere(fleet, given, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml')]) == 1
-    assert given == [([fleet / 'bags' / 'run.mcap'], None)]
+    assert given == [([str(fleet / 'bags' / 'run.mcap')], Ship.load(SHIP))]
 
 
 def bare(fleet: Path, folder: Path, *ships: str) -> Path:
@@ -105,7 +104,7 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
 def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(fleet, given, tmp_path):
     store = bare(fleet, tmp_path, 'Vitus Bering')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
-    assert given == [([tmp_path / 'bags' / '0.mcap'], Ship.load(SHIP))]
+    assert given == [([str(tmp_path / 'bags' / '0.mcap')], Ship.load(SHIP))]
 
 
 def test_a_store_of_two_ships_names_them(fleet: Path, tmp_path, capsys) -> None:
