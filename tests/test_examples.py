@@ -15,12 +15,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main, parser, verbs
 from shipdrag_ros.fleet.store import Store
+from shipdrag_ros.library import diagnosis
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 from tests.sources import log_samples
 from tests.studies.residual.conftest import RIVER_SHIP
@@ -36,7 +38,7 @@ NOT_HERE = (
 )
 DATA = 'SHIPDRAG_DATA'
 ELSEWHERE = 'docs/real_records.md'  # tests/test_real_records.py runs its commands
-READ_ELSEWHERE = 4  # the first commands of docs/diagnosis.md
+READ_ELSEWHERE = 4  # the first commands of docs/diagnosis.md, by tests/cli/test_diagnose.py
 IN_MESSAGES = 'shipdrag import SOURCE -o NEW.mcap'  # the user's names are to be put in
 LIMIT_S = 120.0
 
@@ -209,6 +211,19 @@ def run(command: str) -> None:
         recorded.unlink()  # it has heard no ship, and a replay of nothing is an error
 
 
+@pytest.fixture
+def learnt_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is learnt first is what every further example of `learn` says."""
+    learn_runs, found = diagnosis.learn_runs, []
+
+    def first(*given: Any, **more: Any) -> Any:
+        found[:] = found or [learn_runs(*given, **more)]
+        return found[0]
+
+    monkeypatch.setattr(diagnosis, 'learn_runs', first)
+
+
+@pytest.mark.usefixtures('learnt_once')
 @pytest.mark.parametrize('verb', [verb.name for verb in verbs()])
 def test_the_examples_of_the_help_run(folder: Path, verb: str, capsys) -> None:
     text = help_text(verb, capsys)
@@ -216,6 +231,8 @@ def test_the_examples_of_the_help_run(folder: Path, verb: str, capsys) -> None:
     assert len(lines) >= 2, 'give two in the docstring of the module of the verb'
     for line in lines:
         assert line.split()[1] == verb
+        if line in OF_PAGES['docs/diagnosis.md'][:READ_ELSEWHERE]:
+            continue
         for made in set(re.findall(r'-o (\S+)|--write (\S+)', line)):
             make_room(''.join(made))
         run(line)
@@ -230,12 +247,15 @@ def test_the_examples_of_a_page_run(folder: Path, page: str) -> None:
         make_logs(folder)
     if 's4_residual' in page:  # a ship whose form the regression knows
         (folder / 'ship.yaml').write_text(RIVER_SHIP)
-    if 'diagnosis.md' in page:  # tests/cli/test_diagnose.py runs them, and reads what they say
+    if 'diagnosis.md' in page:
         lines = lines[READ_ELSEWHERE:]
     for name in {name for line in lines for name in re.findall(r'-o (\S+)', line)}:
         make_room(name)
     for line in lines:
-        if 'learn' not in line.split():
+        if line.split()[1] == 'fleet' and page != 'README.md':  # which does the same
+            words = parser('fleet').parse_args(shlex.split(line)[1:])
+            assert all(Path(place).is_dir() for place in words.folders)
+        elif 'learn' not in line.split():
             run(line)
         else:  # the help's example learns from the same bags, and a clean ship teaches nothing
             words = parser('learn').parse_args(shlex.split(line)[1:])

@@ -15,7 +15,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Channel, Float64
+from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
     START_NS,
@@ -177,12 +177,17 @@ def read(truth: Truth, case: Case, seed: int) -> Window:
     position = Sensor(channel=Channel.POSITION, rate_hz=rate_hz, sd=hull.position_sd)
     shaft = Sensor(channel=Channel.SHAFT, rate_hz=max(rate_hz, 0.5), sd=0.02)
     block = sense(truth, (log, position, shaft)[: 3 if case.shaft else 2], seed=seed)
-    start_ns = START_NS + round(case.lead_in_s * 1e9)
+    return cut(block, case.lead_in_s, hull.duration_s)
+
+
+def cut(block: Block, lead_in_s: float, duration_s: float) -> Window:
+    """
+    Return the window of a simulated coastdown, with the record before it where there is one.
+    """
+    start_ns = START_NS + round(lead_in_s * 1e9)
+    before_ns = START_NS if lead_in_s else None
     return Window.from_block(
-        block,
-        start_ns,
-        start_ns + round(hull.duration_s * 1e9),
-        before_ns=START_NS if case.steady else None,
+        block, start_ns, start_ns + round(duration_s * 1e9), before_ns=before_ns
     )
 
 

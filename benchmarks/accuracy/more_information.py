@@ -21,13 +21,14 @@ import numpy as np
 
 from benchmarks._asked import asked
 from benchmarks._tables import along, table
+from benchmarks.accuracy._coasts import cut
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import START_NS, GaussMarkov, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation import GaussMarkov, Scenario, Sensor, sense, simulate
 
 CONFIG = Path(__file__).parents[2] / 'config'
 HULLS = (('vitus_bering', 8.2, 1500.0), ('kvlcc2', 7.97, 1800.0))  # speed [m/s], coastdown [s]
@@ -74,14 +75,9 @@ def scores(number: int, seed: int) -> Float64:
             Sensor(channel=_CHANNELS[1], rate_hz=RATE_HZ, sd=5.0),
             Sensor(channel=_CHANNELS[2], rate_hz=RATE_HZ, sd=0.02),
         ]
-        truth, stop_ns = simulate(ship, scenario), START_NS + round(LEAD_S * 1e9)
-        end_ns, noise = stop_ns + round(duration_s * 1e9), int(rng.integers(2**31))
-        return [
-            Window.from_block(
-                sense(truth, sensors[:count], seed=noise), stop_ns, end_ns, before_ns=START_NS
-            )
-            for count in (1, 2, 3)
-        ]
+        truth, noise = simulate(ship, scenario), int(rng.integers(2**31))
+        blocks = (sense(truth, sensors[:count], seed=noise) for count in (1, 2, 3))
+        return [cut(block, LEAD_S, duration_s) for block in blocks]
 
     found = [estimate_final(each, ship, Parameters()) for each in windows(0)]
     second = estimate_final(windows(1)[-1], ship, Parameters())

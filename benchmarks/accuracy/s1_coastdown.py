@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """
 The coastdown estimator as published (S1): its statements beside ours, its experiment, error and
-coverage of its three problems, its order rule, and the time of an estimate.
+coverage of its three problems, and its order rule.
 
     python -m benchmarks.figures s1_coastdown
 
@@ -16,7 +16,6 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -38,7 +37,7 @@ from benchmarks.accuracy.s1_experiment import (
     maxima,
     off,
 )
-from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation import estimate
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.simulation import Truth
@@ -58,7 +57,6 @@ CASES = (
 TRUE_ORDER = 5
 SIZES = (3.0, 4.0, 6.0)  # of the last true coefficient, in its standard deviations
 RULES = tuple((p, steps) for p in (0.001, 0.01, 0.05, 0.1) for steps in (1, 2, 3))
-COUNTS = (100, 500, 2_000, 10_000, 100_000)
 
 
 def beside() -> list[str]:
@@ -185,32 +183,6 @@ def order_rules(runs: int, coasts: int) -> Iterator[list[str]]:
     order.SIGNIFICANCE, order.NEIGHBOURS = kept
 
 
-def median_ms(window: Window, truth: Truth, problem: str, *, repeats: int) -> float:
-    """
-    Return the median processor time of one estimate, from a window to the result [ms].
-    """
-    taken = []
-    for _ in range(repeats):
-        start = time.process_time()
-        estimate(window, truth.ship, Parameters(estimator=problem))
-        taken.append(time.process_time() - start)
-    return 1e3 * float(np.median(taken))
-
-
-def times() -> Iterator[list[str]]:
-    """
-    Yield the time of one estimate by the number of samples.
-    """
-    truth, rows = voyage(CASES[0]), []
-    for n in COUNTS:
-        window = read(truth, Case(n=n), 0)
-        repeats = max(3, min(100, 200_000 // n))
-        rows.append([median_ms(window, truth, each, repeats=repeats) for each in PROBLEMS])
-        yield [str(n), *(f'{ms:.2f}' for ms in rows[-1])]
-    slopes = np.log(np.divide(rows[-1], rows[-2])) / np.log(COUNTS[-1] / COUNTS[-2])
-    yield ['last slope', *(f'{slope:.2f}' for slope in slopes)]
-
-
 def main() -> None:
     """
     Print it all, and draw where that is asked for.
@@ -242,7 +214,6 @@ def main() -> None:
         width=120,
         left=2,
     )
-    grid('ms of processor time an estimate', ['n of each input', *PROBLEMS], times(), width=80)
 
 
 if __name__ == '__main__':

@@ -5,8 +5,7 @@ S3's sensitivity analysis: its observations beside ours, its reduced model, what
     python -m benchmarks.figures s3_sensitivity
 
 Prints the tables; `--pictures` draws those of docs/s3_sensitivity.md.
-Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor. Times are of the
-processor, in this process; the batched call is the best of 5, the loop of 161 runs is made once.
+Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor.
 """
 
 from __future__ import annotations
@@ -16,9 +15,7 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import math
-import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -27,7 +24,6 @@ from matplotlib.figure import Figure
 
 from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
-from benchmarks.accuracy import _plain_mariner
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.display import Table
@@ -54,7 +50,7 @@ from shipdrag_ros.studies.sensitivity.coasting import (
 )
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
-from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     Experiment,
@@ -67,62 +63,9 @@ from shipdrag_ros.studies.sensitivity.steering import (
 
 DOCS = Path(__file__).resolve().parents[2] / 'docs'
 SHIP, PAPER, KEEP = mariner(), zigzag(15.0), 24
-RTOL = 1e-6
-ROUNDS = 5
 CONTROLS_S = (0.0, 0.1, 0.5)
 KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s
 SHIP_SPEED_M_S = 8.2
-
-
-@dataclass(frozen=True)
-class Speed:
-    """
-    Batched runs beside a loop of solve_ivp, [s] of the processor.
-
-    Attributes
-    ----------
-    batched, looped
-    runs
-    largest
-        Difference of a loss, over the largest loss.
-    same
-        Whether both keep the same derivatives.
-    """
-
-    batched: float
-    looped: float
-    runs: int
-    largest: float
-    same: bool
-
-
-def speed(found: SteeringStudy) -> Speed:
-    """
-    Do the same 161 runs both ways.
-    """
-    factors = [
-        (name, 1.0 + change) for name in FORM for change in CHANGES
-    ]  # the order of the table of losses
-    sets = [dict(SHIP.viscous)]
-    sets += [{**SHIP.viscous, name: factor * SHIP.viscous[name]} for name, factor in factors]
-    table = np.array([[one[name] for name in FORM] for one in sets])
-    times = []
-    for _ in range(ROUNDS):
-        begin = time.process_time()
-        motions = steer(SHIP, PAPER, table, control_s=0.0)
-        times.append(time.process_time() - begin)
-    time_s = motions.time_s
-    begin = time.process_time()
-    looped = [
-        _plain_mariner.zigzag(SHIP, one, PAPER.rudder_rad, time_s, rtol=RTOL) for one in sets
-    ]
-    elapsed = time.process_time() - begin
-    scale = np.array([1.0, 1.0, 1.0 / SHIP.length_m]) * SHIP.speed_m_s
-    differences = (np.array(looped[1:]) - looped[0]) / scale
-    losses = Losses(FORM, Norm.ROOT_MEAN_SQUARE.of(differences).reshape(len(FORM), -1))
-    error = np.max(np.abs(losses.table - found.losses.table)) / np.max(losses.table)
-    same = set(losses.select(KEEP).kept) == set(found.selection.kept)
-    return Speed(min(times), elapsed, len(sets), float(error), same)
 
 
 def checks() -> Table:
@@ -271,7 +214,7 @@ def lines_of(table: Table) -> list[str]:
 
 
 def tables(
-    found: SteeringStudy, shown: Experiment, coast: CoastStudy, timed: Speed, wrong: Table
+    found: SteeringStudy, shown: Experiment, coast: CoastStudy, wrong: Table
 ) -> Iterator[str]:
     """
     Yield the lines of the result file.
@@ -291,10 +234,6 @@ def tables(
         yield from ('', heading, '', *lines_of(table))
     yield ''
     yield f'50 % over 10 %: {root.growth:.2f}; kept {len(found.selection.kept)} of {len(FORM)}'
-    yield (
-        f'{timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a loop of scipy '
-        f'(RK45, rtol {RTOL:g}) {timed.looped:.1f} s; losses agree to {timed.largest:.0e}'
-    )
     yield coasting_words.sentence(coast)
     yield from (f'- {note}' for note in coasting_words.notes(coast))
 
@@ -321,7 +260,7 @@ def main() -> None:
     ship = Ship.example()
     found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)
     coast = study_coast(ship, coast_from(ship, SHIP_SPEED_M_S))
-    print(*tables(found, shown, coast, speed(found), verdicts(ship)), sep='\n')
+    print(*tables(found, shown, coast, verdicts(ship)), sep='\n')
     if not options.pictures:
         return
     time_s = found.check.full.time_s

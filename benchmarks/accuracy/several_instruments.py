@@ -18,12 +18,13 @@ import numpy as np
 
 from benchmarks._asked import asked
 from benchmarks._tables import along, table
-from shipdrag_ros.estimation import Window, estimate_final
+from benchmarks.accuracy._coasts import cut
+from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation import Scenario, Sensor, sense, simulate
 from shipdrag_ros.simulation.scenario import GaussMarkov
 
 LEAD_S, COAST_S, SPEED_M_S = 1800.0, 1500.0, 8.2
@@ -77,10 +78,7 @@ def score(case: Case, ship: Ship, seed: int) -> tuple[float, float, float]:
     """
     Return mean square error, mean variance (of the largest r) and cover of a run.
     """
-    stop_ns = START_NS + round(LEAD_S * 1e9)
-    window = Window.from_block(
-        readings(case, ship, seed), stop_ns, stop_ns + round(COAST_S * 1e9), before_ns=START_NS
-    )
+    window = cut(readings(case, ship, seed), LEAD_S, COAST_S)
     found = estimate_final(window, ship, Parameters()).valid_calm
     speed = np.minimum(found.speed_m_s, ship.baseline_range_m_s[1])
     true = ship.resistance_n(speed) / ship.mass_kg

@@ -26,6 +26,14 @@ START_NS = 1_700_000_000_000_000_000
 BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
 
 
+@pytest.fixture(scope='module')
+def plain(recording: tuple[Path, list[Event]]) -> EndedCoastdown:
+    """A window of the voyage as it was recorded."""
+    (run,) = open_runs([recording[0]])
+    (coastdown,) = replay(run, window=(410.0, 1000.0)).coastdowns
+    return coastdown
+
+
 def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> EndedCoastdown:
     """Coast for 100 s with this heading, and after 100 s turn right round."""
     time_s = np.arange(200.0)
@@ -83,9 +91,8 @@ def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Even
 def test_the_heading_of_a_window_follows_the_convention(recording, parameters):
     (run,) = open_runs([recording[0]])
     compass = replace(parameters, heading_convention='compass')
-    for window in ((410.0, 1000.0), (0.0, 1000.0)):
-        (coastdown,) = replay(run, parameters=compass, window=window).coastdowns
-        assert coastdown.heading_rad == pytest.approx(pi / 2 - 0.7, abs=0.02)
+    (coastdown,) = replay(run, parameters=compass, window=(0.0, 1000.0)).coastdowns
+    assert coastdown.heading_rad == pytest.approx(pi / 2 - 0.7, abs=0.02)
 
 
 def test_a_window_that_gives_nothing_says_why(recording: tuple[Path, list[Event]]) -> None:
@@ -106,22 +113,21 @@ def test_a_window_outside_of_the_bag(recording, window):
 
 def test_a_window_ends_with_the_bag_at_the_latest(recording: tuple[Path, list[Event]]) -> None:
     (run,) = open_runs([recording[0]])
-    ends = [replay(run, window=(410.0, end_s)).coastdowns[0].end_ns for end_s in (1e5, 1e305)]
-    assert ends[0] == ends[1]
+    (coastdown,) = replay(run, window=(410.0, 1e305)).coastdowns
+    assert run.span_ns is not None
+    assert 0 <= run.span_ns[1] - coastdown.end_ns < 10**8
 
 
-def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(tmp_path, ship, voyage):
+def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
+    tmp_path, ship, voyage, plain
+):
     block = voyage()
     later = replace(block, receive_ns=block.receive_ns + 3600 * 10**9)
-    results = []
-    for name, each in (('a', block), ('b', later)):
-        (run,) = open_runs([write_run(tmp_path / f'{name}.mcap', each, ship)])
-        results.append(replay(run, window=(410.0, 1000.0)).coastdowns[0])
-    assert results[0].start_ns == results[1].start_ns
-    assert results[0].estimate is not None
-    assert results[1].estimate is not None
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', later, ship)])
+    (coastdown,) = replay(run, window=(410.0, 1000.0)).coastdowns
+    assert coastdown.start_ns == plain.start_ns
     np.testing.assert_array_equal(
-        results[0].estimate.curve.resistance_m_s2, results[1].estimate.curve.resistance_m_s2
+        coastdown.estimate.curve.resistance_m_s2, plain.estimate.curve.resistance_m_s2
     )
 
 
@@ -151,7 +157,7 @@ def test_what_follows_a_clock_that_was_set_may_have_no_time_of_its_own(tmp_path,
 
 
 def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after_it(
-    tmp_path: Path, ship: Ship, voyage: Callable[..., Block]
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], plain: EndedCoastdown
 ) -> None:
     block = voyage()
     span_ns = int(block.receive_ns[-1] - block.receive_ns[0])
@@ -166,9 +172,7 @@ def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after
     ((_, window),) = coast_windows(result)
     assert len(window.speed_through_water) == 591
     assert window.end_ns == coastdown.end_ns
-    (alone,) = open_runs([write_run(tmp_path / 'b.mcap', block, ship)])
-    (expected,) = replay(alone, window=(410.0, 1000.0)).coastdowns
-    assert expected.estimate is not None
+    assert plain.estimate is not None
     np.testing.assert_array_equal(
-        coastdown.estimate.curve.resistance_m_s2, expected.estimate.curve.resistance_m_s2
+        coastdown.estimate.curve.resistance_m_s2, plain.estimate.curve.resistance_m_s2
     )
