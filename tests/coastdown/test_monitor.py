@@ -398,7 +398,10 @@ def test_a_turn_ends_at_the_power_that_it_began_at(watch, record, sensors, secon
         speed_m_s=6.5,
         lead_in_s=1500.0,
         duration_s=1900.0,
-        orders=(EngineOrder(0.0, shaft=0.5, thrust=0.25), EngineOrder(1000.0, shaft=0.0, thrust=0.0)),
+        orders=(
+            EngineOrder(0.0, shaft=0.5, thrust=0.25),
+            EngineOrder(1000.0, shaft=0.0, thrust=0.0),
+        ),
         turns=(Turn(400.0, 180.0, 0.014, drag_area_m2=14.0),),
     )
     # once it had the power of before the slow-down, and what followed was a coastdown
