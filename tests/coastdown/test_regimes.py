@@ -10,16 +10,17 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
-from shipdrag_ros.coastdown.regimes.births import brakes, glides
+from shipdrag_ros.coastdown.regimes.births import bear, brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
-from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS
+from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS, WIND_SD
 from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by, unpowered
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     AMID,
     BRAKE,
     GLIDE,
+    GLIDE_TURN,
     HELD,
     LEVEL,
     LN_A,
@@ -237,6 +238,26 @@ def test_what_follows_a_manoeuvre_knows_her_speed_and_revs_in_it(ship) -> None:
     held = (bank.row['regime'][after] == GLIDE) & (bank.row['kind'][after] >= HELD)
     assert held.any()
     assert np.all(bank.row['revs'][after][held] == 0.6)
+
+
+@pytest.mark.parametrize(('turned_s', 'kept'), [(10.0, 1.0), (2000.0, 0.0)])
+def test_after_a_turn_in_a_glide_the_wind_is_that_of_before(ship, turned_s, kept) -> None:
+    bank, setting = Histories.fresh(), BankSetting.of(HullPrior.of(ship), BIN_S)
+    bank.used[0], bank.clock[0] = 1, 100
+    bank.mean[0, [LN_U, LN_A, OPEN]] = np.log(3.0), setting.hull.level, -0.03
+    bank.spread[0, OPEN, OPEN] = 0.01**2
+    bank.row['regime'][0], bank.row['first_a'][0], bank.row['since'][0] = GLIDE, 0.01, 0.0
+    bear(bank, setting, False, True)
+    for regime in (BRAKE, GLIDE_TURN):
+        (first, *_) = np.flatnonzero(bank.row['regime'][: bank.used[0]] == regime)
+        before = int(bank.used[0])
+        glides(bank, first, setting, 100.0 * BIN_S + turned_s, 0.1)
+        share = kept if regime == GLIDE_TURN else 1.0
+        after = slice(before, int(bank.used[0]))
+        assert np.allclose(bank.mean[after, OPEN], -0.03 * share, atol=1e-3)
+        # what was learnt of it stays, or it is drawn anew
+        sd = np.sqrt(bank.spread[after, OPEN, OPEN])
+        assert np.allclose(sd, 0.01 if share else float(WIND_SD), rtol=0.1)
 
 
 @pytest.mark.parametrize('seed', range(4))

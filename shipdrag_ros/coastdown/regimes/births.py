@@ -140,20 +140,29 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
 
 @compiled(uncounted=True)
 def _is_let_go(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
-    """End what slowed her beside the water: an engine astern runs down as one ahead does."""
+    """
+    End what slowed her beside the water: an engine astern runs down as one ahead does.
+
+    The wind is that of before, but for how far she has turned.
+    """
     # what holds a body in a window that a person claims lets go at once
-    x, braked = bank.mean[i], bank.row[i].regime == s.BRAKE and setting.engine == 0.0
+    x, f = bank.mean[i], bank.row[i]
+    braked, ahead = f.regime == s.BRAKE and setting.engine == 0.0, 1.0
+    if f.regime == s.GLIDE_TURN:
+        turned = n.TURN_RATE * math.exp(x[s.LN_U]) / setting.hull.length_m * (now_s - f.since)
+        ahead = math.exp(-0.5 * turned * turned)
+    wind_var = ahead * ahead * f.wind_var + (1.0 - ahead * ahead) * _wind(setting) ** 2
     thrust = 0.0
     if braked:
         law = hull_law(setting.hull, x[s.LN_U])[0] + x[s.LN_A]
-        thrust = -bank.row[i].first_a * math.exp(min(x[s.OPEN] - law, 5.0))
+        thrust = -f.first_a * math.exp(min(x[s.OPEN] - law, 5.0))
     for k in range(len(n.RUN_DOWN_S) if braked else 1):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace if braked else _NO_RAMP_S
         share = chance * setting.hull.run_down[k] if braked else chance
         j = _born(bank, i, now_s, share, s.GLIDE, ramp_s)
         if j >= 0:
             bank.row[j].thrust = thrust
-            free(bank, j, s.OPEN, 0.0, _wind(setting) ** 2)
+            free(bank, j, s.OPEN, ahead * f.wind, wind_var)
 
 
 @compiled(inline=True, uncounted=True)
@@ -269,6 +278,13 @@ def amid(bank: Histories, j: int, setting: BankSetting, kind: int) -> None:
     free(bank, j, s.OPEN, 0.0, (n.ENGINE[kind] * engine) ** 2)
 
 
+@compiled(inline=True, uncounted=True)
+def _keep_wind(bank: Histories, j: int) -> None:
+    """Write down the wind of a glide, as something else is open from now on."""
+    f = bank.row[j]
+    f.wind, f.wind_var = bank.mean[j, s.OPEN], bank.spread[j, s.OPEN, s.OPEN]
+
+
 @compiled(uncounted=True)
 def _turns(bank: Histories, i: int, now_s: float, chance: float, regime: int) -> None:
     for k in range(len(n.TURNS)):
@@ -281,6 +297,7 @@ def _turns(bank: Histories, i: int, now_s: float, chance: float, regime: int) ->
                 # what the level before it taught
                 f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
                 f.p0, f.p_var = x[s.POWER], p[s.POWER, s.POWER]
+            _keep_wind(bank, j)
             free(bank, j, s.OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
@@ -300,6 +317,7 @@ def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
                 bank.row[j].kind = bank.row[j].glide_kind = s.STANDS
                 bank.mean[j, s.LN_A] += n.DRAGGED[s.STANDS]
                 bank.spread[j, s.LN_A, s.LN_A] += n.DRAGGED_SD[s.STANDS] ** 2
+            _keep_wind(bank, j)
             size = n.BRAKES[k] if k < len(n.BRAKES) else n.STOPPERS[k - len(n.BRAKES)]
             free(bank, j, s.OPEN, math.log(size), n.BRAKES_SD**2)
 

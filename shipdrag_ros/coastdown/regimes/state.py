@@ -44,6 +44,8 @@ HISTORY = np.dtype(
         ('ramp_s', 'f8'),  # length of ramp or run-down [s]
         ('first_a', 'f8'),  # first resistance [m/s^2]
         ('thrust', 'f8'),  # at the stop over that: of balance, or of an engine astern
+        ('wind', 'f8'),  # a force that stays, over that, before a turn or a brake in a glide
+        ('wind_var', 'f8'),
         ('gust_a', 'f8'),  # resistance under even power, of which gusts are parts [m/s^2]
         ('revs', 'f8'),  # over those expected, or held
         ('free', 'f8'),  # revs over speed of a free screw, or over those of a run-down
