@@ -15,14 +15,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main, parser, verbs
 from shipdrag_ros.fleet.store import Store
-from shipdrag_ros.library import diagnosis
 from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 from tests.sources import log_samples
 from tests.studies.residual.conftest import RIVER_SHIP
@@ -211,19 +209,6 @@ def run(command: str) -> None:
         recorded.unlink()  # it has heard no ship, and a replay of nothing is an error
 
 
-@pytest.fixture
-def learnt_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is learnt first is what every further example of `learn` says."""
-    learn_runs, found = diagnosis.learn_runs, []
-
-    def first(*given: Any, **more: Any) -> Any:
-        found[:] = found or [learn_runs(*given, **more)]
-        return found[0]
-
-    monkeypatch.setattr(diagnosis, 'learn_runs', first)
-
-
-@pytest.mark.usefixtures('learnt_once')
 @pytest.mark.parametrize('verb', [verb.name for verb in verbs()])
 def test_the_examples_of_the_help_run(folder: Path, verb: str, capsys) -> None:
     text = help_text(verb, capsys)
