@@ -92,8 +92,9 @@ def lines(trend: ShipTrend) -> list[str]:
             f'first run {amount(trend.costs.usd_so_far)} USD.'
         )
     if trend.cleaning is not None:
+        pays = trend.cleaning
         middle, early, late = (
-            day(trend.after_last_run(years)) for years in vars(trend.cleaning).values()
+            day(trend.after_last_run(years)) for years in (pays.years, pays.earliest, pays.latest)
         )
         found.append(f'Cleaning pays from {middle} (80 %: {early} to {late}).')
     left = [point for point in trend.points if not point.used]
