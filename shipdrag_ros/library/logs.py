@@ -21,7 +21,13 @@ from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
 from shipdrag_ros.sources.formats.csv.importer import read_csv
-from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows, texts_of
+from shipdrag_ros.sources.formats.csv.table import (
+    Cells,
+    LogTable,
+    TableRows,
+    are_numbers,
+    written,
+)
 from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.reading import LogRun, format_of, join
 
@@ -100,9 +106,9 @@ class FrameTable(LogTable):
             columns = [_cells(array[first : first + most]) for array in self._arrays]
             valued = np.zeros(len(columns[0]), np.bool_)
             for cells in columns:
-                texts = not isinstance(cells, np.ndarray)
-                valued |= [*map(bool, cells)] if texts else cells == cells  # NaN is no value
-            yield TableRows(range(first + 1, first + 1 + len(valued)), columns)[valued]
+                valued |= cells == cells if are_numbers(cells) else cells != ''  # NaN is no value
+            lines = np.arange(first + 1, first + 1 + len(valued))
+            yield TableRows(lines, columns)[valued]
 
 
 def _free(name: str, named: Sequence[tuple[str, Any]]) -> str:
@@ -123,12 +129,10 @@ def _array(values: Any) -> NDArray[Any]:
 def _cells(array: NDArray[Any]) -> Cells:
     """Return numbers as they are, dates in ns, and the text of other values."""
     if array.dtype.kind != 'M':
-        return array if array.dtype.kind in 'fiu' else texts_of(array)
+        return array if are_numbers(array) else written(array)
     stamps = array.astype('datetime64[ns]')
     missing, counts = np.isnat(stamps), stamps.astype(np.int64)
-    if not missing.any():
-        return counts
-    return ['' if none else text for none, text in zip(missing.tolist(), texts_of(counts))]
+    return np.where(missing, '', written(counts)) if missing.any() else counts
 
 
 _NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it

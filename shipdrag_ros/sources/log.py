@@ -104,6 +104,7 @@ _SI = {
     'position': 'm',
     'heading': 'rad (yaw)',
     'shaft': 'rad/s (pitch: ratio or rad)',
+    'pitch': 'ratio or rad',
     'rudder': 'rad',
     'wind_apparent': 'm/s (forward, to port)',
     'depth': 'm',

@@ -88,10 +88,11 @@ def test_no_step_of_python_for_each_row() -> None:
 def test_counts_as_numbers_are_the_times_of_their_texts(unit: str, values: list[float]) -> None:
     table = LogTable.__new__(LogTable)
     found = []
-    for cells in (np.array(values), [repr(each) if each == each else '' for each in values]):
+    texts = [repr(each) if each == each else '' for each in values]
+    for cells in (np.array(values), np.array(texts, object)):
         bad: dict[int, BadCell] = {}
-        clock = row_clock(parse_time(f't:{unit}'), None, [], table)
-        times = clock.times(cells, 0, bad)
+        clock = row_clock(parse_time(f't:{unit}'), None, np.array([], object), table)
+        times = clock.times(cells, bad)
         found.append([None if place in bad else int(t) for place, t in enumerate(times)])
     assert found[0] == found[1]
     first = values[0]
@@ -106,13 +107,14 @@ def test_counts_as_numbers_are_the_times_of_their_texts(unit: str, values: list[
 )
 def test_numbers_and_their_texts_are_read_alike(values: list[float], side: str) -> None:
     read = CellReader(side=side)
-    texts = [f'{value:.4f}' for value in values]
+    texts = np.array([f'{value:.4f}' for value in values], object)
     bad: list[dict[int, BadCell]] = [{}, {}]
     one, other = read.all(np.array(values), bad[0]), read.all(texts, bad[1])
     assert np.array_equal(one, other, equal_nan=True)
     assert {k: each.reason for k, each in bad[0].items()} == {
         k: each.reason for k, each in bad[1].items()
     }
+    assert all(float(each.cell) == values[k] for k, each in bad[0].items())
 
 
 def test_two_columns_of_one_name_are_refused() -> None:

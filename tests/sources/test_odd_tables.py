@@ -14,6 +14,9 @@ import pytest
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.sources.format import Job
+from shipdrag_ros.sources.formats.csv.importer import FORMAT
+from shipdrag_ros.sources.log import Log
 from shipdrag_ros.sources.reading import read_any
 
 SPEED = 5.0  # m/s, to the north
@@ -188,3 +191,44 @@ def test_a_unit_may_stand_at_the_end_of_a_name(tmp_path, name, channel, factor):
     block, _ = read(tmp_path, f'time_s,sog_mps,{name}', rows)
     expected = [(0.5 + s / 1000) * factor for s in range(30)]
     assert of(block, channel)[:, 0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('columns', ['n', 'n,m'])
+def test_a_pitch_is_told_with_its_unit(tmp_path: Path, columns: str) -> None:
+    path = tmp_path / 'log.csv'
+    path.write_text('n,m\n0.5,0.25\n')
+    log = Log()
+    result = FORMAT.read(Job(path, {'map': [f'pitch={columns}'], 'rate': 1.0}), log)
+    assert "  pitch <- 'n' [ratio], first 0.5 ratio or rad" in result.told(path, '')
+
+
+def test_rows_beyond_the_last_date_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / 'log.csv'
+    path.write_text('n\n' + '1\n' * 20)
+    result = FORMAT.read(Job(path, {'map': ['shaft=n'], 'rate': 1e-9}), Log())
+    assert result.written == {'shaft': 2}
+    assert result.rejected['time']['no possible date'].count == 18
+
+
+def test_a_condition_that_leaves_no_row_beside_a_row_that_is_too_wide(tmp_path: Path) -> None:
+    path = tmp_path / 'log.csv'
+    path.write_text('a,n\n' + 'x,1\n' * 20 + 'x,1,2\n')
+    options = {'map': ['shaft=n'], 'rate': 1.0, 'where': [('a', 'y')]}
+    with pytest.raises(ImportDataError, match='the column holds x'):
+        FORMAT.read(Job(path, options), Log())
+
+
+def test_the_order_of_dates_helps_to_find_the_unit_of_a_speed(tmp_path: Path) -> None:
+    path = tmp_path / 'log.csv'
+    rows = [f'03.04.2018 {clock(i)},{latitude(i)},10.25,{SPEED}' for i in range(100)]
+    path.write_text('\n'.join(['time,Lat,Lon,SOG', *rows]))
+    log = Log()
+    result = FORMAT.read(Job(path, {'date_order': 'dmy'}), log)
+    assert result.written['speed_over_ground'] == 100
+    assert log.first[Channel.SPEED_OVER_GROUND] == (SPEED,)
+
+
+def test_a_refused_time_is_told_as_it_stands(tmp_path: Path) -> None:
+    rows = [f'{i},{i % 10}5;10' for i in range(20)]
+    _, shown = read(tmp_path, 'time [s];STW [kn]', [*rows, '20,-5;10'])
+    assert "time: 1 rejected, not a number: line 22: '20,-5'" in shown

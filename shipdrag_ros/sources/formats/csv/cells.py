@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from decimal import Decimal
 from fractions import Fraction
+from itertools import count
 from math import cos, hypot, isfinite, pi, remainder, sin
-from typing import Any
+from typing import Any, NoReturn
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -19,27 +20,81 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import SECOND_NS, Float64, Int64
-from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, Form, TimeColumn
-from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, texts_of
+from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64
+from shipdrag_ros.sources.formats.csv.columns import (
+    COMPASS,
+    NANOSECONDS,
+    InputColumns,
+    TimeColumn,
+)
+from shipdrag_ros.sources.formats.csv.table import (
+    Cells,
+    LogTable,
+    are_numbers,
+    texts_of,
+    written,
+)
 from shipdrag_ros.sources.log import BASE_NS, LIMIT_NS
 
 _PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
-_SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
-_DECIMAL = re.compile(r'([-+]?\d{1,3}(?:\.\d*)?)\s*°?\s*([NSEW])?')
-_PARTED = re.compile(r"(\d{1,3})[°\s]\s*(\d{1,2}(?:\.\d*)?)\s*'?\s*([NSEW])")
+# sign, degrees, minutes and side of a coordinate
+_DECIMAL = re.compile(r'([-+]?)(\d{1,3}(?:\.\d*)?)()\s*°?\s*([NSEW])?')
+_PARTED = re.compile(r"()(\d{1,3})[°\s]\s*(\d{1,2}(?:\.\d*)?)\s*'?\s*([NSEW])")
 _JOINED = re.compile(r'([-+]?)(\d{1,3})(\d{2}(?:\.\d*)?)\s*([NSEW])?')
+_SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
 _THOUSANDS = re.compile(r'[-+]?[1-9]\d{0,2}(\.\d{3})+')
 
 
 class BadCell(Exception):
-    """A cell without a usable number."""
+    """
+    A cell that cannot be used.
 
-    def __init__(self, reason: str, cell: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.cell = cell
+    Attributes
+    ----------
+    cell
+        What it holds.
+    """
+
+    cell = ''
+
+    @property
+    def reason(self) -> str:
+        """Why it cannot be used."""
+        return str(self)
+
+
+Bad = dict[int, BadCell]
+"""Cells that cannot be used, by their places."""
+
+
+def read_each(
+    read: Callable[[Any], float],
+    cells: Iterable[Any],
+    places: Iterable[int],
+    found: NDArray[Any],
+    bad: Bad,
+) -> None:
+    """
+    Read cells one by one.
+
+    Parameters
+    ----------
+    read
+        Returns the value of a cell, or raises `BadCell`.
+    cells, places
+        Each cell and its place.
+    found : (n,)
+        Where the values go.
+    bad
+        Where the others go.
+    """
+    for place, cell in zip(places, cells, strict=True):
+        try:
+            found[place] = read(cell)
+        except BadCell as error:
+            error.cell = str(cell)
+            bad.setdefault(place, error)
 
 
 @dataclass(frozen=True)
@@ -71,17 +126,17 @@ class CellReader:
             If it holds no usable number.
         """
         if not cell:
-            raise BadCell('empty', cell)
+            raise BadCell('empty')
         if self.comma and not self.side and '.' in cell:
-            raise BadCell('a point where others have a decimal comma', cell)
+            raise BadCell('a point where others have a decimal comma')
         text = cell.replace(',', '.', 1) if self.comma else cell
         if self.side:
-            return _coordinate(text.strip().upper(), self.side, self.minutes, cell)
+            return self._coordinate(text.strip().upper())
         if not NUMBER.fullmatch(text):
-            raise BadCell('not a number', cell)
+            raise BadCell('not a number')
         return float(text)
 
-    def all(self, cells: Cells, bad: dict[int, BadCell]) -> Float64:
+    def all(self, cells: Cells, bad: Bad) -> Float64:
         """
         Return (n,) numbers, NaN where there is none.
 
@@ -90,49 +145,41 @@ class CellReader:
         cells : (n,)
             Of a column.
         bad
-            Filled with why, by the place of a cell that holds none.
+            Filled with those that hold none.
         """
-        if isinstance(cells, np.ndarray):
-            if not self.minutes:
-                return self._of_numbers(cells.astype(np.float64), bad)
-            cells = texts_of(cells)
-        if not (self.comma or self.side) and _PLAIN.issuperset(''.join(cells)):
-            with suppress(ValueError):  # an empty cell for instance
-                found = np.array([float(cell) for cell in cells])
-                if np.isfinite(found).all():
-                    return found
-        found = np.full(len(cells), np.nan)
-        for place, cell in enumerate(cells):
-            try:
-                found[place] = self.one(cell)
-            except BadCell as error:
-                bad.setdefault(place, error)
+        if are_numbers(cells):
+            cells = written(cells) if self.minutes else cells.astype(np.float64)
+        found = self._at_once(cells)
+        left = np.flatnonzero(np.isnan(found))
+        read_each(self.one, texts_of(cells[left]), left.tolist(), found, bad)
         return found
 
-    def _of_numbers(self, values: Float64, bad: dict[int, BadCell]) -> Float64:
-        good = np.isfinite(values)
-        if self.side:
-            largest = 90.0 if self.side == 'NS' else 180.0
-            good &= np.abs(values) <= (largest if self.side == 'NS' else 2.0 * largest)
-            values = np.where(values > largest, values - 360.0, values)
-        why = 'no latitude and longitude' if self.side else 'not a number'
-        for place in np.flatnonzero(~good).tolist():
-            none = np.isnan(values[place])
-            cell = '' if none else str(values[place])
-            bad.setdefault(place, BadCell('empty' if none else why, cell))
-        return np.where(good, values, np.nan)
+    def _at_once(self, cells: Cells) -> Float64:
+        """Return (n,) numbers, NaN where a cell is to be looked at by itself."""
+        if are_numbers(cells):
+            most = {'': np.finfo(np.float64).max, 'NS': 90.0, 'EW': 360.0}[self.side]
+            turned = np.where(cells > 180.0, cells - 360.0, cells) if self.side == 'EW' else cells
+            return np.where(np.abs(cells) <= most, turned, np.nan)
+        if not (self.comma or self.side) and _PLAIN.issuperset(''.join(cells)):
+            with suppress(ValueError):  # an empty cell for instance
+                found = np.array([*map(float, cells)], np.float64)
+                return np.where(np.isfinite(found).all(), found, np.nan)
+        return np.full(len(cells), np.nan)
 
-
-def _coordinate(text: str, side: str, minutes: bool, cell: str) -> float:
-    found = _JOINED.fullmatch(text) if minutes else _PARTED.fullmatch(text)
-    if found is not None and not (minutes and found[1] and found[4]):
-        *_, whole, rest, letter = found.groups()
-        value = _checked(float(whole), float(rest), letter or side[0], side, cell)
-        return -value if minutes and found[1] == '-' else value
-    found = None if minutes else _DECIMAL.fullmatch(text)
-    if found is None or (found[2] and text[0] in '+-'):
-        raise BadCell('no latitude and longitude', cell)
-    return _checked(float(found[1]), 0.0, found[2] or side[0], side, cell)
+    def _coordinate(self, text: str) -> float:
+        found = (_JOINED if self.minutes else _PARTED).fullmatch(text)
+        if found is None and not self.minutes:
+            found = _DECIMAL.fullmatch(text)
+        if found is not None and not (found[1] and found[4]):
+            minutes, side = float(found[3] or 0.0), found[4] or self.side[0]
+            value = float(found[2]) + minutes / 60.0
+            half, whole = (90.0, 90.0) if self.side == 'NS' else (180.0, 360.0)
+            if side in self.side and minutes < 60.0 and value <= whole:
+                value *= _SIDES[side]
+                value = 0.0 - value if found[1] == '-' else value
+                # a longitude counted from 0 to 360 is one too
+                return value - 360.0 if value > half else value
+        raise BadCell('no latitude and longitude')
 
 
 def has_decimal_commas(cells: Iterable[str]) -> bool:
@@ -154,7 +201,7 @@ def has_decimal_commas(cells: Iterable[str]) -> bool:
     return bool(commas > 1 and parted and 10 * commas >= plain and 50 * points <= commas)
 
 
-def coordinate_readers(latitudes: Sequence[str], longitudes: Sequence[str]) -> list[CellReader]:
+def coordinate_readers(latitudes: Cells, longitudes: Cells) -> list[CellReader]:
     """
     Return what reads latitudes and longitudes, by how some of them are written.
     """
@@ -194,30 +241,20 @@ def _share_in_minutes(cells: Iterable[str], largest: float, digits: int) -> floa
     return fitting / max(count, 1)
 
 
-def _checked(degrees: float, minutes: float, letter: str, side: str, cell: str) -> float:
-    value = abs(degrees) + minutes / 60.0
-    largest = 90.0 if side == 'NS' else 180.0
-    # a longitude counted from 0 to 360 is one too
-    if letter not in side or minutes >= 60.0 or value > (largest if side == 'NS' else 360.0):
-        raise BadCell('no latitude and longitude', cell)
-    value *= _SIDES[letter] * (-1.0 if degrees < 0.0 else 1.0)
-    return value - 360.0 if value > largest else value
-
-
-def combined(form: Form, values: Sequence[Float64]) -> tuple[Float64, Float64]:
+def combined(columns: InputColumns, values: Sequence[Float64]) -> tuple[Float64, Float64]:
     """
     Return the two values (n,) of samples from those of their columns, in SI units.
     """
-    first = values[0]
-    nothing = np.zeros(len(first))
-    if form is Form.COMPASS:
-        return np.array([remainder(each, 2.0 * pi) for each in _finite(pi / 2.0 - first)]), nothing
-    if form is Form.HYPOT:
-        return np.array([*map(hypot, first, values[1])]), nothing
-    if form is Form.POLAR:
-        angle = _finite(values[1])
+    first, second = values if len(values) > 1 else (values[0], np.zeros(len(values[0])))
+    if COMPASS in columns.units:
+        yaw = [remainder(each, 2.0 * pi) for each in _finite(pi / 2.0 - first)]
+        return np.array(yaw), second
+    if columns.is_polar:
+        angle = _finite(second)
         return -first * [*map(cos, angle)], first * [*map(sin, angle)]
-    return first, values[1] if len(values) > 1 else nothing
+    if columns.channel.kind is Channel.SPEED_OVER_GROUND and len(values) > 1:
+        return np.array([*map(hypot, first, second)]), np.zeros(len(first))
+    return first, second
 
 
 def _finite(values: Float64) -> list[float]:
@@ -229,8 +266,10 @@ def _finite(values: Float64) -> list[float]:
 ORDERS = ('ymd', 'dmy', 'mdy')
 """Of year, month and day in a date."""
 
+MIDNIGHT = re.compile(r'(00?:00(?::00(?:[.,]0+)?)?)?')
+"""Of a time of day that is midnight or none."""
+
 _DAY = re.compile(r'(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4})')
-_MIDNIGHT = re.compile(r'00?:00(?::00(?:[.,]0+)?)?')
 _COMPACT = re.compile(r'(\d{4})(\d\d)(\d\d)')
 _CLOCK = re.compile(
     r'(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?(?:\s*([aApP][mM]))?\s*'
@@ -244,13 +283,14 @@ def parts(text: str) -> tuple[str, str]:
     Split a cell into date and time of day; either may be empty.
     """
     day, blank, clock = re.sub(r'(?<=\d)T(?=\d)', ' ', text, count=1).partition(' ')
+    clock = clock.strip()
     if _DAY.fullmatch(day) or _COMPACT.fullmatch(day):
-        midnight, _, rest = clock.strip().partition(' ')
-        if ':' in rest and _MIDNIGHT.fullmatch(midnight):  # a date of a spreadsheet, and the time
-            return day, rest.strip()
-        return day, clock.strip()
-    if blank and _DAY.fullmatch(clock.strip()):  # the time first
-        return clock.strip(), day
+        midnight, _, rest = clock.partition(' ')
+        if ':' in rest and MIDNIGHT.fullmatch(midnight):  # a date of a spreadsheet, and the time
+            clock = rest.strip()
+        return day, clock
+    if blank and _DAY.fullmatch(clock):  # the time first
+        return clock, day
     return '', text
 
 
@@ -259,16 +299,7 @@ def is_date(text: str) -> bool:
     Say whether a cell holds a date, a time of day, or both.
     """
     day, clock = parts(text)
-    if day and not _COMPACT.fullmatch(day):
-        return not clock or _CLOCK.fullmatch(clock) is not None
-    return bool(clock) and _CLOCK.fullmatch(clock) is not None
-
-
-def is_midnight(clock: str) -> bool:
-    """
-    Say whether a time of day is midnight or none.
-    """
-    return not clock or _MIDNIGHT.fullmatch(clock) is not None
+    return bool(_CLOCK.fullmatch(clock) if clock else _DAY.fullmatch(day))
 
 
 def order_of(texts: Iterable[str], table: LogTable) -> tuple[str, str]:
@@ -296,7 +327,7 @@ def order_of(texts: Iterable[str], table: LogTable) -> tuple[str, str]:
     for hint in (*table.titles, table.path.name):
         for found in _IN_TITLE.finditer(hint):
             date = (int(found[1]), int(found[2]), int(found[3]))
-            fitting = [order for order in possible if _numbers(days[0], order, '') == date]
+            fitting = [order for order in possible if _numbers(days[0], order) == date]
             if len(fitting) == 1:
                 return fitting[0], f'{found[0]} in {hint.strip("- ")!r}'
     if not possible:
@@ -327,43 +358,43 @@ def zone_of(text: str) -> tzinfo:
         ) from None
 
 
-def _fits(day: str, order: str) -> bool:
-    try:
-        datetime(*_numbers(day, order, day))
-    except (BadCell, ValueError):
-        return False
-    return True
-
-
-def _numbers(day: str, order: str, text: str) -> tuple[int, int, int]:
+def _numbers(day: str, order: str) -> tuple[int, int, int]:
     """Return year, month and day of the month."""
     if found := _COMPACT.fullmatch(day):
         return int(found[1]), int(found[2]), int(found[3])
     found = _DAY.fullmatch(day)
     if found is None:
-        raise BadCell('no date', text)
-    written = dict(zip(order, (found[1], found[3], found[4]), strict=True))
-    year = written['y']
-    if len(year) not in (2, 4) or len(written['d']) > 2 or (order == 'ymd' and len(year) != 4):
-        raise BadCell('no possible date', text)
+        raise BadCell('no date')
+    named = dict(zip(order, (found[1], found[3], found[4]), strict=True))
+    year = named['y']
+    if len(year) not in (2, 4) or len(named['d']) > 2 or (order == 'ymd' and len(year) != 4):
+        raise BadCell('no possible date')
     century = 2000 if len(year) == 2 else 0
-    return century + int(year), int(written['m']), int(written['d'])
+    return century + int(year), int(named['m']), int(named['d'])
 
 
-def _clock_ns(text: str, whole: str) -> tuple[int, tzinfo | None]:
+def _fits(day: str, order: str) -> bool:
+    try:
+        datetime(*_numbers(day, order))
+    except (BadCell, ValueError):
+        return False
+    return True
+
+
+def _clock_ns(text: str) -> tuple[int, tzinfo | None]:
     """Return the time of day [ns], and its zone where it states one."""
     if not text:
         return 0, None
     found = _CLOCK.fullmatch(text)
     if found is None:
-        raise BadCell('no time of day', whole)
+        raise BadCell('no time of day')
     hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
     if found[5] and 1 <= hour <= 12:
         hour = hour % 12 + (12 if found[5].lower() == 'pm' else 0)
-    elif found[5] or hour > 23:
-        raise BadCell('no time of day', whole)
-    if minute > 59 or second > 59:
-        raise BadCell('no time of day', whole)
+    elif found[5]:
+        hour = 24  # half a day has no such hour
+    if hour > 23 or minute > 59 or second > 59:
+        raise BadCell('no time of day')
     zone = zone_of(found[6] if found[6][0] in '+-' else 'UTC') if found[6] else None
     fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
     return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns, zone
@@ -375,23 +406,30 @@ _DAY_NS = 86_400 * SECOND_NS
 _COUNTS_FROM = (('ns', 10**17), ('us', 10**14), ('ms', 10**11))  # since 1970, from 1973 on
 
 
+@dataclass
 class RowClock:
     """
     Times of rows [ns], each from its cell.
 
     Attributes
     ----------
+    read
+        Returns the time of a cell as it is counted [ns].
     base_ns
-        What was added to the times of the table [ns]; None if they are dates.
+        What is added to the times of the table [ns]; None if they are dates.
     notes
         What was assumed, a sentence each.
+    unit
+        Of counts; '' of others. The first count shows whether they are dates.
     """
 
-    def __init__(self) -> None:
-        self.base_ns: int | None = None
-        self.notes: list[str] = []
+    read: Callable[[str], int | Decimal]
+    base_ns: int | None = None
+    notes: list[str] = field(default_factory=list)
+    unit: str = ''
+    _begun: bool = False
 
-    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
+    def times(self, cells: Cells, bad: Bad) -> Int64:
         """
         Return (n,) times of rows [ns].
 
@@ -399,28 +437,35 @@ class RowClock:
         ----------
         cells : (n,)
             Of the time.
-        first
-            Number of the first row, from 0.
         bad
-            Filled with why, by the place of a cell that holds none.
+            Filled with those that hold none.
         """
-        found = np.zeros(len(cells), np.int64)
-        for place, cell in enumerate(texts_of(cells) if isinstance(cells, np.ndarray) else cells):
-            try:
-                time_ns = self._time_ns(cell)
-                if not 0 <= time_ns < LIMIT_NS:
-                    raise BadCell('no possible date', cell)
-                found[place] = time_ns
-            except BadCell as error:
-                bad[place] = error
+        found, exact = np.zeros(len(cells), np.int64), np.zeros(len(cells), np.bool_)
+        if are_numbers(cells):
+            found, exact = _counts_ns(cells, len(str(NANOSECONDS[self.unit])) - 1)
+        left = np.flatnonzero(~exact)
+        read_each(self._bounded_ns, texts_of(cells[left]), left.tolist(), found, bad)
+        good = np.ones(len(found), np.bool_)
+        good[list(bad)] = False
+        if self.unit and not self._begun and good.any():
+            self._begun = True
+            self.base_ns = BASE_NS if found[good.argmax()] < _RELATIVE_BELOW_NS else None
+        found += self.base_ns or 0
+        beyond = np.flatnonzero(good & ((found < 0) | (found >= LIMIT_NS)))
+        read_each(_impossible, texts_of(cells[beyond]), beyond.tolist(), found, bad)
         return found
 
-    def _time_ns(self, cell: str) -> int:
-        raise NotImplementedError
+    def _bounded_ns(self, cell: str) -> int:
+        time_ns = self.read(cell)
+        return int(time_ns) if -LIMIT_NS < time_ns < LIMIT_NS else _impossible(cell)
+
+
+def _impossible(cell: str) -> NoReturn:
+    raise BadCell('no possible date')
 
 
 def row_clock(
-    time: TimeColumn | None, rate_hz: float | None, cells: Sequence[str], table: LogTable
+    time: TimeColumn | None, rate_hz: float | None, cells: Cells, table: LogTable
 ) -> RowClock:
     """
     Make the clock of a table.
@@ -441,77 +486,97 @@ def row_clock(
     """
     if time is None:
         assert rate_hz is not None
-        return _Steady(rate_hz)
-    texts = [cell.strip() for cell in cells if cell.strip()]
-    if len(time.names) == 2 or (texts and is_date(texts[0])):
-        return _Dates(time, texts, table)
-    return _Counts(time, texts)
-
-
-class _Steady(RowClock):
-    """Of rows that are so many a second."""
-
-    def __init__(self, rate_hz: float) -> None:
-        super().__init__()
         if not (isfinite(rate_hz) and rate_hz > 0.0):
             raise ImportDataError(
                 f'--rate {rate_hz!r}: expected a number of rows a second above 0'
             )
-        self.base_ns = BASE_NS
-        self._row_ns = SECOND_NS / Fraction(rate_hz)
+        row_ns, rows = SECOND_NS / Fraction(rate_hz), count()
+        return RowClock(lambda _: round(next(rows) * row_ns), BASE_NS)
+    texts = [*filter(None, texts_of(cells))]
+    if len(time.names) == 1 and not (texts and is_date(texts[0])):
+        return _counts(time, texts)
+    order, known_by = (time.order, '') if time.order else order_of(texts, table)
+    if order:
+        return RowClock(_Dates(order, time.zone).ns, notes=[*_notes(time, order, known_by, texts)])
+    if texts and parts(texts[0])[0]:
+        raise ImportDataError(
+            f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
+            '--date-order dmy or --date-order mdy'
+        )
+    return RowClock(_Dates().ns, BASE_NS, ['The times are times of day without a date.'])
 
-    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
-        rows = range(first, first + len(cells))
-        return np.array([BASE_NS + round(number * self._row_ns) for number in rows], np.int64)
+
+def _notes(time: TimeColumn, order: str, known_by: str, texts: Sequence[str]) -> Iterator[str]:
+    """Say what is assumed of dates."""
+    if known_by and order != 'ymd':
+        words = {'d': 'day', 'm': 'month', 'y': 'year'}
+        yield f'Dates are {"/".join(words[each] for each in order)}, as {known_by} show.'
+    clock = ''.join(parts(text)[1] for text in texts[:1])
+    stated = clock.endswith(('Z', 'UTC', 'GMT')) or {*'+-'} & {*clock}
+    if time.zone is UTC and not (stated or 'utc' in ' '.join(time.names).lower()):
+        yield 'The times state no zone and are taken as UTC (--zone).'
 
 
-class _Dates(RowClock):
-    """Of dates, or of times of day alone."""
+def _counts(time: TimeColumn, texts: Sequence[str]) -> RowClock:
+    """Return the clock of counts since 1970, or from a start."""
+    comma, unit, check = has_decimal_commas(texts), time.unit, CellReader().one
+    notes: list[str] = []
 
-    def __init__(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
-        super().__init__()
-        self._zone = time.zone
+    def number(cell: str) -> Decimal:
+        plain = cell.replace(',', '.', 1) if comma and '.' not in cell else cell
+        check(plain)
+        return Decimal(plain)
+
+    def ns(cell: str) -> Decimal:
+        return (number(cell) * NANOSECONDS[unit]).to_integral_value()
+
+    for text in texts[: not unit]:
+        with suppress(BadCell):
+            size = abs(number(text))
+            unit = next((each for each, least in _COUNTS_FROM if size >= least), '')
+    if unit != time.unit:
+        notes.append(f'The times are counts of {unit} since 1970, by their size.')
+    unit = unit or 's'
+    return RowClock(ns, notes=notes, unit=unit)
+
+
+class _Dates:
+    """
+    Reads dates, or times of day alone.
+
+    Parameters
+    ----------
+    order
+        Of year, month and day; '' of times of day.
+    zone
+        Of dates that state none.
+    """
+
+    def __init__(self, order: str = '', zone: tzinfo = UTC) -> None:
+        self._order = order
+        self._zone = zone
         self._midnights = 0
         self._last_of_day_ns = 0
-        self._order, known_by = time.order, ''
-        if not self._order:
-            self._order, known_by = order_of(texts, table)
-        order = self._order
-        if not order and texts and parts(texts[0])[0]:
-            raise ImportDataError(
-                f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
-                '--date-order dmy or --date-order mdy'
-            )
-        if not order:
-            self.base_ns = BASE_NS
-            self.notes.append('The times are times of day without a date.')
-            return
-        if known_by and order != 'ymd':
-            words = {'d': 'day', 'm': 'month', 'y': 'year'}
-            written = '/'.join(words[each] for each in order)
-            self.notes.append(f'Dates are {written}, as {known_by} show.')
-        stated = 'utc' in ' '.join(time.names).lower() or any(map(_has_zone, texts[:1]))
-        if time.zone is UTC and not stated:
-            self.notes.append('The times state no zone and are taken as UTC (--zone).')
 
-    def _time_ns(self, cell: str) -> int:
+    def ns(self, cell: str) -> int:
+        """
+        Return the time of a cell [ns], of a time of day from the first midnight on.
+        """
         if not cell:
-            raise BadCell('empty', cell)
+            raise BadCell('empty')
         day, clock = parts(cell)
-        clock_ns, zone = _clock_ns(clock, cell)
+        clock_ns, zone = _clock_ns(clock)
         if not self._order:
             if day:
-                raise BadCell('a date where others have none', cell)
+                raise BadCell('a date where others have none')
             return self._since_midnight(clock_ns)
-        year, month, number = _numbers(day, self._order, cell)
         try:
-            midnight = datetime(year, month, number, tzinfo=zone or self._zone)
+            midnight = datetime(*_numbers(day, self._order), tzinfo=zone or self._zone)
             # the zone's offset at the time itself, which a change of the clocks moves
             local = midnight + timedelta(seconds=clock_ns // SECOND_NS)
-            seconds = int(local.timestamp())
+            return int(local.timestamp()) * SECOND_NS + clock_ns % SECOND_NS
         except (ValueError, OverflowError):
-            raise BadCell('no possible date', cell) from None
-        return seconds * SECOND_NS + clock_ns % SECOND_NS
+            _impossible(cell)
 
     def _since_midnight(self, of_day_ns: int) -> int:
         """Add the midnights passed: a time of day that goes back by hours is of the next day."""
@@ -520,65 +585,7 @@ class _Dates(RowClock):
         elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
             self._midnights -= 1  # a row from before the midnight behind one from after it
         self._last_of_day_ns = of_day_ns
-        return BASE_NS + self._midnights * _DAY_NS + of_day_ns
-
-
-class _Counts(RowClock):
-    """Of counts since 1970, or from a start."""
-
-    def __init__(self, time: TimeColumn, texts: Sequence[str]) -> None:
-        super().__init__()
-        self._comma = has_decimal_commas(texts)
-        self._unit_ns = time.unit_ns
-        self._known = False
-        self._plain = CellReader()
-        for text in () if time.given else texts[:1]:
-            try:
-                count = abs(self._plain.one(text.replace(',', '.', 1) if self._comma else text))
-            except BadCell:
-                continue
-            unit = next((unit for unit, least in _COUNTS_FROM if count >= least), 's')
-            if unit != 's':
-                self._unit_ns = NANOSECONDS[unit]
-                self.notes.append(f'The times are counts of {unit} since 1970, by their size.')
-
-    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
-        if not isinstance(cells, np.ndarray):
-            return super().times(cells, first, bad)
-        times, exact = _counts_ns(cells, len(str(self._unit_ns)) - 1)
-        for place in np.flatnonzero(~exact).tolist():
-            (cell,) = texts_of(cells[place : place + 1])
-            try:
-                times[place] = self._count_ns(cell)
-            except BadCell as error:
-                bad[place] = error
-        good = np.ones(len(times), np.bool_)
-        good[list(bad)] = False
-        if good.any():
-            self._begin(int(times[good.argmax()]))
-        times += self.base_ns or 0
-        for place in np.flatnonzero(good & ((times < 0) | (times >= LIMIT_NS))).tolist():
-            bad[place] = BadCell('no possible date', str(cells[place]))
-        return times
-
-    def _time_ns(self, cell: str) -> int:
-        time_ns = self._count_ns(cell)
-        self._begin(time_ns)
-        return time_ns + (self.base_ns or 0)
-
-    def _count_ns(self, cell: str) -> int:
-        plain = cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
-        self._plain.one(plain)
-        exact = Decimal(plain) * self._unit_ns
-        if exact.copy_abs() >= LIMIT_NS:
-            raise BadCell('no possible date', cell)
-        return int(exact.to_integral_value())
-
-    def _begin(self, time_ns: int) -> None:
-        """Say by the first count whether they count from 1970 or from a start."""
-        if not self._known:
-            self.base_ns = BASE_NS if time_ns < _RELATIVE_BELOW_NS else None
-            self._known = True
+        return self._midnights * _DAY_NS + of_day_ns
 
 
 def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.bool_]]:
@@ -593,22 +600,15 @@ def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.boo
         return np.where(left, counts, 0).astype(np.int64) * 10**digits, left
     size = np.where(left, size, 0.0)
     whole = np.floor(size)
-    part, ns = size - whole, np.zeros(len(counts), np.int64)
-    exact = np.zeros(len(counts), np.bool_)
-    for k in range(digits + 1):
-        decimal = np.rint(part * 10.0**k)
-        fits = left & ~exact & (whole + decimal / 10.0**k == size)
-        ns[fits] = decimal[fits].astype(np.int64) * 10 ** (digits - k)
-        exact |= fits
-    # one of more decimals is rounded, where it is clear to which side
+    part = size - whole
     fine = part * 10.0**digits
-    near = np.abs(fine - np.rint(fine)) + np.spacing(size) * 10.0**digits < 0.5
-    fits = left & ~exact & near
-    ns[fits] = np.rint(fine[fits]).astype(np.int64)
+    ns = np.rint(fine)
+    # one of more decimals is rounded, where it is clear to which side
+    exact = left & (np.abs(fine - ns) + np.spacing(size) * 10.0**digits < 0.5)
+    for k in reversed(range(digits + 1)):
+        decimal = np.rint(part * 10.0**k)
+        fits = left & (whole + decimal / 10.0**k == size)
+        ns[fits] = decimal[fits] * 10.0 ** (digits - k)
+        exact |= fits
     whole_ns = whole.astype(np.int64) * 10**digits
-    return np.where(np.signbit(counts), -1, 1) * (whole_ns + ns), exact | fits
-
-
-def _has_zone(text: str) -> bool:
-    clock = parts(text)[1]
-    return clock.endswith(('Z', 'UTC', 'GMT')) or '+' in clock or '-' in clock
+    return np.where(np.signbit(counts), -1, 1) * (whole_ns + ns.astype(np.int64)), exact

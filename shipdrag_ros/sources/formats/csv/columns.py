@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, tzinfo
 from decimal import Decimal
-from enum import Enum
 from importlib import resources
 from math import pi
 
@@ -54,15 +53,6 @@ NANOSECONDS: Mapping[str, Decimal] = {
 }
 
 
-class Form(Enum):
-    """How the columns of an input make its value."""
-
-    PLAIN = 'plain'
-    HYPOT = 'hypot'  # a speed from two components
-    POLAR = 'polar'  # apparent wind: speed, and where it comes from, clockwise from ahead
-    COMPASS = 'compass'  # deg clockwise from north
-
-
 @dataclass(frozen=True)
 class InputColumns:
     """
@@ -74,21 +64,15 @@ class InputColumns:
         What they hold; of several shafts or pitches, the first one.
     names
         Names or numbers, counted from 1; of one value, or of one a shaft.
-    factors
-        What each is multiplied by for the unit of `Channel`.
     units
         In which they stand, as `--map` takes them.
-    form
-        How several make one value.
     stated
         Whether a unit is stated; where not, they are SI.
     """
 
     channel: Channel
     names: tuple[str, ...]
-    factors: tuple[float, ...]
-    units: tuple[str, ...] = ()
-    form: Form = Form.PLAIN
+    units: tuple[str, ...]
     stated: bool = True
 
     @property
@@ -96,15 +80,24 @@ class InputColumns:
         """What they are mapped to."""
         return _name(self.channel)
 
+    @property
+    def factors(self) -> list[float]:
+        """What each is multiplied by for the unit of `Channel`."""
+        return [_UNITS[self.channel.kind][unit] for unit in self.units]
+
+    @property
+    def is_polar(self) -> bool:
+        """Whether a wind is its speed, and where it comes from, clockwise from ahead."""
+        return [unit in _ANGLE for unit in self.units] == [False, True]
+
     def by_channel(self) -> Iterator[InputColumns]:
         """
         Yield the columns of each channel: of several shafts, one each.
         """
         for channels in (SHAFTS, PITCHES):
             if self.channel is channels[0]:
-                columns = zip(channels, self.names, self.factors, self.units, strict=False)
-                for channel, name, factor, unit in columns:
-                    yield InputColumns(channel, (name,), (factor,), (unit,))
+                for channel, name, unit in zip(channels, self.names, self.units, strict=False):
+                    yield InputColumns(channel, (name,), (unit,))
                 return
         yield self
 
@@ -118,10 +111,8 @@ class TimeColumn:
     ----------
     names
         One column, or one of the date and one of the time of day.
-    unit_ns
-        Of a count [ns]; s where none is given.
-    given
-        Whether the unit was given.
+    unit
+        Of a count, see `NANOSECONDS`; '' where none is given.
     order
         Of year, month and day in a date, see `cells.ORDERS`; '' to be found.
     zone
@@ -129,8 +120,7 @@ class TimeColumn:
     """
 
     names: tuple[str, ...]
-    unit_ns: Decimal
-    given: bool = False
+    unit: str = ''
     order: str = ''
     zone: tzinfo = UTC
 
@@ -156,20 +146,20 @@ def parse_input(text: str) -> InputColumns:
     """
     name, _, rest = text.partition('=')
     name = name.strip()
-    channels = [channel for channel in _UNITS if _name(channel) == name]
-    if not channels:
-        known = ', '.join(dict.fromkeys(map(_name, _UNITS)))
-        raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
+    known = {unit for channel in _UNITS if _name(channel) == name for unit in _UNITS[channel]}
+    if not known:
+        inputs = ', '.join(dict.fromkeys(map(_name, _UNITS)))
+        raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {inputs}')
     counts = _COUNTS.get(kind_of(name), (1,))
-    columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
-    if len(columns) not in counts or not all(column for column, _ in columns):
+    columns, units = zip(*(_split_unit(piece, known) for piece in rest.split(',')), strict=True)
+    if len(columns) not in counts or not all(columns):
         expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
         example = f'{name}={",".join(["COLUMN[:unit]"] * counts[0])}'
         raise ImportDataError(f'--map {text!r}: expected {expected} column(s), {example}')
-    return columns_of(name, [column for column, _ in columns], [unit for _, unit in columns])
+    return columns_of(name, columns, units)
 
 
-def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) -> InputColumns:
+def columns_of(name: str, columns: Sequence[str], stated: Sequence[str]) -> InputColumns:
     """
     Return the columns of an input.
 
@@ -180,46 +170,30 @@ def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) 
     columns
         Their names.
     stated
-        Unit of each, None where none is stated.
+        Unit of each, '' where none is stated.
 
     Raises
     ------
     ImportDataError
         If the units do not go together.
     """
-    text = f'{name}={",".join(columns)}'
-    given = [unit for unit in stated if unit is not None]
+    given = [*filter(None, stated)]
     channel = next(channel for channel in _UNITS if _name(channel) == name)
     if 'deg' in given:
         channel = GEODETIC.get(channel, channel)
     known = _UNITS[channel]
-    if any(unit not in known for unit in given):
-        raise ImportDataError(
-            f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
-        )
     common = given[0] if given else next(iter(known))
     units = tuple(unit or common for unit in stated)  # a unit given once holds for all
-    form = Form.PLAIN
-    if channel is Channel.WIND_APPARENT:
-        angles = [unit in _ANGLE for unit in units]
-        if angles == [False, True]:
-            form = Form.POLAR
-        elif any(angles):
-            raise ImportDataError(
-                f'--map {text!r}: expected both columns in a unit of speed, or the second in deg'
-            )
-    elif COMPASS in units:
-        form = Form.COMPASS
-    elif channel.kind is Channel.SPEED_OVER_GROUND and len(columns) == 2:
-        form = Form.HYPOT
-    return InputColumns(
-        channel,
-        tuple(columns),
-        tuple(known[unit] for unit in units),
-        units,
-        form,
-        stated=bool(given),
-    )
+    found = InputColumns(channel, tuple(columns), units, stated=bool(given))
+    expected = ''
+    if not known.keys() >= {*units}:
+        expected = f'in deg, or both in {", ".join(_LENGTH)}'
+    elif channel is Channel.WIND_APPARENT and _ANGLE.keys() & {*units} and not found.is_polar:
+        expected = 'in a unit of speed, or the second in deg'
+    if expected:
+        text = f'{name}={",".join(columns)}'
+        raise ImportDataError(f'--map {text!r}: expected both columns {expected}')
+    return found
 
 
 def parse_time(text: str) -> TimeColumn:
@@ -232,25 +206,21 @@ def parse_time(text: str) -> TimeColumn:
         If the unit is not known.
     """
     column, unit = _split_unit(text, NANOSECONDS)
-    names = tuple(name.strip() for name in column.split(',')) if unit is None else (column,)
+    names = (column,) if unit else tuple(name.strip() for name in column.split(','))
     if not all(names) or len(names) > 2:
         raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit], or DATE,TIME')
-    return TimeColumn(names, NANOSECONDS[unit or 's'], given=unit is not None)
+    return TimeColumn(names, unit)
 
 
 def _name(channel: Channel) -> str:
     return 'pitch' if channel in PITCHES else channel.input
 
 
-def _units_of(channels: list[Channel]) -> set[str]:
-    return {unit for channel in channels for unit in _UNITS[channel]}
-
-
-def _split_unit(text: str, units: Mapping[str, object] | set[str]) -> tuple[str, str | None]:
+def _split_unit(text: str, units: Collection[str]) -> tuple[str, str]:
     """Return column and unit; a colon may also be part of a column's name."""
     column, colon, unit = text.strip().rpartition(':')
     if not colon:
-        return text.strip(), None
+        return unit, ''
     if unit.strip() in units:
         return column.strip(), unit.strip()
     raise ImportDataError(

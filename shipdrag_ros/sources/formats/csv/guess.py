@@ -11,22 +11,25 @@ not used.
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import tzinfo
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import ALL_MOTION, FURTHER, Channel, Float64
 from shipdrag_ros.sources.formats.csv.cells import (
-    BadCell,
+    MIDNIGHT,
+    Bad,
     CellReader,
     coordinate_readers,
     has_decimal_commas,
     is_date,
-    is_midnight,
     parts,
     row_clock,
 )
@@ -37,9 +40,10 @@ from shipdrag_ros.sources.formats.csv.columns import (
     InputColumns,
     TimeColumn,
     columns_of,
+    parse_input,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, are_numbers
 
 _STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
 _MOVING_M_S = 0.4
@@ -161,7 +165,7 @@ class FirstRows:
             if role:
                 self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
 
-    def texts(self, place: int) -> Sequence[str]:
+    def texts(self, place: int) -> Cells:
         """
         Return the cells of a column; '' where a row is too short.
         """
@@ -172,18 +176,21 @@ class FirstRows:
         Return (n,) numbers of a column, NaN where a cell is none.
         """
         cells = self._rows.columns[place]
-        comma = not isinstance(cells, np.ndarray) and has_decimal_commas(cells)
-        return CellReader(comma=comma).all(cells, {})
+        return CellReader(not are_numbers(cells) and has_decimal_commas(cells)).all(cells, {})
+
+    def largest(self, place: int) -> float:
+        """
+        Return the largest size of the numbers of a column; 0 where it has none.
+        """
+        return float(np.nanmax(np.abs(self.values(place)), initial=0.0))
 
     def coordinates(self, places: Sequence[int]) -> list[Float64]:
         """
         Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
         """
         readers = coordinate_readers(*map(self.texts, places))
-        return [
-            read.all(self._rows.columns[place], {})
-            for read, place in zip(readers, places, strict=True)
-        ]
+        cells = [self._rows.columns[place] for place in places]
+        return [read.all(each, {}) for read, each in zip(readers, cells, strict=True)]
 
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
         """
@@ -191,24 +198,15 @@ class FirstRows:
         """
         if time is None:
             return None
-        places = [self.table.column(name) for name in time.names]
-        texts = self._rows.joined(places)
+        cells = self._rows.joined([self.table.column(name) for name in time.names])
+        bad: Bad = {}
         try:
-            clock = row_clock(time, None, texts, self.table)
+            times = row_clock(time, None, cells, self.table).times(cells, bad)
         except ImportDataError:
             return None
-        bad: dict[int, BadCell] = {}
-        times = clock.times(self._rows.columns[places[0]] if len(places) == 1 else texts, 0, bad)
         good = np.ones(len(times), np.bool_)
         good[list(bad)] = False
-        first = times[good.argmax()] if good.any() else 0
-        return np.where(good, (times - first) * 1e-9, np.nan)
-
-    def largest(self, place: int) -> float:
-        """
-        Return the largest size of the numbers of a column; 0 where it has none.
-        """
-        return float(np.nanmax(np.abs(self.values(place)), initial=0.0))
+        return np.where(good, (times - times[good][:1].sum()) * 1e-9, np.nan)
 
 
 _DAYS = 20_000.0  # a spreadsheet's count of days, from 1954 on
@@ -229,11 +227,14 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
     if dated:
         clock = next((each for each in times if each not in dated), None)
         clocks = [parts(text)[1] for text in rows.texts(dated[0].place)]
-        bare = not any(clocks[:5])
-        if clock is not None and not bare:  # a spreadsheet gives a date a midnight
-            bare = _holds(rows, clock, date=False) and all(map(is_midnight, clocks))
-        names = (dated[0].key, clock.key) if bare and clock is not None else (dated[0].key,)
-        return TimeColumn(names, NANOSECONDS['s'])
+        names = [dated[0].key]
+        if clock is not None and (
+            not any(clocks[:5])
+            # a spreadsheet gives a date a midnight
+            or (_holds(rows, clock, date=False) and all(map(MIDNIGHT.fullmatch, clocks)))
+        ):
+            names.append(clock.key)
+        return TimeColumn(tuple(names))
     if not times:
         header = ', '.join(map(repr, rows.header))
         raise ImportDataError(
@@ -242,7 +243,7 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
         )
     column = times[0]
     if column.unit in NANOSECONDS:
-        return TimeColumn((column.key,), NANOSECONDS[column.unit], given=True)
+        return TimeColumn((column.key,), column.unit)
     return _counted(rows, column, notes)
 
 
@@ -256,7 +257,7 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
     """Return a time without a unit; whole numbers in large steps may be milliseconds."""
     texts = [text for text in rows.texts(column.place) if text]
     if texts and is_date(texts[0]):
-        return TimeColumn((column.key,), NANOSECONDS['s'])
+        return TimeColumn((column.key,))
     values = rows.values(column.place)
     values = values[np.isfinite(values)]
     step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
@@ -278,16 +279,7 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
         raise ImportDataError(f'{rows.path!r}: the time {column.key!r} {why}')
     if small:
         notes.append(f'The time {column.key!r} states no unit and is taken as s.')
-    return TimeColumn((column.key,), NANOSECONDS['s'])
-
-
-def with_dates(time: TimeColumn | None, order: str, zone: tzinfo | None) -> TimeColumn | None:
-    """
-    Return the column of a time with what was said of its dates.
-    """
-    if time is None:
-        return None
-    return replace(time, order=order or time.order, zone=zone or time.zone)
+    return TimeColumn((column.key,))
 
 
 PLAIN_TIMES = ('time', 'time_s', 't', 't_s')
@@ -308,19 +300,30 @@ _TURN = 6.4  # no angle in rad is larger
 _NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
 _LENGTHS = frozenset(('m', 'km', 'ft', 'nmi'))
 _ANGLES = ('rad', 'deg')
-# the other inputs, and their likely units by the roles of their columns
-_OTHERS: Mapping[str, Mapping[str, str]] = {
-    'rudder': {'rudder': 'deg'},
-    'wind_apparent': {'aws': 'kn', 'awa': 'deg'},
-    'shaft': {'shaft': 'rpm'},
-    'depth': {'depth': 'm'},
-}
+# inputs, and the likely units of their columns by the roles of these
+_USUAL: Sequence[tuple[str, Mapping[str, str]]] = (
+    ('position', {'lat': 'deg', 'lon': 'deg'}),
+    ('position', {'x': 'm', 'y': 'm'}),
+    ('speed_through_water', {'stw': 'kn'}),
+    ('speed_over_ground', {'sog': 'kn'}),
+    ('speed_over_ground', {'east': 'm/s', 'north': 'm/s'}),
+    ('heading', {'heading': 'deg'}),
+    ('rudder', {'rudder': 'deg'}),
+    ('wind_apparent', {'aws': 'kn', 'awa': 'deg'}),
+    ('shaft', {'shaft': 'rpm'}),
+    ('depth', {'depth': 'm'}),
+)
 
 
-@dataclass
 class Guess:
     """
-    What was understood of a table.
+    What is understood of a table: what is said of it, or else by its names and values.
+
+    Parameters
+    ----------
+    table
+    options
+        By `Option.key`; those that are not there were not given.
 
     Attributes
     ----------
@@ -332,69 +335,63 @@ class Guess:
         How it is known, a sentence each.
     unclear
         What was not sure, and what to type, a sentence each.
-    """
-
-    inputs: list[InputColumns] = field(default_factory=list)
-    time: TimeColumn | None = None
-    notes: list[str] = field(default_factory=list)
-    unclear: list[str] = field(default_factory=list)
-
-
-def guess(
-    table: LogTable, *, time: TimeColumn | None = None, counted: bool = False, speed_unit: str = ''
-) -> Guess:
-    """
-    Find the inputs in a table.
-
-    Parameters
-    ----------
-    table
-    time
-        Column of the time, where it is given.
-    counted
-        Whether the rows are counted, so that none is needed.
-    speed_unit
-        Of speeds whose columns state none; '' where it is not given.
 
     Raises
     ------
     ImportDataError
-        If nothing that moves has a known unit, saying what to type.
+        If the options do not fit, or nothing that moves has a known unit, saying what to type.
     """
-    if table.header is None:
-        raise ImportDataError(
-            f'{str(table.path)!r} has no names of columns; say what they are by their numbers, '
-            'for instance --map speed_through_water=1:kn --rate 1'
-        )
-    rows = FirstRows(table)
-    made = _Guesser(rows, speed_unit)
-    if time is None and not counted:
-        time = guessed_time(rows, made.notes)
-    made.time = time
-    if made.is_plain():
-        made.plain()
-    else:
-        made.by_names(time)
-    if not any(each.channel.input in ALL_MOTION for each in made.inputs):
-        raise ImportDataError(made.nothing())
-    return made
 
-
-class _Guesser(Guess):
-    """Guesses by the first rows of a table."""
-
-    def __init__(self, rows: FirstRows, speed_unit: str) -> None:
-        super().__init__()
-        self._rows = rows
-        self._speed_unit = speed_unit
+    def __init__(self, table: LogTable, options: Mapping[str, Any]) -> None:
+        self.notes: list[str] = []
+        self.unclear: list[str] = []
+        self._table = table
+        self._speed_unit: str = options.get('speed_unit', '')
         self._track: Float64 | None = None
+        self.inputs = [placed(table, parse_input(text)) for text in options.get('map', ())]
+        given = Counter(each.name for each in self.inputs)
+        for name, count in given.items():
+            if count > 1:
+                raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
+        if not given and table.header is None:
+            raise ImportDataError(
+                f'{str(table.path)!r} has no names of columns; say what they are by their '
+                'numbers, for instance --map speed_through_water=1:kn --rate 1'
+            )
+        time: TimeColumn | None = options.get('time')
+        if time is None and options.get('rate') is None:
+            if table.header is None:
+                raise ImportDataError(
+                    'the times of the rows: give --time COLUMN[:unit] or --rate HZ'
+                )
+            time = guessed_time(self._rows, self.notes)
+        said = {'order': 'date_order', 'zone': 'zone'}
+        dates = {name: options[key] for name, key in said.items() if key in options}
+        self.time = None if time is None else replace(time, **dates)
+        if not given:
+            self._find()
 
-    def _one(self, role: str) -> NamedColumn | None:
-        columns = self._rows.roles.get(role, [])
-        if len(columns) > 1:
-            others = ', '.join(repr(each.key) for each in columns[1:])
-            self._doubt(f'{others}: {columns[0].key!r} is taken for the same thing')
-        return columns[0] if columns else None
+    @cached_property
+    def _rows(self) -> FirstRows:
+        return FirstRows(self._table)
+
+    def _find(self) -> None:
+        """Find the inputs by names and values."""
+        if self._is_plain():
+            self._plain()
+        else:
+            self._by_names()
+        if not any(each.channel.input in ALL_MOTION for each in self.inputs):
+            raise ImportDataError(self._nothing())
+
+    def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
+        """Return the columns of some roles, none where one is missing."""
+        found = [self._rows.roles.get(role, []) for role in roles]
+        for first, *others in filter(None, found):
+            if others:
+                keys = ', '.join(repr(each.key) for each in others)
+                self._doubt(f'{keys}: {first.key!r} is taken for the same thing')
+        return [each[0] for each in found] if all(found) else []
 
     def _doubt(self, text: str) -> None:
         if text not in self.unclear:
@@ -418,12 +415,7 @@ class _Guesser(Guess):
         speeds = '--speed-unit kn or m/s, or ' if bare & SPEED_UNITS.keys() else ''
         self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
-    def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
-        self.inputs.append(columns_of(name, [each.key for each in columns], list(units)))
-
-    # columns named as the inputs are
-
-    def is_plain(self) -> bool:
+    def _is_plain(self) -> bool:
         header = set(self._rows.header)
         known = {name for names in PLAIN_COLUMNS for name in names.split(',')}
         named = {each.key for columns in self._rows.roles.values() for each in columns}
@@ -433,13 +425,13 @@ class _Guesser(Guess):
             and (named <= known | set(PLAIN_TIMES))
         )
 
-    def plain(self) -> None:
+    def _plain(self) -> None:
         header = self._rows.header
         for names, name in PLAIN_COLUMNS.items():
             columns = names.split(',')
             if not all(column in header for column in columns):
                 continue
-            unit = 'deg' if names.startswith('latitude') else None
+            unit = 'deg' if names.startswith('latitude') else ''
             found = columns_of(name, columns, [unit] * len(columns))
             largest = self._rows.largest(self._rows.table.column(columns[0]))
             if name in ('heading', 'rudder') and largest > _TURN:
@@ -453,103 +445,101 @@ class _Guesser(Guess):
 
     # columns by their usual names
 
-    def by_names(self, time: TimeColumn | None) -> None:
-        self._position(self._rows.seconds(time))
-        self._speed('speed_through_water', 'kn', 'stw')
-        if not self._speed('speed_over_ground', 'kn', 'sog'):
-            self._speed('speed_over_ground', 'm/s', 'east', 'north')
-        self._heading()
-        for name, likely in _OTHERS.items():
-            columns = self._all(likely)
+    def _by_names(self) -> None:
+        self._time_s = self._rows.seconds(self.time)
+        units_of = {'position': self._position, 'heading': self._heading}
+        settled: set[str] = set()
+        for name, likely in _USUAL:
+            columns = [] if name in settled else self._all(likely)
             if not columns:
                 continue
-            units = [
-                self._unit(each, likely[role]) for each, role in zip(columns, likely, strict=True)
-            ]
-            try:
-                self._take(name, columns, units)
-            except ImportDataError:  # of none, or of another quantity
-                asked = [
-                    u if u and unit == 'deg' else unit
-                    for u, unit in zip(units, likely.values(), strict=True)
-                ]
-                self._ask(name, columns, asked)
+            find = self._speed if 'speed' in name else units_of.get(name, self._other)
+            units = find(name, columns, [*likely.values()])
+            if units:
+                self.inputs.append(columns_of(name, [each.key for each in columns], units))
+            if units or name == 'position':  # never another position in place of an unclear one
+                settled.add(name)
 
-    def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
-        """Return the columns of some roles, none where one is missing."""
-        columns = [self._one(role) for role in roles]
-        return [] if None in columns else [each for each in columns if each is not None]
+    # each returns the units of the columns of an input; none where they were asked for
 
-    def _position(self, time_s: Float64 | None) -> None:
-        if both := self._all(('lat', 'lon')):
-            other = next((each.unit for each in both if each.unit in _NO_COORDINATES), '')
-            if other:
-                keys = ', '.join(repr(each.key) for each in both)
-                self._doubt(f'{keys}: coordinates in {other} are not read')
-                return
-            self._take('position', both, ['deg', 'deg'])
-            if time_s is not None:
-                values = self._rows.coordinates([each.place for each in both])
-                self._track = track_speed(time_s, *values)
-        elif both := self._all(('x', 'y')):
-            units = {each.unit for each in both}
-            if len(units) > 1 or not units <= _LENGTHS:
-                self._ask('position', both, ['m', 'm'])
-                return
-            self._take('position', both, [each.unit for each in both])
-            if time_s is not None and units == {'m'}:
-                x, y = (self._rows.values(each.place) for each in both)
-                self._track = plane_speed(time_s, x, y)
+    def _position(
+        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
+    ) -> list[str]:
+        units, places = [each.unit for each in columns], [each.place for each in columns]
+        geodetic = likely[0] == 'deg'
+        other = next((unit for unit in units if unit in _NO_COORDINATES), '')
+        if geodetic and other:
+            keys = ', '.join(repr(each.key) for each in columns)
+            self._doubt(f'{keys}: coordinates in {other} are not read')
+            return []
+        if not geodetic and (len({*units}) > 1 or not _LENGTHS.issuperset(units)):
+            self._ask(name, columns, likely)
+            return []
+        if self._time_s is not None and geodetic:
+            self._track = track_speed(self._time_s, *self._rows.coordinates(places))
+        elif self._time_s is not None and 'm' in units:
+            self._track = plane_speed(self._time_s, *map(self._rows.values, places))
+        return ['deg', 'deg'] if geodetic else units
 
-    def _speed(self, name: str, likely: str, *roles: str) -> bool:
-        """Take a speed, of one column or of two components; say whether it was."""
-        columns = self._all(roles)
-        if not columns:
-            return False
-        keys = ', '.join(repr(each.key) for each in columns)
+    def _speed(
+        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
+    ) -> list[str]:
+        """Of a speed of one column, or of two components."""
         parts = [self._rows.values(each.place) for each in columns]
         values = np.hypot(*parts) if parts[1:] else parts[0]
         said = {each.unit for each in columns if each.unit} or {self._speed_unit} - {''}
         if len(said) > 1 or not said <= SPEED_UNITS.keys():
-            self._ask(name, columns, [likely] * len(columns))
-            return False
+            self._ask(name, columns, likely)
+            return []
         unit = ''.join(said)
         seen = '' if self._track is None else unit_of(values, self._track, unit)
         if unit and seen and seen != unit:
             why = f'is said to be in {unit}, and agrees with the positions in {seen}'
             self._ask(name, columns, [unit] * len(columns), why=why, other=seen)
-            return False
+            return []
         if len({bool(each.unit) for each in columns}) > 1:  # one of both is said, and no more
             unit = ''
         if not (unit or seen):
-            self._ask(name, columns, [likely] * len(columns))
-            return False
+            self._ask(name, columns, likely)
+            return []
         if not unit:
+            keys = ', '.join(repr(each.key) for each in columns)
             self.notes.append(
                 f'{keys}: no unit is stated; in {seen} it agrees with the way between the '
                 'positions.'
             )
-        self._take(name, columns, [unit or seen] * len(columns))
         if self._track is None:  # the other speed is compared with this one
             self._track = values * SPEED_UNITS[unit or seen]
-        return True
+        return [unit or seen] * len(columns)
 
-    def _heading(self) -> None:
-        column = self._one('heading')
-        if column is None:
-            return
+    def _heading(
+        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
+    ) -> list[str]:
+        (column,) = columns
         if column.unit == 'rad' and column.key.lower() == 'heading_rad':
-            self._take('heading', [column], ['rad'])
             self.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
             )
-        elif self._unit(column, 'deg') == 'deg':
-            self._take('heading', [column], [COMPASS])
+            return ['rad']
+        if self._unit(column, 'deg') == 'deg':
             self.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
-        else:
-            unit = column.unit if column.unit == 'rad' else COMPASS
-            why = 'whether it is yaw or compass, or its unit, is not known'
-            self._ask('heading', [column], [unit], why=why, other='rad deg compass')
+            return [COMPASS]
+        unit = column.unit if column.unit == 'rad' else COMPASS
+        why = 'whether it is yaw or compass, or its unit, is not known'
+        self._ask(name, columns, [unit], why=why, other='rad deg compass')
+        return []
+
+    def _other(
+        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
+    ) -> list[str]:
+        units = [*map(self._unit, columns, likely)]
+        with suppress(ImportDataError):  # of another quantity
+            if all(units):
+                columns_of(name, [each.key for each in columns], units)
+                return units
+        asked = [u if u and unit == 'deg' else unit for u, unit in zip(units, likely, strict=True)]
+        self._ask(name, columns, asked)
+        return []
 
     def _unit(self, column: NamedColumn, likely: str) -> str:
         """Return the unit that is stated, given, or shown by the values; '' for none."""
@@ -559,7 +549,7 @@ class _Guesser(Guess):
             return self._speed_unit
         return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''
 
-    def nothing(self) -> str:
+    def _nothing(self) -> str:
         """Say that nothing that moves is known, and what to type."""
         path = self._rows.path
         why = '; '.join(self.unclear) or (

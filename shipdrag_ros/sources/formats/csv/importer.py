@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
@@ -34,9 +34,9 @@ from shipdrag_ros.samples import (
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
 from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
+    Bad,
     BadCell,
     CellReader,
-    RowClock,
     combined,
     coordinate_readers,
     has_decimal_commas,
@@ -46,20 +46,11 @@ from shipdrag_ros.sources.formats.csv.cells import (
 from shipdrag_ros.sources.formats.csv.columns import (
     SPEED_UNITS,
     InputColumns,
-    parse_input,
     parse_time,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.guess import (
-    FirstRows,
-    Guess,
-    guess,
-    guessed_time,
-    is_table,
-    placed,
-    with_dates,
-)
-from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows
+from shipdrag_ros.sources.formats.csv.guess import Guess, is_table
+from shipdrag_ros.sources.formats.csv.table import LogTable, TableRows, are_numbers
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     ImportResult,
@@ -143,54 +134,40 @@ def read_csv(
         If a column is not there, nothing that moves has a known unit, the options do not go
         together, or nothing can be read.
     """
-    time, rate = options.get('time'), options.get('rate')
-    if time is not None and rate is not None:
+    if options.get('time') is not None and options.get('rate') is not None:
         raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
-    dates = options.get('date_order', ''), options.get('zone')
-    found = _inputs(table, with_dates(time, *dates), options)
-    time = with_dates(found.time, *dates)
-    channels = [each for mapped in found.inputs for each in mapped.by_channel()]
-    places = [[table.column(name) for name in each.names] for each in channels]
-    time_places = [] if time is None else [table.column(name) for name in time.names]
-    where = options.get('where', ())
-    chosen = [(table.column(name), text) for name, text in where]
-    sample = table.first_rows(_SAMPLE_ROWS)
-    clock = row_clock(time, rate, sample.joined(time_places), table)
-    inputs = zip(channels, places, _readers(channels, places, sample), strict=True)
-    record = _RowSamples(list(inputs), chosen, clock, time_places)
+    found = Guess(table, options)
+    record = _RowSamples(table, found, options)
     about = {
         'source': table.path.name,  # the name alone, whatever the machine
         'inputs': {each.name: list(each.names) for each in found.inputs},
-        'time': None if time is None else ', '.join(time.names),
-        'rate_hz': rate,
-        'where': dict(where),
+        'time': None if found.time is None else ', '.join(found.time.names),
+        'rate_hz': options.get('rate'),
+        'where': dict(options.get('where', ())),
     }
     log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     for rows in table.rows(progress):
         log.write_samples(record.take(rows))
-    result = record.result(table, log)
-    doubts = tuple(f'Not used: {each}' for each in found.unclear)
-    return replace(result, notes=(*found.notes, *result.notes, *doubts))
+    return record.result(log)
 
 
 class _RowSamples:
     """Turns rows into samples and counts what becomes of them."""
 
-    def __init__(
-        self,
-        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[CellReader]]],
-        where: Sequence[tuple[int, str]],
-        clock: RowClock,
-        time_places: Sequence[int],
-    ) -> None:
-        self._inputs = inputs
-        self._where = where
-        self._clock = clock
-        self._time_places = time_places
+    def __init__(self, table: LogTable, found: Guess, options: Mapping[str, Any]) -> None:
+        self._table, self._found = table, found
+        channels = [each for mapped in found.inputs for each in mapped.by_channel()]
+        places = [[*map(table.column, each.names)] for each in channels]
+        time = () if found.time is None else found.time.names
+        self._time_places = [*map(table.column, time)]
+        self._where = [(table.column(name), text) for name, text in options.get('where', ())]
+        sample = table.first_rows(_SAMPLE_ROWS)
+        self._clock = row_clock(
+            found.time, options.get('rate'), sample.joined(self._time_places), table
+        )
+        self._inputs = [*zip(channels, places, _readers(channels, places, sample), strict=True)]
         self._too_fast: Counter[Channel] = Counter()
-        self._used = {place for _, places, _ in inputs for place in places} | {*time_places}
-        self._rows = self._index = self._left_out = 0
-        self._backward = self._repeated = 0
+        self._rows = self._left_out = self._backward = self._repeated = 0
         self._first_ns: int | None = None
         self._newest_ns = self._arrived_ns = -1
         self._set_back_ns = 0  # by which a clock was set back so far
@@ -213,14 +190,14 @@ class _RowSamples:
         arrived = self._arrived(times)
         value, known = np.zeros((n, m, 2)), np.ones((n, m), np.bool_)
         for k, (columns, places, readers) in enumerate(self._inputs):
-            bad: dict[int, BadCell] = {}
+            bad: Bad = {}
             values = [
                 read.all(rows.columns[place], bad) * factor
                 for read, place, factor in zip(readers, places, columns.factors, strict=True)
             ]
             self._reject(columns.channel.input, rows, bad)
             known[list(bad), k] = False
-            value[:, k, 0], value[:, k, 1] = combined(columns.form, values)
+            value[:, k, 0], value[:, k, 1] = combined(columns, values)
             if columns.channel.kind in _SPEEDS:
                 fast = np.abs(value[known[:, k], k, 0]) > ABSURD_SPEED_M_S
                 self._too_fast[columns.channel] += int(np.sum(fast))
@@ -261,41 +238,38 @@ class _RowSamples:
         """Leave out rows without the texts that were asked for."""
         self._rows += len(rows)
         for place, text in self._where:
-            cells = np.array(rows.texts(place), object)
-            kept = cells == text
-            for cell in cells[~kept] if len(self._seen) < _FEW else ():
-                if len(self._seen) < _FEW:
-                    self._seen[cell] = None
+            cells = rows.texts(place)
+            kept = np.array([cell == text for cell in cells], np.bool_)
+            others = dict.fromkeys(cells[~kept])
+            self._seen = dict.fromkeys([*(self._seen | others)][:_FEW])
             self._left_out += int(np.sum(~kept))
             rows = rows[kept]
         return rows
 
     def _timed(self, rows: TableRows) -> tuple[Int64, TableRows]:
         """Return the times of rows, and the rows that have one."""
-        one = len(self._time_places) == 1
-        cells: Cells = [''] * len(rows)
-        if self._time_places:
-            cells = rows.columns[self._time_places[0]] if one else rows.joined(self._time_places)
-        fits = np.ones(len(rows), np.bool_)
+        cells, fits = rows.joined(self._time_places), np.ones(len(rows), np.bool_)
         if rows.beyond:
-            fits = np.array([line not in rows.beyond for line in rows.lines])
-            cells = [cell if fit else '' for cell, fit in zip(cells, fits, strict=True)]
-        bad: dict[int, BadCell] = {}
-        times = self._clock.times(cells, self._index, bad)
-        self._index += len(rows)
+            fits = ~np.isin(rows.lines, [*rows.beyond])
+            cells = np.where(fits, cells, '')
+        bad: Bad = {}
+        times = self._clock.times(cells, bad)
         for place in np.flatnonzero(~fits).tolist():
-            text = rows.beyond[rows.lines[place]]
-            bad[place] = BadCell(f'more than {len(rows.columns)} columns', text)
+            bad[place] = BadCell(f'more than {len(rows.columns)} columns')
+            bad[place].cell = rows.beyond[rows.lines[place]]
         self._reject('time', rows, bad)
         fits[list(bad)] = False
         return times[fits], rows[fits]
 
-    def result(self, table: LogTable, log: Log) -> TableResult:
+    def result(self, log: Log) -> TableResult:
         """Sum up; ImportDataError if there is nothing."""
+        table = self._table
         if self._first_ns is None or not +self._written:
             raise ImportDataError(
                 f'{str(table.path)!r} gave no sample from {self._rows} row(s); {self._why_not()}'
             )
+        used = {place for _, places, _ in self._inputs for place in places}
+        used.update(self._time_places)
         return TableResult(
             rows=self._rows,
             left_out=self._left_out,
@@ -309,9 +283,9 @@ class _RowSamples:
             delimiter=table.delimiter,
             header=table.header is not None,
             understood=self._understood(log),
-            notes=tuple(self._notes(table)),
+            notes=tuple(self._notes()),
             not_used=tuple(
-                name for place, name in enumerate(table.header or ()) if place not in self._used
+                name for place, name in enumerate(table.header or ()) if place not in used
             ),
         )
 
@@ -328,13 +302,14 @@ class _RowSamples:
             if columns.channel in log.first
         )
 
-    def _notes(self, table: LogTable) -> Iterator[str]:
-        if table.titles:
-            yield f'{len(table.titles)} line(s) above the table were left out.'
-        if table.joined_lines:
+    def _notes(self) -> Iterator[str]:
+        yield from self._found.notes
+        if self._table.titles:
+            yield f'{len(self._table.titles)} line(s) above the table were left out.'
+        if self._table.joined_lines:
             yield (
-                f'{table.joined_lines} line(s) were taken as part of a cell in quotation marks; a '
-                'mark that is not closed does that.'
+                f'{self._table.joined_lines} line(s) were taken as part of a cell in quotation '
+                'marks; a mark that is not closed does that.'
             )
         yield from self._clock.notes
         for channel, count in (+self._too_fast).items():
@@ -342,6 +317,7 @@ class _RowSamples:
                 f'{channel.input}: {count} of {self._written[channel.input]} values are above '
                 f'{ABSURD_SPEED_M_S:g} m/s, faster than any displacement ship; is the unit right?'
             )
+        yield from (f'Not used: {each}' for each in self._found.unclear)
 
     def _why_not(self) -> str:
         if self._left_out == self._rows and self._seen:
@@ -354,7 +330,7 @@ class _RowSamples:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, rows: TableRows, bad: Mapping[int, BadCell]) -> None:
+    def _reject(self, name: str, rows: TableRows, bad: Bad) -> None:
         for place, why in sorted(bad.items()):
             reject(self._rejected, name, why.reason, rows.lines[place], why.cell)
 
@@ -363,8 +339,8 @@ def _readers(
     inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: TableRows
 ) -> list[list[CellReader]]:
     """Return what reads the cells of each column, as they are written in the first rows."""
-    written = [cells for cells in sample.columns if not isinstance(cells, np.ndarray)]
-    comma = has_decimal_commas(chain.from_iterable(written))
+    texts = (cells for cells in sample.columns if not are_numbers(cells))
+    comma = has_decimal_commas(chain.from_iterable(texts))
     return [
         coordinate_readers(*map(sample.texts, here))
         if columns.channel.kind is Channel.POSITION_GEODETIC
@@ -382,24 +358,6 @@ def _score(head: Head) -> float:
 
 def _open(job: Job, log: Log) -> TableResult:
     return read_csv(LogTable(job.source), log, job.options, progress=job.progress)
-
-
-def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
-    """Return the columns that were given, or else those that are guessed."""
-    counted = options.get('rate') is not None
-    mapped = options.get('map', ())
-    if not mapped:
-        speed_unit = options.get('speed_unit', '')
-        return guess(table, time=time, counted=counted, speed_unit=speed_unit)
-    found = Guess([placed(table, parse_input(text)) for text in mapped], time)
-    for name, count in Counter(each.name for each in found.inputs).items():
-        if count > 1:
-            raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
-    if time is None and not counted:
-        if table.header is None:
-            raise ImportDataError('the times of the rows: give --time COLUMN[:unit] or --rate HZ')
-        found.time = guessed_time(FirstRows(table), found.notes)
-    return found
 
 
 def _where(text: str) -> tuple[str, str]:

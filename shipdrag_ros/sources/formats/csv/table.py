@@ -10,13 +10,12 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BufferedReader, TextIOWrapper
-from itertools import compress, islice, zip_longest
+from itertools import islice, zip_longest
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, NamedTuple, cast
+from typing import IO, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import DataError, ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import OTHER_UNITS, UNITS, role_and_unit
 from shipdrag_ros.sources.opened import check_unpacked, opened
 
@@ -42,15 +41,34 @@ _KNOWN_UNITS = {*UNITS, *OTHER_UNITS, 'utc', 'hh:mm:ss'}
 _UNIT = re.compile(r'[\[(]?([^\[\]()]*)[\])]?')
 
 
-class LogRow(NamedTuple):
-    """The cells of a row, stripped, and the line it ends on."""
+LogRow = tuple[int, Sequence[str]]
+"""The line a row ends on, and its cells, stripped."""
 
-    line: int
-    cells: Sequence[str]
+Cells = NDArray[Any]
+"""Of a column: numbers, or objects, which are texts, stripped."""
 
 
-Cells = Sequence[str] | NDArray[Any]
-"""Of a column: texts, stripped, or numbers."""
+def are_numbers(cells: Cells) -> bool:
+    """
+    Say whether a column holds numbers, and no texts.
+    """
+    return cells.dtype.kind in 'fiu'
+
+
+def written(values: NDArray[Any]) -> Cells:
+    """
+    Return the shortest text that reads back as the same value; '' where there is none.
+    """
+    listed = values.tolist()
+    texts = ['' if each is None or each != each else str(each).strip() for each in listed]
+    return np.array(texts, object)
+
+
+def texts_of(cells: Cells) -> Cells:
+    """
+    Return cells as text.
+    """
+    return written(cells) if are_numbers(cells) else cells
 
 
 @dataclass(frozen=True)
@@ -68,8 +86,8 @@ class TableRows:
         By line, the text of a row that has more cells than the table has columns.
     """
 
-    lines: Sequence[int] = ()
-    columns: Sequence[Cells] = ()
+    lines: Int64
+    columns: Sequence[Cells]
     beyond: Mapping[int, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -79,41 +97,25 @@ class TableRows:
         """Return the rows that are chosen, (n,)."""
         if chosen.all():
             return self
-        columns = [
-            each[chosen] if isinstance(each, np.ndarray) else list(compress(each, chosen))
-            for each in self.columns
-        ]
-        return TableRows(list(compress(self.lines, chosen)), columns, self.beyond)
+        columns = [each[chosen] for each in self.columns]
+        return TableRows(self.lines[chosen], columns, self.beyond)
 
-    def texts(self, place: int) -> Sequence[str]:
+    def texts(self, place: int) -> Cells:
         """
         Return the cells (n,) of a column as text.
         """
-        cells = self.columns[place] if self.columns else ()
-        return texts_of(cells) if isinstance(cells, np.ndarray) else cells
+        return texts_of(self.columns[place])
 
-    def joined(self, places: Sequence[int]) -> Sequence[str]:
+    def joined(self, places: Sequence[int]) -> Cells:
         """
-        Return the text (n,) of one or two columns, as a date and its time of day stand in them.
+        Return the cells (n,) of one column, or the text of two: a date and its time of day.
         """
-        some = [self.texts(place) for place in places]
-        return [' '.join(cells).strip() for cells in zip(*some, strict=True)]
-
-
-def texts_of(cells: NDArray[Any]) -> list[str]:
-    """
-    Return the shortest text that reads back as the same value; '' where there is none.
-    """
-    found = ['' if value is None or value != value else str(value) for value in cells.tolist()]
-    return found if cells.dtype.kind in 'fiub' else [text.strip() for text in found]
-
-
-class _Layout(NamedTuple):
-    """How the lines of a table hang together: lines of a title before it, and its delimiter."""
-
-    titles: int
-    delimiter: str
-    cells: Sequence[str]
+        if len(places) == 1:
+            return self.columns[places[0]]
+        joined = np.full(len(self), '', object)
+        for place in places:
+            joined += self.texts(place) + ' '
+        return written(joined)
 
 
 class LogTable:
@@ -159,21 +161,18 @@ class LogTable:
             raise ImportDataError(
                 f'{str(path)!r} is no text, it begins with {first[:4]!r}; save it as CSV'
             )
-        layout = self._layout([line for _, line in lines])
-        self.delimiter = layout.delimiter
-        self.titles = tuple(line.strip() for _, line in lines[: layout.titles])
-        self._skip = lines[layout.titles][0] - 1
-        if not layout.cells:
+        start, self.delimiter, named = self._layout([line for _, line in lines])
+        self.titles = tuple(line.strip() for _, line in lines[:start])
+        self._skip = lines[start][0] - 1
+        if not named:
             raise ImportDataError(
                 f'{str(path)!r} holds no cell; give a table with a line a sample'
             )
-        cells = [layout.cells[0].lstrip('# '), *layout.cells[1:]]
+        cells = (named[0].lstrip('# '), *named[1:])
         measured = [_is_measured(cell) for cell in cells if cell]
-        self.header: tuple[str, ...] | None = None
-        if 2 * sum(measured) < len(measured):
-            self.header = tuple(cells)
+        self.header = cells if 2 * sum(measured) < len(measured) else None
         self.width = len(cells)
-        below = lines[layout.titles + 1][1] if len(lines) > layout.titles + 1 else ''
+        below = ''.join(line for _, line in lines[start + 1 : start + 2])
         self.units = None if self.header is None else _units(self._cells(below, self.delimiter))
 
     def _first_lines(self) -> list[tuple[int, str]]:
@@ -181,8 +180,8 @@ class LogTable:
         blank = DELIMITERS + ' \r\n'
         found = []
         try:
-            with self._decoded() as (_, file):
-                for number, line in enumerate(self._lines(file), start=1):
+            with opened(self.path) as (raw, file), _decoded(file) as text:
+                for number, line in enumerate(self._lines(raw, text), start=1):
                     if line.strip(blank).strip():
                         found.append((number, line))
                     if len(found) >= _SAMPLE_LINES or number > 10_000:
@@ -193,23 +192,23 @@ class LogTable:
             ) from error
         return found
 
-    def _layout(self, lines: Sequence[str]) -> _Layout:
-        """Find the delimiter that makes rows of the lines, and the first of these."""
+    def _layout(self, lines: Sequence[str]) -> tuple[int, str, Sequence[str]]:
+        """Return where the table begins, the delimiter that makes rows of it, its first row."""
         layouts = []
         for mark in DELIMITERS:
             rows = [self._cells(line, mark) for line in lines]
             start = _first_row(rows)
             if start is not None:
-                layouts.append(_Layout(start, mark, rows[start]))
+                layouts.append((start, mark, rows[start]))
         if layouts:
-            return max(layouts, key=lambda each: (-each.titles, len(each.cells)))
+            return max(layouts, key=lambda each: (-each[0], len(each[2])))
         rows = [line.split() for line in lines]
         width = len(rows[-1])
         start = next(place for place, row in enumerate(rows) if len(row) == width)
         same = sum(len(row) == width for row in rows[start:])
         if width > 1 and same >= 0.8 * len(rows[start:]) and _DATE.match(rows[-1][0]):
-            return _Layout(start, BLANKS, rows[start])
-        return _Layout(0, DELIMITERS[0], self._cells(lines[0], DELIMITERS[0]))
+            return start, BLANKS, rows[start]
+        return 0, DELIMITERS[0], self._cells(lines[0], DELIMITERS[0])
 
     def column(self, name: str) -> int:
         """
@@ -260,10 +259,8 @@ class LogTable:
         total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)
         self.joined_lines = 0
-        with self._decoded() as (raw, file):
-            lines = self._lines(file, raw)
-            for _ in range(self._skip):
-                next(lines, None)
+        with opened(self.path) as (raw, file), _decoded(file) as text:
+            lines = islice(self._lines(raw, text), self._skip, None)
             rows = islice(self._rows(lines, self.delimiter, self._skip), above, None)
             while some := list(islice(rows, most)):
                 if progress is not None:
@@ -274,24 +271,26 @@ class LogTable:
         """
         Return the first rows.
         """
-        return next(self.rows(most=most), TableRows(columns=[()] * self.width))
+        return next(self.rows(most=most), self._by_column([]))
 
     def _by_column(self, rows: Sequence[LogRow]) -> TableRows:
-        columns: list[Cells] = [*zip_longest(*(row.cells for row in rows), fillvalue='')]
-        columns += [('',) * len(rows)] * (self.width - len(columns))
+        empty = [''] * self.width
+        padded = zip_longest(empty, *(cells for _, cells in rows), fillvalue='')
+        columns = np.array([*padded], object)[:, 1:]
         beyond = {}
         if len(columns) > self.width:  # as decimal commas make it
-            beyond = {r.line: ','.join(r.cells) for r in rows if any(r.cells[self.width :])}
-        return TableRows([row.line for row in rows], columns[: self.width], beyond)
+            beyond = {line: ','.join(cells) for line, cells in rows if any(cells[self.width :])}
+        lines = np.array([line for line, _ in rows], np.int64)
+        return TableRows(lines, [*columns[: self.width]], beyond)
 
     def _cells(self, line: str, delimiter: str) -> Sequence[str]:
-        return next((row.cells for row in self._rows([line], delimiter)), ())
+        return next((cells for _, cells in self._rows([line], delimiter)), ())
 
     def _rows(self, lines: Iterable[str], delimiter: str, above: int = 0) -> Iterator[LogRow]:
         if delimiter == BLANKS:
             for number, line in enumerate(lines, start=above + 1):
                 if line.strip():
-                    yield LogRow(number, line.split())
+                    yield number, line.split()
             return
         reader = csv.reader(lines, delimiter=delimiter)
         try:
@@ -301,17 +300,21 @@ class LogTable:
                 last = reader.line_num
                 stripped = [cell.strip() for cell in cells]
                 if any(stripped):
-                    yield LogRow(above + reader.line_num, stripped)
+                    yield above + reader.line_num, stripped
         except csv.Error as error:
             raise ImportDataError(
                 f'{str(self.path)!r} line {above + reader.line_num} is no row of a table: {error}'
             ) from error
 
-    def _lines(self, file: TextIOWrapper, raw: IO[bytes] | None = None) -> Iterator[str]:
+    def _lines(self, raw: IO[bytes], text: TextIOWrapper) -> Iterator[str]:
         """Yield lines of a sane length, of a packed file that unpacks to a sane size."""
-        number = size = 0
+        number, size, how_far = 0, 0, ''
         try:
-            while line := file.readline(_LINE):
+            file = cast(BufferedReader, text.buffer)
+            if file.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+                raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
+            how_far = ' after line {}'
+            while line := text.readline(_LINE):
                 number += 1
                 size += len(line)
                 if len(line) == _LINE:
@@ -319,27 +322,19 @@ class LogTable:
                         f'{str(self.path)!r} line {number} is no row of a table: it is longer '
                         f'than {_LINE} characters'
                     )
-                if raw is not None and file.buffer is not raw:
+                if file is not raw:
                     check_unpacked(self.path, size, raw.tell())
                 yield line
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
             raise ImportDataError(
-                f'{str(self.path)!r} cannot be unpacked after line {number}: {error}'
+                f'{str(self.path)!r} cannot be unpacked{how_far.format(number)}: {error}'
             ) from error
 
-    @contextmanager
-    def _decoded(self) -> Iterator[tuple[IO[bytes], TextIOWrapper]]:
-        with opened(self.path) as (raw, file):
-            reader = cast(BufferedReader, file)
-            try:
-                start = reader.peek(2)
-            except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-                raise ImportDataError(f'{str(self.path)!r} cannot be unpacked: {error}') from error
-            if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-                raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
-            # a name that is not UTF-8 may still be given by its number
-            with TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='') as text:
-                yield raw, text
+
+def _decoded(file: IO[bytes]) -> TextIOWrapper:
+    # a name that is not UTF-8 may still be given by its number
+    reader = cast(BufferedReader, file)
+    return TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='')
 
 
 def _first_row(rows: Sequence[Sequence[str]]) -> int | None:
