@@ -204,26 +204,18 @@ def has_decimal_commas(cells: Iterable[str]) -> bool:
 def coordinate_readers(latitudes: Cells, longitudes: Cells) -> list[CellReader]:
     """
     Return what reads latitudes and longitudes, by how some of them are written.
+
+    The latitudes show whether it is ddmm.mmmm: four digits before the point are no
+    degrees. Three may be a longitude in the wrong column, unless the longitudes are
+    written so too. A longitude alone shows nothing: 200.5 is one from 0 to 360 degrees.
     """
-    minutes = are_in_minutes(latitudes, longitudes)
+    four = _share_in_minutes(latitudes, 90.0, 4)
+    three = min(_share_in_minutes(latitudes, 90.0, 3), _share_in_minutes(longitudes, 180.0, 3))
+    minutes = max(four, three) > 0.5
     return [
         CellReader(comma=not minutes and has_decimal_commas(cells), side=side, minutes=minutes)
         for cells, side in ((latitudes, 'NS'), (longitudes, 'EW'))
     ]
-
-
-def are_in_minutes(latitudes: Iterable[str], longitudes: Iterable[str]) -> bool:
-    """
-    Say whether coordinates are written as ddmm.mmmm.
-
-    The latitudes show it: four digits before the point are no degrees. Three may
-    be a longitude in the wrong column, unless the longitudes are written so too.
-    A longitude alone shows nothing: 200.5 is one from 0 to 360 degrees.
-    """
-    if _share_in_minutes(latitudes, 90.0, 4) > 0.5:
-        return True
-    three = _share_in_minutes(latitudes, 90.0, 3), _share_in_minutes(longitudes, 180.0, 3)
-    return min(three) > 0.5
 
 
 def _share_in_minutes(cells: Iterable[str], largest: float, digits: int) -> float:
@@ -331,9 +323,7 @@ def order_of(texts: Iterable[str], table: LogTable) -> tuple[str, str]:
             if len(fitting) == 1:
                 return fitting[0], f'{found[0]} in {hint.strip("- ")!r}'
     if not possible:
-        raise ImportDataError(
-            f'{str(table.path)!r}: the dates, {days[0]!r} for instance, are in no order known here'
-        )
+        raise table.error(f': the dates, {days[0]!r} for instance, are in no order known here')
     return '', f'{days[0]!r} is {" or ".join(possible)}'
 
 
@@ -499,9 +489,8 @@ def row_clock(
     if order:
         return RowClock(_Dates(order, time.zone).ns, notes=[*_notes(time, order, known_by, texts)])
     if texts and parts(texts[0])[0]:
-        raise ImportDataError(
-            f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
-            '--date-order dmy or --date-order mdy'
+        raise table.error(
+            f': day and month are ambiguous, {known_by}; give --date-order dmy or --date-order mdy'
         )
     return RowClock(_Dates().ns, BASE_NS, ['The times are times of day without a date.'])
 

@@ -15,9 +15,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from datetime import UTC
 from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -147,7 +147,7 @@ class FirstRows:
 
     Attributes
     ----------
-    path, header
+    header
         Of the table.
     roles
         Columns by what their names say they are, in their order.
@@ -155,7 +155,6 @@ class FirstRows:
 
     def __init__(self, table: LogTable, most: int = _SAMPLE_ROWS) -> None:
         self.table = table
-        self.path = str(table.path)
         self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
         self._rows = table.first_rows(most)
@@ -237,9 +236,9 @@ def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
         return TimeColumn(tuple(names))
     if not times:
         header = ', '.join(map(repr, rows.header))
-        raise ImportDataError(
-            f'{rows.path!r} has no column that is known as a time; it has '
-            f'{header}. Give --time COLUMN[:unit], or --rate HZ'
+        raise rows.table.error(
+            f' has no column that is known as a time; it has {header}. Give --time '
+            'COLUMN[:unit], or --rate HZ'
         )
     column = times[0]
     if column.unit in NANOSECONDS:
@@ -276,7 +275,7 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
     elif small and step >= 10.0:
         why = f'has no known unit; its steps are {step:g}. Give --time {typed}:ms, or :s'
     if why:
-        raise ImportDataError(f'{rows.path!r}: the time {column.key!r} {why}')
+        raise rows.table.error(f': the time {column.key!r} {why}')
     if small:
         notes.append(f'The time {column.key!r} states no unit and is taken as s.')
     return TimeColumn((column.key,))
@@ -313,6 +312,47 @@ _USUAL: Sequence[tuple[str, Mapping[str, str]]] = (
     ('shaft', {'shaft': 'rpm'}),
     ('depth', {'depth': 'm'}),
 )
+
+
+class _Unclear(Exception):
+    """What is not sure of an input, and what to type."""
+
+
+class _Wanted(NamedTuple):
+    """An input, its columns and their likely units."""
+
+    name: str
+    columns: Sequence[NamedColumn]
+    likely: Sequence[str]
+
+    @property
+    def keys(self) -> str:
+        """The columns as messages name them."""
+        return ', '.join(repr(each.key) for each in self.columns)
+
+    def taken(self, units: Sequence[str]) -> InputColumns:
+        """
+        Return the columns in some units.
+        """
+        return columns_of(self.name, [each.key for each in self.columns], units)
+
+    def unclear(
+        self,
+        units: Sequence[str] = (),
+        why: str = 'unit not known',
+        other: str = 'another unit',
+    ) -> _Unclear:
+        """
+        Say why the columns are not used, and what to type, in units where not in the likely ones.
+        """
+        asked = [*zip(self.columns, units or self.likely, strict=True)]
+        typed = ','.join(f'{each.typed}:{unit}' for each, unit in asked)
+        if len({unit for _, unit in asked}) == 1:  # given once it holds for all
+            typed = typed.replace(f':{asked[0][1]},', ',')
+        bare = {unit for each, unit in asked if not each.unit}
+        speeds = '--speed-unit kn or m/s, or ' if bare & SPEED_UNITS.keys() else ''
+        option = shlex.quote(f'{self.name}={typed}')
+        return _Unclear(f'{self.keys}: {why}; {speeds}--map {option}, or {other}')
 
 
 class Guess:
@@ -354,20 +394,18 @@ class Guess:
             if count > 1:
                 raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
         if not given and table.header is None:
-            raise ImportDataError(
-                f'{str(table.path)!r} has no names of columns; say what they are by their '
-                'numbers, for instance --map speed_through_water=1:kn --rate 1'
+            raise table.error(
+                ' has no names of columns; say what they are by their numbers, for instance '
+                '--map speed_through_water=1:kn --rate 1'
             )
         time: TimeColumn | None = options.get('time')
         if time is None and options.get('rate') is None:
             if table.header is None:
-                raise ImportDataError(
-                    'the times of the rows: give --time COLUMN[:unit] or --rate HZ'
-                )
+                why = 'give --time COLUMN[:unit] or --rate HZ'
+                raise ImportDataError(f'the times of the rows: {why}')
             time = guessed_time(self._rows, self.notes)
-        said = {'order': 'date_order', 'zone': 'zone'}
-        dates = {name: options[key] for name, key in said.items() if key in options}
-        self.time = None if time is None else replace(time, **dates)
+        order, zone = options.get('date_order', ''), options.get('zone', UTC)
+        self.time = None if time is None else replace(time, order=order, zone=zone)
         if not given:
             self._find()
 
@@ -382,7 +420,7 @@ class Guess:
         else:
             self._by_names()
         if not any(each.channel.input in ALL_MOTION for each in self.inputs):
-            raise ImportDataError(self._nothing())
+            raise self._nothing()
 
     def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
         """Return the columns of some roles, none where one is missing."""
@@ -396,24 +434,6 @@ class Guess:
     def _doubt(self, text: str) -> None:
         if text not in self.unclear:
             self.unclear.append(text)
-
-    def _ask(
-        self,
-        name: str,
-        columns: Sequence[NamedColumn],
-        units: Sequence[str],
-        *,
-        why: str = 'unit not known',
-        other: str = 'another unit',
-    ) -> None:
-        """Say why columns are not used, and what to type."""
-        keys = ', '.join(repr(each.key) for each in columns)
-        typed = ','.join(f'{each.typed}:{unit}' for each, unit in zip(columns, units, strict=True))
-        if len(set(units)) == 1:  # given once it holds for all
-            typed = typed.replace(f':{units[0]},', ',')
-        bare = {unit for each, unit in zip(columns, units, strict=True) if not each.unit}
-        speeds = '--speed-unit kn or m/s, or ' if bare & SPEED_UNITS.keys() else ''
-        self._doubt(f'{keys}: {why}; {speeds}--map {shlex.quote(f"{name}={typed}")}, or {other}')
 
     def _is_plain(self) -> bool:
         header = set(self._rows.header)
@@ -435,10 +455,9 @@ class Guess:
             found = columns_of(name, columns, [unit] * len(columns))
             largest = self._rows.largest(self._rows.table.column(columns[0]))
             if name in ('heading', 'rudder') and largest > _TURN:
-                raise ImportDataError(
-                    f'{self._rows.path!r}: {name!r} goes to {largest:g}, '
-                    f'which is no angle in rad; a column of this name is in SI units. Name the '
-                    f'unit in it, {name}_deg, or give --map'
+                raise self._table.error(
+                    f': {name!r} goes to {largest:g}, which is no angle in rad; a column of this '
+                    f'name is in SI units. Name the unit in it, {name}_deg, or give --map'
                 )
             self.inputs.append(found)
         self.notes.append('The columns have the names of the inputs: their units are SI.')
@@ -453,69 +472,60 @@ class Guess:
             columns = [] if name in settled else self._all(likely)
             if not columns:
                 continue
+            wanted = _Wanted(name, columns, [*likely.values()])
             find = self._speed if 'speed' in name else units_of.get(name, self._other)
-            units = find(name, columns, [*likely.values()])
-            if units:
-                self.inputs.append(columns_of(name, [each.key for each in columns], units))
-            if units or name == 'position':  # never another position in place of an unclear one
-                settled.add(name)
+            try:
+                self.inputs.append(wanted.taken(find(wanted)))
+            except _Unclear as why:
+                self._doubt(str(why))
+                if name != 'position':  # no other one in place of one that is unclear
+                    continue
+            settled.add(name)
 
-    # each returns the units of the columns of an input; none where they were asked for
+    # each returns the units of the columns of an input, or raises what is unclear
 
-    def _position(
-        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
-    ) -> list[str]:
-        units, places = [each.unit for each in columns], [each.place for each in columns]
-        geodetic = likely[0] == 'deg'
-        other = next((unit for unit in units if unit in _NO_COORDINATES), '')
-        if geodetic and other:
-            keys = ', '.join(repr(each.key) for each in columns)
-            self._doubt(f'{keys}: coordinates in {other} are not read')
-            return []
-        if not geodetic and (len({*units}) > 1 or not _LENGTHS.issuperset(units)):
-            self._ask(name, columns, likely)
-            return []
-        if self._time_s is not None and geodetic:
-            self._track = track_speed(self._time_s, *self._rows.coordinates(places))
-        elif self._time_s is not None and 'm' in units:
+    def _position(self, wanted: _Wanted) -> list[str]:
+        units, places = zip(*((each.unit, each.place) for each in wanted.columns), strict=True)
+        if wanted.likely[0] == 'deg':
+            if other := next((unit for unit in units if unit in _NO_COORDINATES), ''):
+                raise _Unclear(f'{wanted.keys}: coordinates in {other} are not read')
+            if self._time_s is not None:
+                self._track = track_speed(self._time_s, *self._rows.coordinates(places))
+            return ['deg', 'deg']
+        if units[0] != units[1] or units[0] not in _LENGTHS:
+            raise wanted.unclear()
+        if self._time_s is not None and units[0] == 'm':
             self._track = plane_speed(self._time_s, *map(self._rows.values, places))
-        return ['deg', 'deg'] if geodetic else units
+        return [*units]
 
-    def _speed(
-        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
-    ) -> list[str]:
+    def _speed(self, wanted: _Wanted) -> list[str]:
         """Of a speed of one column, or of two components."""
+        columns = wanted.columns
         parts = [self._rows.values(each.place) for each in columns]
         values = np.hypot(*parts) if parts[1:] else parts[0]
         said = {each.unit for each in columns if each.unit} or {self._speed_unit} - {''}
         if len(said) > 1 or not said <= SPEED_UNITS.keys():
-            self._ask(name, columns, likely)
-            return []
+            raise wanted.unclear()
         unit = ''.join(said)
         seen = '' if self._track is None else unit_of(values, self._track, unit)
         if unit and seen and seen != unit:
             why = f'is said to be in {unit}, and agrees with the positions in {seen}'
-            self._ask(name, columns, [unit] * len(columns), why=why, other=seen)
-            return []
+            raise wanted.unclear([unit] * len(columns), why, seen)
         if len({bool(each.unit) for each in columns}) > 1:  # one of both is said, and no more
             unit = ''
         if not (unit or seen):
-            self._ask(name, columns, likely)
-            return []
+            raise wanted.unclear()
         if not unit:
-            keys = ', '.join(repr(each.key) for each in columns)
             self.notes.append(
-                f'{keys}: no unit is stated; in {seen} it agrees with the way between the '
+                f'{wanted.keys}: no unit is stated; in {seen} it agrees with the way between the '
                 'positions.'
             )
         if self._track is None:  # the other speed is compared with this one
             self._track = values * SPEED_UNITS[unit or seen]
         return [unit or seen] * len(columns)
 
-    def _heading(
-        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
-    ) -> list[str]:
-        (column,) = columns
+    def _heading(self, wanted: _Wanted) -> list[str]:
+        (column,) = wanted.columns
         if column.unit == 'rad' and column.key.lower() == 'heading_rad':
             self.notes.append(
                 f'{column.key!r} is taken as the input of this name, yaw from east to north.'
@@ -526,20 +536,15 @@ class Guess:
             return [COMPASS]
         unit = column.unit if column.unit == 'rad' else COMPASS
         why = 'whether it is yaw or compass, or its unit, is not known'
-        self._ask(name, columns, [unit], why=why, other='rad deg compass')
-        return []
+        raise wanted.unclear([unit], why, 'rad deg compass')
 
-    def _other(
-        self, name: str, columns: Sequence[NamedColumn], likely: Sequence[str]
-    ) -> list[str]:
-        units = [*map(self._unit, columns, likely)]
+    def _other(self, wanted: _Wanted) -> list[str]:
+        units = [*map(self._unit, wanted.columns, wanted.likely)]
         with suppress(ImportDataError):  # of another quantity
-            if all(units):
-                columns_of(name, [each.key for each in columns], units)
+            if all(units) and wanted.taken(units):
                 return units
-        asked = [u if u and unit == 'deg' else unit for u, unit in zip(units, likely, strict=True)]
-        self._ask(name, columns, asked)
-        return []
+        found = zip(units, wanted.likely, strict=True)
+        raise wanted.unclear([u if u and unit == 'deg' else unit for u, unit in found])
 
     def _unit(self, column: NamedColumn, likely: str) -> str:
         """Return the unit that is stated, given, or shown by the values; '' for none."""
@@ -549,15 +554,14 @@ class Guess:
             return self._speed_unit
         return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''
 
-    def _nothing(self) -> str:
+    def _nothing(self) -> ImportDataError:
         """Say that nothing that moves is known, and what to type."""
-        path = self._rows.path
         why = '; '.join(self.unclear) or (
             f'its columns are {", ".join(map(repr, self._rows.header))}, and none has a '
             'usual name of a speed or a position; say which it is, for instance --map '
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
         )
-        return f'{path!r} gives no speed and no position in a unit that is known: {why}'
+        return self._table.error(f' gives no speed and no position in a unit that is known: {why}')
 
 
 def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
@@ -597,14 +601,3 @@ def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
         f'--map {shlex.quote(text)}: these may be degrees; give {shlex.quote(f"{text}:deg")} '
         f'for latitude and longitude, or {shlex.quote(f"{text}:m")}'
     )
-
-
-def is_table(path: Path) -> bool:
-    """
-    Say whether a file can be read as a table with several columns or numbers alone.
-    """
-    try:
-        table = LogTable(path)
-    except ImportDataError:
-        return False
-    return table.width > 1 or table.header is None

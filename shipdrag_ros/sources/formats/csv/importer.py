@@ -49,7 +49,7 @@ from shipdrag_ros.sources.formats.csv.columns import (
     parse_time,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.guess import Guess, is_table
+from shipdrag_ros.sources.formats.csv.guess import Guess
 from shipdrag_ros.sources.formats.csv.table import LogTable, TableRows, are_numbers
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
@@ -265,9 +265,7 @@ class _RowSamples:
         """Sum up; ImportDataError if there is nothing."""
         table = self._table
         if self._first_ns is None or not +self._written:
-            raise ImportDataError(
-                f'{str(table.path)!r} gave no sample from {self._rows} row(s); {self._why_not()}'
-            )
+            raise table.error(f' gave no sample from {self._rows} row(s); {self._why_not()}')
         used = {place for _, places, _ in self._inputs for place in places}
         used.update(self._time_places)
         return TableResult(
@@ -350,10 +348,16 @@ def _readers(
 
 
 def _score(head: Head) -> float:
-    if not head.lines or head.lines[0][0] in '{<[' or not is_table(head.path):
+    if not head.lines or head.lines[0][0] in '{<[':
         return NO
-    names = LogTable(head.path).header or ()
-    return LIKELY if any(role_and_unit(name)[0] for name in names) else POSSIBLE
+    try:
+        table = LogTable(head.path)
+    except ImportDataError:
+        return NO
+    if table.header is None:  # numbers alone, perhaps in one column
+        return POSSIBLE
+    known = any(role_and_unit(name)[0] for name in table.header)
+    return NO if table.width == 1 else LIKELY if known else POSSIBLE
 
 
 def _open(job: Job, log: Log) -> TableResult:

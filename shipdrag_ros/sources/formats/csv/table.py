@@ -156,18 +156,14 @@ class LogTable:
         lines = self._first_lines()
         first = lines[0][1] if lines else ''
         if not first:
-            raise ImportDataError(f'{str(path)!r} is empty; give a table with a line a sample')
+            raise self.error(' is empty; give a table with a line a sample')
         if '\0' in first or first.startswith('PK'):  # as spreadsheets begin, which are archives
-            raise ImportDataError(
-                f'{str(path)!r} is no text, it begins with {first[:4]!r}; save it as CSV'
-            )
+            raise self.error(f' is no text, it begins with {first[:4]!r}; save it as CSV')
         start, self.delimiter, named = self._layout([line for _, line in lines])
         self.titles = tuple(line.strip() for _, line in lines[:start])
         self._skip = lines[start][0] - 1
         if not named:
-            raise ImportDataError(
-                f'{str(path)!r} holds no cell; give a table with a line a sample'
-            )
+            raise self.error(' holds no cell; give a table with a line a sample')
         cells = (named[0].lstrip('# '), *named[1:])
         measured = [_is_measured(cell) for cell in cells if cell]
         self.header = cells if 2 * sum(measured) < len(measured) else None
@@ -187,10 +183,15 @@ class LogTable:
                     if len(found) >= _SAMPLE_LINES or number > 10_000:
                         break
         except OSError as error:
-            raise ImportDataError(
-                f'{str(self.path)!r} cannot be read: {error.strerror or error}; give a CSV file'
-            ) from error
+            why = error.strerror or error
+            raise self.error(f' cannot be read: {why}; give a CSV file') from error
         return found
+
+    def error(self, text: str) -> ImportDataError:
+        """
+        Return an error of the table, which names its file.
+        """
+        return ImportDataError(f'{str(self.path)!r}{text}')
 
     def _layout(self, lines: Sequence[str]) -> tuple[int, str, Sequence[str]]:
         """Return where the table begins, the delimiter that makes rows of it, its first row."""
@@ -223,9 +224,7 @@ class LogTable:
         found = [place for place, each in enumerate(names) if each == name]
         if len(found) > 1:
             numbers = ' or '.join(str(place + 1) for place in found)
-            raise ImportDataError(
-                f'{str(self.path)!r} has {len(found)} columns {name!r}; write a number: {numbers}'
-            )
+            raise self.error(f' has {len(found)} columns {name!r}; write a number: {numbers}')
         if found:
             return found[0]
         if name.isdecimal() and 1 <= int(name) <= self.width:
@@ -234,9 +233,7 @@ class LogTable:
         hint = f'and numbers 1 to {self.width} are names too'
         if self.width == 1:
             hint = 'and no comma, semicolon or tab that would separate columns'
-        raise ImportDataError(
-            f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
-        )
+        raise self.error(f' has no column {name!r}; it has {listed}, {hint}')
 
     def about(self, place: int) -> tuple[str, str]:
         """
@@ -302,9 +299,8 @@ class LogTable:
                 if any(stripped):
                     yield above + reader.line_num, stripped
         except csv.Error as error:
-            raise ImportDataError(
-                f'{str(self.path)!r} line {above + reader.line_num} is no row of a table: {error}'
-            ) from error
+            number = above + reader.line_num
+            raise self.error(f' line {number} is no row of a table: {error}') from error
 
     def _lines(self, raw: IO[bytes], text: TextIOWrapper) -> Iterator[str]:
         """Yield lines of a sane length, of a packed file that unpacks to a sane size."""
@@ -312,23 +308,20 @@ class LogTable:
         try:
             file = cast(BufferedReader, text.buffer)
             if file.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-                raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
+                raise self.error(' is in UTF-16; save it as UTF-8')
             how_far = ' after line {}'
             while line := text.readline(_LINE):
                 number += 1
                 size += len(line)
                 if len(line) == _LINE:
-                    raise ImportDataError(
-                        f'{str(self.path)!r} line {number} is no row of a table: it is longer '
-                        f'than {_LINE} characters'
-                    )
+                    why = f'it is longer than {_LINE} characters'
+                    raise self.error(f' line {number} is no row of a table: {why}')
                 if file is not raw:
                     check_unpacked(self.path, size, raw.tell())
                 yield line
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise ImportDataError(
-                f'{str(self.path)!r} cannot be unpacked{how_far.format(number)}: {error}'
-            ) from error
+            where = how_far.format(number)
+            raise self.error(f' cannot be unpacked{where}: {error}') from error
 
 
 def _decoded(file: IO[bytes]) -> TextIOWrapper:
