@@ -191,6 +191,16 @@ class FirstRows:
         cells = [self._rows.columns[place] for place in places]
         return [read.all(each, {}) for read, each in zip(readers, cells, strict=True)]
 
+    def may_be_degrees(self, places: Sequence[int]) -> bool:
+        """
+        Say whether all numbers of two columns can be latitudes and longitudes.
+        """
+        numbers = map(self.values, places)
+        return all(
+            np.all(np.isfinite(degrees) | ~np.isfinite(number))
+            for degrees, number in zip(self.coordinates(places), numbers, strict=True)
+        )
+
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
         """
         Return (n,) times of the rows from the first one [s], NaN where there is none.
@@ -578,26 +588,20 @@ def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
     rows, places = FirstRows(table, _FEW_ROWS), [table.column(name) for name in mapped.names]
     said = [role_and_unit(*table.about(place)) for place in places]
     roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
-    text = f'{mapped.name}={",".join(mapped.names)}'
-    if roles == ['lon', 'lat']:
-        swapped = shlex.quote(f'{mapped.name}={",".join(mapped.names[::-1])}')
-        raise ImportDataError(f'--map {shlex.quote(text)}: latitude comes first; give {swapped}')
     units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
-    if len(units) == 1 and (units == {'deg'} or all(unit for _, unit in said)):
+    text = f'{mapped.name}={",".join(mapped.names)}'
+    metres = shlex.quote(f'{text}:m')
+    if roles == ['lon', 'lat']:
+        swapped = f'{mapped.name}={",".join(mapped.names[::-1])}'
+        why = f'latitude comes first; give {shlex.quote(swapped)}'
+    elif len(units) == 1 and (units == {'deg'} or all(unit for _, unit in said)):
         return columns_of(mapped.name, mapped.names, [*units] * 2)
-    if units:
-        raise ImportDataError(
-            f'--map {shlex.quote(text)}: its columns do not say one unit, but '
-            f'{" and ".join(unit or "none" for _, unit in said)}; give one, as '
-            f'{shlex.quote(f"{text}:m")}'
-        )
-    beyond = any(
-        np.any(np.isnan(degrees) & np.isfinite(rows.values(place)))
-        for place, degrees in zip(places, rows.coordinates(places), strict=True)
-    )
-    if roles == ['x', 'y'] or (beyond and not {'lat', 'lon'} & {*roles}):
+    elif units:
+        stated = ' and '.join(unit or 'none' for _, unit in said)
+        why = f'its columns do not say one unit, but {stated}; give one, as {metres}'
+    elif roles == ['x', 'y'] or not ({'lat', 'lon'} & {*roles} or rows.may_be_degrees(places)):
         return mapped
-    raise ImportDataError(
-        f'--map {shlex.quote(text)}: these may be degrees; give {shlex.quote(f"{text}:deg")} '
-        f'for latitude and longitude, or {shlex.quote(f"{text}:m")}'
-    )
+    else:
+        degrees = shlex.quote(f'{text}:deg')
+        why = f'these may be degrees; give {degrees} for latitude and longitude, or {metres}'
+    raise ImportDataError(f'--map {shlex.quote(text)}: {why}')
