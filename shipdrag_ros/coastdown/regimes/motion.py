@@ -597,6 +597,10 @@ def _by_shafts(
 ) -> float:
     """Return the log density of the revs, and date the stop and the end of thrust by them."""
     f, step_s = bank.row[i], setting.step_s
+    if f.liar == s.THE_SHAFTS:  # no better known where they stay than what a level has
+        stays, f.stays = f.stays, said[s.HIGH]
+        still = 0.0 if np.isnan(stays) else n.STUCK * _off(said[s.HIGH], stays)
+        return float(n.SHAFT_TEMPER * math.log(still + 1.0 - n.STUCK))
     now_s = (bank.clock[0] - 0.5) * step_s
     shown, scaled = _shaft(bank, i, setting, said, log_first, now_s, work), setting.engine == 0.0
     # a slow error of revs does not turn their sign
