@@ -44,7 +44,7 @@ from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.estimation.estimators import WindowEstimator, shielded
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block, Reason
+from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Reason
 from shipdrag_ros.ship import Ship
 
 
@@ -175,7 +175,12 @@ class Monitor:
         bins = self._memory.bins
         heading = heading_doubt(bins, self._parameters.heading_convention)
         found = self._vouching.texts
-        return found | ({'heading': heading} if heading else {})
+        shafts = self._shafts_doubted
+        return (
+            found
+            | ({'heading': heading} if heading else {})
+            | ({'shaft': shafts} if shafts else {})
+        )
 
     def contradictions(self) -> dict[str, str]:
         """
@@ -549,6 +554,17 @@ class Monitor:
         gliding = self._regimes.gliding > 0.5
         return self._running.update(stamp_ns, self._estimator, gliding=gliding)
 
+    @property
+    def _shafts_doubted(self) -> str:
+        """What is said of shafts that probably say nothing true; '' where they are believed."""
+        chance = 0.0 if self._regimes is None else self._regimes.shafts_lie
+        if not chance > 0.5:
+            return ''
+        return (
+            f'the motion is not that of a ship whose shafts turn as they say (probability '
+            f'{chance:.2f}): they are not used; check the sensor'
+        )
+
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
         """Cut a window, with the record from `first_ns` on before it."""
         kept = since(
@@ -558,10 +574,14 @@ class Monitor:
             capacity=CAPACITY,
         )
         kept = self._vouching.kept(kept)
+        shafts = self._shafts_doubted
+        if shafts:
+            kept = kept[~np.isin(kept.channel, (*SHAFTS, *PITCHES))]
         window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
         notes = (*window.notes, *self._vouching.notes(start_ns))
+        notes += (f'without shaft: {shafts}',) if shafts else ()
         log, doubt = self._vouching.log_doubt
         told_ns = None if self._regimes is None else self._regimes.told_ns
         return replace(window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns)

@@ -22,7 +22,7 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference import priors
-from shipdrag_ros.inference.linear import evidence_of, whitened_products
+from shipdrag_ros.inference.linear import evidences, whitened_products
 from shipdrag_ros.inference.noise import (
     HOLD,
     SIZE,
@@ -57,7 +57,8 @@ class Seen(NamedTuple):
     table : (1 + p, n)
         What is measured, less a guess; columns of what is unknown.
     mean, precision : (q, p)
-        Priors of the unknowns, all alike in probability; a precision of 0: not known.
+        Priors of the unknowns, all alike in probability; a precision of 0: not known, of
+        infinity: 0.
     noise
         White noise as samples show it, and how the hull damps.
     steady
@@ -117,16 +118,11 @@ def _log_posterior(z: Float64, seen: Seen, prior: SizePrior) -> float:
     value = values(z, prior).reshape(1, SIZE)
     setting = Settings(value[:, :WHITE_OF], value[:, WHITE_OF:HOLD], value[:, HOLD], np.ones(1))
     products, log_det = whitened_products(seen.table, seen.rows, seen.noise, seen.steady, setting)
-    best, total = -np.inf, 0.0
-    for q in range(len(seen.mean)):
-        each = evidence_of(products[0], seen.mean[q], seen.precision[q])
-        if each > best:
-            total = total * np.exp(best - each) + 1.0
-            best = each
-        elif each > -np.inf:
-            total += np.exp(each - best)
+    logs = evidences(products, seen.mean, seen.precision)[0]
+    best = logs.max()
     if not best > -np.inf:
         return -np.inf
+    total = np.exp(logs - best).sum()
     square = 0.0
     for i in prior.which:
         square += z[i] * z[i]

@@ -201,12 +201,8 @@ def _posed(
 
 
 @compiled
-def evidence_of(products: Float64, mean: Float64, precision: Float64) -> float:
-    """
-    Return the logarithm of the evidence of one linear model, as `of_family`, alone.
-
-    Half of that work: noise is learnt by some hundred of these, and needs no solution.
-    """
+def _evidence(products: Float64, mean: Float64, precision: Float64) -> float:
+    """Return the logarithm of the evidence of one linear model, as `of_family`, alone."""
     solved, log_evidence, right, lower, scale = _posed(products, mean, precision)
     if not solved:
         return -np.inf
@@ -217,6 +213,35 @@ def evidence_of(products: Float64, mean: Float64, precision: Float64) -> float:
         right[a] = value / lower[a, a]
         log_evidence += 0.5 * right[a] ** 2 - np.log(lower[a, a]) + np.log(scale[a])
     return float(log_evidence)
+
+
+@compiled
+def evidences(products: Float64, mean: Float64, precision: Float64) -> Float64:
+    """
+    Return the logarithms of the evidence (s, f) of linear models, as `solve`, without solutions.
+
+    Parameters
+    ----------
+    products : (s, 1 + p, 1 + p)
+    mean, precision : (f, p)
+        What has an infinite precision is 0, and costs nothing: noise is learnt by some hundred
+        settings, under priors each of which leaves out most of the columns.
+    """
+    s, f = len(products), len(mean)
+    logs = np.empty((s, f))
+    for q in range(f):
+        held = np.flatnonzero(precision[q] < np.inf)
+        m, least = len(held), precision[q].min()
+        part = np.empty((1 + m, 1 + m))
+        for k in range(s):
+            for a in range(1 + m):
+                i = 1 + held[a - 1] if a else 0
+                for b in range(1 + m):
+                    part[a, b] = products[k, i, 1 + held[b - 1] if b else 0]
+            logs[k, q] = _evidence(part, mean[q][held], precision[q][held])
+            if logs[k, q] > _ROUNDING and least > 0.0:
+                logs[k, q] = -np.inf
+    return logs
 
 
 @compiled

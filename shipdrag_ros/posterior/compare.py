@@ -29,6 +29,7 @@ from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.limits import SizePosterior
 from shipdrag_ros.inference.linear import (
     Families,
+    evidences,
     products_of,
     solve,
     solve_scaled,
@@ -575,9 +576,7 @@ class Comparing:
                 prior = self.runs.priors(replace(self.base, smooth=where), nothing.at)
                 for mean, precision in zip(prior.mean, prior.precision):
                     means.append(np.concatenate([mean[table.place], np.zeros(q)]))
-                    precisions.append(
-                        np.concatenate([precision[table.place], np.full(q, EXACT**-2.0)])
-                    )
+                    precisions.append(np.concatenate([precision[table.place], np.full(q, np.inf)]))
             for i, which in enumerate(taught):
                 amount, held = _amount(ways[which])
                 mean, precision = means[0].copy(), precisions[0].copy()
@@ -604,7 +603,7 @@ class Comparing:
             products, log_det = whitened_products(
                 lines, run.model.rows, table.white, run.model.steady, learnt.settings
             )
-            logs, _, _ = solve(products, seen.mean, seen.precision, 0, 0)
+            logs = evidences(products, seen.mean, seen.precision)
             alike = np.logaddexp.reduce(logs, axis=1) - 0.5 * log_det - math.log(len(means))
             noise.append(_noise(learnt, alike))
         self.noise = noise

@@ -409,6 +409,31 @@ def test_a_turn_ends_at_the_power_that_it_began_at(watch, record, sensors, secon
     assert abs(start_s(coastdown) - 600.0 - 1000.0) < 15.0
 
 
+@pytest.mark.parametrize('seed', [0, 1])
+@pytest.mark.parametrize('stops', [False, True])
+def test_a_shaft_sensor_that_dies_makes_no_coastdown(ship, record, sensors, stops, seed) -> None:
+    dies = EngineOrder(0.0, shaft=0.0, thrust=1.0)
+    orders = (dies, EngineOrder(400.0, shaft=0.0, thrust=0.0)) if stops else (dies,)
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        seed=seed,
+        speed_m_s=6.5,
+        lead_in_s=1500.0,
+        duration_s=1600.0,
+        orders=orders,
+    )
+    monitor = Monitor(ship, Parameters())
+    early = block.stamp_ns < block.stamp_ns[0] + 1_800_000_000_000
+    events = monitor.update(block[early])
+    assert 'not used; check the sensor' in monitor.doubts()['shaft']
+    events += monitor.update(block[~early]) + monitor.finish()
+    told = [each for each in ended(events) if not each.withdrawn]
+    assert len(told) == stops
+    for coastdown in told:
+        assert abs(start_s(coastdown) - 600.0 - 400.0) < 30.0
+        assert any('without shaft' in note for note in coastdown.estimate.notes)
+
+
 @pytest.mark.parametrize('thrust', [1.0, 0.5])
 def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float) -> None:
     orders = (STOP, EngineOrder(400.0, shaft=0.8, thrust=thrust))

@@ -409,6 +409,8 @@ def _children(
     if both and f.liar == s.NOBODY:
         _lies(bank, i, s.THE_LOG, n.LIES * hours)
         _lies(bank, i, s.THE_TRACK, n.LIES * hours)
+    if setting.shafts > 0 and not claimed and f.liar == s.NOBODY:
+        _lies(bank, i, s.THE_SHAFTS, n.LIES * hours)
     fades = is_fade(bank.row[i])
     if regime == s.LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
         f.regime = regime = s.DRIVEN

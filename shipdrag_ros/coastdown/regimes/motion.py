@@ -500,6 +500,10 @@ def _shaft(
             regime == s.GLIDE and _thrust_left(f, now_s) < 0.0
         )
         return math.log(1.0 if astern else n.SHAFT_LIES)
+    if f.liar == s.THE_SHAFTS:  # no better known where they stay than what a level has
+        stays, f.stays = f.stays, nu
+        still = 0.0 if np.isnan(stays) else n.STUCK * _off(nu, stays)
+        return math.log(still + 1.0 - n.STUCK)
     # at any revs, mostly at those of before
     if regime == s.AMID or (regime == s.LEVEL and not scaled):
         before, stands = f.revs, nu < n.CREEPS  # then another pushes, unheard
@@ -601,6 +605,8 @@ def _by_shafts(
     shown, scaled = _shaft(bank, i, setting, said, log_first, now_s, work), setting.engine == 0.0
     # a slow error of revs does not turn their sign
     gained = shown if said[s.LOW] < _REVERSED or not scaled else n.SHAFT_TEMPER * shown
+    if f.liar == s.THE_SHAFTS:
+        return float(gained)
     young = bank.row[i].regime == s.GLIDE and now_s - f.since < 2.0 * step_s
     if young and scaled and bank.row[i].kind < s.HELD:
         # no slow error hides that the revs of all have not changed

@@ -65,7 +65,7 @@ HISTORY = np.dtype(
 SWITCH = np.dtype([('at', 'f8'), ('what', 'i8'), ('ramp', 'f8')], align=True)
 """When it was [s since the start], the regime entered and its ramp [s]."""
 _PAST = np.dtype([('row', HISTORY), ('switched', SWITCH, (SWITCHES,))])
-NOBODY, THE_LOG, THE_TRACK = range(3)
+NOBODY, THE_LOG, THE_TRACK, THE_SHAFTS = range(4)
 GOVERNED, TORQUE, FADING = range(3)  # a level: revs are held, or torque; or it falls evenly
 WINDMILLS, STANDS, HELD, STUCK = range(4)  # a screw in a glide; the last by its sensor alone
 

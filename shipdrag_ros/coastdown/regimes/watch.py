@@ -233,6 +233,13 @@ class RegimeFilter:
         out = self._bank.out
         return float(out[P_RUN_DOWN] + out[P_GLIDING])
 
+    @property
+    def shafts_lie(self) -> float:
+        """Probability that the shafts say nothing true."""
+        all_ = self._bank.histories
+        row = all_.row[: int(all_.used[0])]
+        return float(np.exp(row['weight'][row['liar'] == s.THE_SHAFTS]).sum())
+
     def gliding_since(self, second: float) -> float:
         """
         Return the probability of a glide that began before a second [s since the epoch].
