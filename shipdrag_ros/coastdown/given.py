@@ -316,7 +316,9 @@ class _Judge:
             near = kept[0] if before else max(kept[1] - _SHORTEST, kept[0])
             braked = self._slows(first, last) > self._slows(near, near + _SHORTEST)
         if not braked and 0.0 <= np.nanmax(speed, initial=-1.0) < self._slow:
-            return Dismissal.SLOW, f'she is all but at rest, at {np.nanmax(speed):.2g} m/s'
+            fastest = float(np.nanmax(speed))
+            text = f'she is slower than {self._slow:.2g} m/s, too slow for a coastdown'
+            return Dismissal.SLOW, f'{text}: {fastest:.2g} m/s at most'
         if np.nansum(speed) < 0.0:
             fastest = -float(np.nanmin(speed))
             return Dismissal.ASTERN, f'the ship goes astern, at up to {fastest:.2g} m/s'

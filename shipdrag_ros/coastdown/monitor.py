@@ -423,7 +423,7 @@ class Monitor:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
-        for each in regimes.glides():
+        for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
             if each.begin_s >= since_s:
                 found.append(each)
             elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
@@ -432,7 +432,14 @@ class Monitor:
                     rest = each.since(regimes.read_after(since_s), since_s)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
-        return [each for each in found if each.begin_s < last_s]
+        return [each for each in found if each.begin_s < min(last_s, each.end_s)]
+
+    def _as_read(self, glide: Dated, regimes: RegimeFilter) -> Dated:
+        """Let a glide that ended while nothing was read end with the last reading."""
+        first_s, last_s = regimes.unread_about(glide.end_s)
+        if glide.ended_by is None or last_s - first_s <= self._parameters.data_stop_s:
+            return glide
+        return glide._replace(end_s=first_s, ended_by=EndedBy.DATA_STOP)
 
     def _begin(self, dated: Dated, number: int) -> Onset:
         start = max(int(dated.start_s), 1)

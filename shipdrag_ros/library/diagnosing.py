@@ -9,7 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 from shipdrag_ros.bags import Run, WindowedRun, WindowSpan
-from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, NOT_ALL, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarlier, WeighedFact
@@ -303,6 +303,7 @@ def _found(
             lines.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
         warnings += [f'{each.name}: {line}' for line in lines]
         windows = coast_windows(result)
+        warnings += _ends(each.name, windows)
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
@@ -365,6 +366,16 @@ def _named(
     """Yield the coastdowns of a bag with a name each."""
     for place, (_, window) in enumerate(windows, start=1):
         yield (bag if len(windows) == 1 else f'{bag}, coastdown {place}'), window
+
+
+def _ends(bag: str, windows: Sequence[tuple[EndedCoastdown, Window]]) -> Iterator[str]:
+    """Yield why coastdowns ended, where it was neither the record nor the least speed."""
+    known = (EndedBy.RECORD_END, EndedBy.SPEED, EndedBy.GIVEN)
+    named = _named(bag, windows)
+    for (name, _), (coastdown, _) in zip(named, windows, strict=True):
+        if coastdown.ended_by not in known:
+            also = f'; {coastdown.disturbed}' if coastdown.disturbed else ''
+            yield f'{name}: the coastdown ends where {ENDED_BY[coastdown.ended_by]}{also}'
 
 
 def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:

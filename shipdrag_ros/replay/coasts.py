@@ -197,9 +197,7 @@ def window_between(result: ReplayResult, start_ns: int, end_ns: int, *, steady: 
     parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
     before_ns = round(parameters.steady_s * SECOND_NS)
     margin_ns = margin_around_ns(parameters)
-    first_ns = max(start_ns - before_ns - margin_ns, 0)
-    inputs = result.run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns)
-    block = concatenate([item for item in inputs if isinstance(item, Block)])
+    block = result.samples(start_ns - before_ns, end_ns, margin_ns)
     length_m = result.ship.length_m
     heard = _arrived_later(block) if clocks_apart(result) else block
     reasons = validate(heard, parameters, length_m)

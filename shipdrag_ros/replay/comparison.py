@@ -38,6 +38,8 @@ class Recorded:
         Messages that are in the bag, or should be.
     identical
         Of these, those that the replay gave to the last bit.
+    beside
+        Of these, those that both have.
     first_difference
         Topic, stamp and both contents; None if all are identical.
     largest_difference
@@ -56,6 +58,7 @@ class Recorded:
     largest_difference: float = 0.0
     largest_difference_sigma: float = 0.0
     by: str | None = None
+    beside: int = 0
 
 
 class Comparison:
@@ -127,6 +130,7 @@ class Comparison:
         return True
 
     def _compare(self, recorded: OutputMessage, replayed: OutputMessage) -> None:
+        self._found.beside += 1
         if recorded.payload != replayed.payload:
             self._differ(recorded, replayed)
         else:

@@ -165,6 +165,7 @@ def _recorded(runs: Sequence[RunResult]) -> dict[str, Any]:
         largest_difference_sigma=max(
             (run.recorded.largest_difference_sigma for run in runs), default=0.0
         ),
+        beside=sum(run.recorded.beside for run in runs),
         by=', '.join(sorted({run.recorded.by for run in runs if run.recorded.by})) or None,
     )
     return vars(total)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Reason
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Reason, concatenate
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import checked
 
@@ -66,6 +67,27 @@ class InputCounts:
     rejected: Mapping[str, int]
 
 
+class HeardSpan(NamedTuple):
+    """
+    A piece of a run: its first and last arrival, its lowest and highest stamp [ns].
+
+    A clock may be another than that of the recorder, and may be set within a run.
+    """
+
+    first_ns: int
+    last_ns: int
+    low_ns: int
+    high_ns: int
+
+    @classmethod
+    def of(cls, block: Block) -> HeardSpan:
+        """
+        Return that of some samples.
+        """
+        spans = (block.receive_ns, block.stamp_ns)
+        return cls(*(int(end) for each in spans for end in (each.min(), each.max())))
+
+
 @dataclass(frozen=True)
 class ReplayResult:
     """
@@ -91,6 +113,8 @@ class ReplayResult:
         What was said of inputs that contradict another, by input.
     left_out
         The same of those that were not used for it.
+    heard
+        The pieces that were read.
     """
 
     run: Run
@@ -103,6 +127,33 @@ class ReplayResult:
     steady_lead_s: float | None = None
     contradictions: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    heard: tuple[HeardSpan, ...] = ()
+
+    def samples(self, start_ns: int, end_ns: int, margin_ns: int) -> Block:
+        """
+        Read the samples stamped between two times again, by whatever clock.
+
+        Parameters
+        ----------
+        start_ns, end_ns
+            Stamps [ns].
+        margin_ns
+            What arrived so long before and after them is read too [ns].
+        """
+        holding = [
+            each for each in self.heard if each.low_ns <= end_ns and each.high_ns >= start_ns
+        ]
+        if not holding:
+            return Block.empty()
+        first_ns = max(min(each.first_ns for each in holding) - margin_ns, 0)
+        last_ns = max(each.last_ns for each in holding) + margin_ns
+        inputs = self.run.inputs(start_ns=first_ns, end_ns=last_ns)
+        block = concatenate([item for item in inputs if isinstance(item, Block)])
+        arrived = block.receive_ns[(block.stamp_ns >= start_ns) & (block.stamp_ns <= end_ns)]
+        if not len(arrived):
+            return block[:0]
+        near = block.receive_ns >= arrived.min() - margin_ns
+        return block[np.flatnonzero(near & (block.receive_ns <= arrived.max() + margin_ns))]
 
     @property
     def whole_glides(self) -> tuple[WholeGlide, ...]:
@@ -238,6 +289,7 @@ def _as_on_board(
     comparison = Comparison(run.outputs() if own else iter(()), by=_by(run))
     coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
+    heard: list[HeardSpan] = []
 
     def take(events: list[Event]) -> None:
         for event in events:
@@ -259,6 +311,8 @@ def _as_on_board(
                     'one, or a recording that begins before it'
                 )
             continue
+        if isinstance(item, Block) and len(item):
+            heard.append(HeardSpan.of(item))
         take(feed(monitor, item))
         if progress is not None:
             progress(inputs.messages.total(), total)
@@ -277,6 +331,7 @@ def _as_on_board(
         monitor.steady_lead_s,
         monitor.contradictions(),
         monitor.left_out(),
+        tuple(heard),
     )
 
 
@@ -316,6 +371,7 @@ def _in_window(
         (coastdown, *coastdown.cuts),
         _counts(run, samples.inputs, used, rejected),
         Recorded(by=_by(run)),
+        heard=(HeardSpan.of(samples.block),) if len(samples.block) else (),
     )
 
 

@@ -58,6 +58,7 @@ def test_the_json_has_its_keys_the_curve_is_near_the_truth_and_the_words_give_ev
         'largest_difference': 0.0,
         'largest_difference_sigma': 0.0,
         'by': None,
+        'beside': 0,
     }
     assert found['inputs']['position'] == {'messages': 1801, 'used': 1801, 'rejected': {}}
     (coastdown,) = found['coastdowns']

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
-from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.coastdown.events import ENDED_BY, TURNED, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.fleet import job
@@ -223,3 +224,11 @@ def test_a_glide_that_cannot_be_followed_does_not_let_nothing_be_missing(
     said = capsys.readouterr()
     assert 'nothing is missing' not in said.out
     assert 'it is not known whether anything is missing' in said.err
+
+
+def test_why_a_coastdown_ended_is_noted() -> None:
+    turned = EndedCoastdown(0, 1, None, EndedBy.TURN, None)
+    (said,) = diagnosing._ends('a.mcap', [(turned, None)])
+    assert said == f'a.mcap: the coastdown ends where {ENDED_BY[EndedBy.TURN]}; {TURNED}'
+    whole = replace(turned, ended_by=EndedBy.RECORD_END)
+    assert list(diagnosing._ends('a.mcap', [(whole, None)])) == []

@@ -86,3 +86,26 @@ def test_zeros_of_any_log_are_kept_where_asked_for(tmp_path: Path, channel: Chan
     every, _ = accepted_samples(run, None, zeros=True)
     assert len(sound) < 1000
     assert len(every) == len(stamps)
+
+
+@pytest.mark.parametrize(
+    ('set_s', 'by_s'), [(0.0, -3600.0), (50.0, -3600.0), (50.0, -300.0), (50.0, 3600.0)]
+)
+def test_samples_are_found_by_the_clock_that_stamped_them(
+    ship, parameters, voyage, tmp_path, set_s, by_s
+) -> None:
+    block = voyage(steady_s=450.0)
+    second = (block.receive_ns - START_NS) / S
+    stamps = block.stamp_ns + np.where(second >= set_s, round(by_s * S), 0)
+    shifted = replace(block, stamp_ns=stamps)
+    if by_s > 0.0:  # of a sensor whose arrival is told by its own clock
+        shifted = replace(shifted, receive_ns=np.maximum(block.receive_ns, stamps))
+    (run,) = open_runs([write_run(tmp_path / 'moved.mcap', shifted, ship=ship)])
+    *_, (coastdown, window) = coast_windows(replay(run, parameters=parameters))
+    assert coastdown.estimate is not None
+    assert abs(window.start_ns / S - START_NS / S - 450.0 - by_s) < 10.0
+    inside = (stamps >= window.start_ns) & (stamps <= window.end_ns)
+    log = inside & (block.channel == LOG) & (second >= set_s)
+    np.testing.assert_array_equal(window.speed_through_water.value, block.value[log, 0])
+    assert window.before is not None
+    assert len(window.before.speed_through_water) > 350

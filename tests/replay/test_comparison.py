@@ -64,7 +64,7 @@ def test_topics_are_compared_each_for_itself() -> None:
     for stamp in (1, 2):
         for name in ('speed', 'resistance', 'events'):
             comparison.add(message(stamp, name=name))
-    assert comparison.finish() == Recorded(4, 4, None)
+    assert comparison.finish() == Recorded(4, 4, None, beside=4)
 
 
 def test_a_figure_that_differs_is_shown(recording: tuple[Path, list[Event]]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import open_runs
+from shipdrag_ros.coastdown import given
 from shipdrag_ros.coastdown.events import (
     ENDED_BY,
     Dismissal,
@@ -50,6 +51,15 @@ def test_the_comparison_with_the_bag_is_said() -> None:
     assert 'first difference: /coastdown_node/speed at 12 ns' in differs
     rounding = words.recorded_sentence(Recorded(7, 6, 'x', 3e-14))
     assert 'more than 3e-14 of its value' in rounding
+
+
+def test_what_was_not_compared_is_not_said_to_be_alike() -> None:
+    old = Recorded(9, 2, 'recorded 1.0, replayed nothing', np.inf, 0.0, '0.0.1', beside=2)
+    some, none = (words.recorded_sentence(replace(old, beside=both)) for both in (2, 0))
+    assert 'of 2 in both the estimates differ by 0 standard deviations at most' in some
+    assert '7 are in the bag or the replay alone' in some
+    assert 'standard deviations' not in none
+    assert '9 are in the bag or the replay alone' in none
 
 
 def test_a_coastdown_without_estimate_gives_its_reason(coastdown, ship):
@@ -180,6 +190,34 @@ def test_nothing_is_made_of_a_gap(tmp_path: Path, voyage, ship: Ship) -> None:
     assert (cut.start_ns, cut.end_ns) == (before.end_ns, after.start_ns)
     assert cut.reason is Dismissal.GAP
     assert 'nothing was read' in cut.text
+
+
+@pytest.mark.parametrize('gap_s', [(1300, 1420), (1210, 1900)])
+def test_what_a_gap_left_unjudged_is_said(tmp_path: Path, ship: Ship, gap_s) -> None:
+    second, rng = np.arange(2800), np.random.default_rng(0)
+    speed, gust = np.full(len(second), 7.0), 0.0
+    for k in range(1, len(speed)):
+        gust = 0.975 * gust + 1.4e-4 * rng.normal()  # correlated over 40 s
+        drag = 2.6e-4 * (speed[k - 1] ** 2 - 49.0 * (k <= 1200))
+        speed[k] = speed[k - 1] + (gust - drag) / 1.05
+    speed += rng.normal(0.0, 0.04, len(speed))
+    block = log(speed)[(second < gap_s[0]) | (second > gap_s[1])]
+    result = replayed(tmp_path, block, ship)
+    told = [each for each in result.coastdowns if each.ended_by is EndedBy.DATA_STOP]
+    ends_s = [(each.end_ns - block.stamp_ns[0]) / 1e9 for each in result.coastdowns]
+    assert not any(gap_s[0] < end_s < gap_s[1] for end_s in ends_s)
+    said = ' '.join(words.run_warnings(result))
+    rest = [each for each in result.coastdowns if each.cuts]
+    assert told
+    assert rest or f'--window {gap_s[1] + 1} 2799' in said
+    assert rest or 'the readings of speed ceased for' in said
+
+
+def test_a_glide_that_is_too_slow_is_not_said_to_be_at_rest() -> None:
+    judge = SimpleNamespace(_binned=SimpleNamespace(speed=np.array([1.9, 1.8])), _slow=3.1)
+    reason, text = given._Judge._why(judge, 0, 2, given.GLIDES, None)
+    assert reason is Dismissal.SLOW
+    assert text == 'she is slower than 3.1 m/s, too slow for a coastdown: 1.9 m/s at most'
 
 
 def test_thrust_after_a_glide_is_no_reduced_power_and_its_probability_is_said(tmp_path, ship):

@@ -280,6 +280,17 @@ class RegimeFilter:
         gap = np.cumsum(self._read[since:]) == 0
         return float(self._zero_s + (since + int(gap.sum())) * self._width)
 
+    def unread_about(self, second: float) -> tuple[float, float]:
+        """
+        Return begin and end of the time about a second in which no motion was read [s].
+        """
+        at = min(max(int((second - self._zero_s) // self._width), 0), len(self._read) - 1)
+        read = np.flatnonzero(self._read)
+        before, after = np.split(read, [int(np.searchsorted(read, at))])
+        first = int(before[-1]) + 1 if len(before) else 0
+        last = int(after[0]) if len(after) else len(self._read)
+        return self._zero_s + first * self._width, self._zero_s + last * self._width
+
     @property
     def even(self) -> bool:
         """Whether she is likelier under even power than not."""
