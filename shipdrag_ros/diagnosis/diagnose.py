@@ -23,6 +23,7 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.verdict import (
     ComparedRuns,
     asked,
+    asked_of_speed,
     judge,
     limits_of,
     ratio_before_the_stop,
@@ -129,7 +130,8 @@ def diagnose(
     questions = [
         f'{run.name}: {ask}'
         for j, run in enumerate(seen)
-        if not checked & {None, j} and (ask := asked(ratio_before_the_stop(run)))
+        if (ask := '' if checked & {None, j} else asked(ratio_before_the_stop(run)))
+        or (ask := asked_of_speed(run.speed_m_s, run.ship))
     ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]

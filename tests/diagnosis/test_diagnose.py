@@ -55,6 +55,18 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
         diagnose([run(lead_in_s=120.0)], SHIP, PARAMETERS)
 
 
+def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
+    log_alone = run('log_scale=0.9438').window.without('position', 'not on board')
+    for facts in ((), (Fact('units_checked'),)):
+        found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=facts)
+        said = words.sentence(found)
+        assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
+        assert '(0.0 to 19.4 knots): is the unit wrong?' in said
+        assert '--map speed_through_water=COLUMN:kn' in said
+        assert '15.50' not in said
+    assert not found.candidates
+
+
 def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
     straight = run()
     assert straight.window.before is not None
