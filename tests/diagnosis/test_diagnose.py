@@ -82,6 +82,7 @@ def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
     window = replace(straight.window, position=bent(straight.window.position), before=before)
     found = diagnose([CoastRun('bent', window)], SHIP, PARAMETERS)
     assert found.verdict not in (Verdict.NONE, Verdict.NAMED)
+    assert found.where is None or NONE not in [each.names for each in found.held]
     assert any('wander apart' in note for note in found.notes)
 
 
@@ -239,6 +240,8 @@ def test_what_is_hidden_is_named_with_its_size(text: str, parameter: str, size: 
     found = answer(text)
     name = text.partition('=')[0]
     assert [effect.name for effect in found.effects] == [name]
+    assert found.where is not None
+    assert found.where.channel == 'log'
     known = found.effects[0].parameters[parameter]
     assert abs(known.value - size) < 4.0 * known.sd
     assert found.after is not None
