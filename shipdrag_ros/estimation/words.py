@@ -116,16 +116,17 @@ def conditions(estimate: Estimate) -> str:
 
 def _force_in_calm(estimate: Estimate, ship: Ship, speed_m_s: float) -> str:
     """
-    Say what she needs in calm deep water, where what was measured is left in the figures before.
+    Say what she needs in calm deep water; '' where that is what is shown.
     """
     known, curve = estimate.reference, estimate.valid_calm
-    if not (known.unknown and known.measured and estimate.sigma_parts and len(curve)):
+    if not (known.unknown and estimate.sigma_parts and len(curve)):
         return ''
     force = Force.of(curve, ship)
     said = force.at(force.near(speed_m_s))
-    return (
-        f' In calm deep water, with the {known.measured[0]} taken out: {said[0].lower()}{said[1:]}'
-    )
+    how = 'whatever the weather was'
+    if known.measured:
+        how = f'with the {known.measured[0]} taken out'
+    return f' In calm deep water, {how}: {said[0].lower()}{said[1:]}'
 
 
 def in_calm(estimate: Estimate, speed_m_s: float) -> str:

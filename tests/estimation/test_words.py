@@ -64,6 +64,8 @@ def test_wind_that_was_read_and_left_in_is_named_and_taken_out(estimate, ship) -
         'the wind, which was measured, left in as well as the depth, which is not known' in of_run
     )
     assert '(no difference that shows)' in in_calm
+    unread, _ = replace(windy, reference=Reference()).summary(replace(ship, baseline=baseline))
+    assert unread.endswith(f' In calm deep water, whatever the weather was: {in_calm}')
 
 
 def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, ship: Ship) -> None:
