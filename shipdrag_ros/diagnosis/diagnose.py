@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from shipdrag_ros.diagnosis.advice import Undecided, advice
 from shipdrag_ros.diagnosis.earlier import Carried, EarlierDiagnosis, carried
@@ -23,6 +24,7 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.verdict import (
     ComparedRuns,
     asked,
+    asked_of_speed,
     judge,
     limits_of,
     ratio_before_the_stop,
@@ -31,7 +33,7 @@ from shipdrag_ros.diagnosis.verdict import (
 )
 from shipdrag_ros.diagnosis.words import names_text
 from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict, smallest_set
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing
@@ -129,7 +131,8 @@ def diagnose(
     questions = [
         f'{run.name}: {ask}'
         for j, run in enumerate(seen)
-        if not checked & {None, j} and (ask := asked(ratio_before_the_stop(run)))
+        if (ask := '' if checked & {None, j} else asked(ratio_before_the_stop(run)))
+        or (ask := asked_of_speed(run.speed_m_s, run.ship))
     ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
@@ -166,6 +169,9 @@ def _answer(
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
+    answer = [held for held, _ in smallest_set(found.probability, CERTAIN)]
+    agree = NONE in answer and verdict in (Verdict.NONE, Verdict.ONE_OF)
+    unknown = verdict is Verdict.UNKNOWN or UNKNOWN in answer
     return DiagnosisResult(
         verdict=verdict,
         effects=judged.effects,
@@ -174,8 +180,16 @@ def _answer(
         unnamed=found.probability.get(UNKNOWN, 0.0),
         would_decide=advice(undecided, progress) if advise and verdict is Verdict.ONE_OF else (),
         where=None
-        if verdict is Verdict.NONE
-        else where(seen, comparing, found, before, of_force=bool(differ)),
+        if agree
+        else where(
+            seen,
+            comparing,
+            found,
+            before,
+            judged.explained,
+            judged.decision.effects or ({} if unknown else set(chain(*answer))),
+            of_force=bool(differ),
+        ),
         before=gap_of(seen, comparing.residuals(before)),
         after=gap_of(seen, comparing.residuals(best)) if judged.missing else None,
         held_out_before=held_out(seen, comparing, before),

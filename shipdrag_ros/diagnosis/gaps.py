@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted, RunResidual
 from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, place_of
 from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.simulation.effects import find
 
 _PARTS = 12  # of a coastdown, to say where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
@@ -127,6 +128,8 @@ def where(
     comparing: Comparing,
     found: ComparedHypotheses[Fitted],
     before: Fitted,
+    after: Fitted,
+    named: Collection[str],
     *,
     of_force: bool,
 ) -> Where:
@@ -140,6 +143,10 @@ def where(
         Of these runs.
     before
         The ship as stated.
+    after
+        What explains the runs, whose speeds are said: a ship as stated may never be as slow.
+    named
+        Effects of the answer.
     of_force
         Whether it is known to be in the force.
 
@@ -148,13 +155,13 @@ def where(
     Where
         The ends hold 90 % of the excess over noise.
     """
-    channel = FORCE if of_force else _channel(found)
+    channel = FORCE if of_force else _falsified(named) or _channel(found)
     times, speeds = [], []
     residuals = comparing.residuals(before)
-    for run, residual, table in zip(seen, residuals, before.linear, strict=True):
-        after = (run.along.rows.time_s - run.lead_in_s) / run.duration_s
-        part = np.clip((after * _PARTS).astype(int), 0, _PARTS - 1)
-        rows = np.flatnonzero(after >= 0.0)
+    for run, residual, table in zip(seen, residuals, after.linear, strict=True):
+        since = (run.along.rows.time_s - run.lead_in_s) / run.duration_s
+        part = np.clip((since * _PARTS).astype(int), 0, _PARTS - 1)
+        rows = np.flatnonzero(since >= 0.0)
         excess = np.zeros(_PARTS)
         np.add.at(excess, part[rows], residual.whitened[rows] ** 2 - 1.0)
         share = np.cumsum(np.maximum(excess, 0.0))
@@ -165,7 +172,7 @@ def where(
         last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
         ends = np.array([first, last + 1]) / _PARTS
         times.append(ends * run.duration_s)
-        speeds.append(np.interp(ends, after, table.speed_m_s))
+        speeds.append(np.interp(ends, since, table.speed_m_s))
     if not times:
         whole = max(run.duration_s for run in seen)
         return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in seen)))
@@ -174,6 +181,15 @@ def where(
         (float(np.min(times)), float(np.max(times))),
         (float(np.min(speeds)), float(np.max(speeds))),
     )
+
+
+def _falsified(named: Collection[str]) -> str:
+    """Return the channel of instruments whose errors alone are named; else ''."""
+    read = [find(name).errs_in for name in named]
+    if not read or not all(read):
+        return ''
+    by_log = {'speed_through_water' in each for each in read}
+    return 'log_radar' if len(by_log) > 1 else 'log' if True in by_log else 'radar'
 
 
 def _channel(found: ComparedHypotheses[Fitted]) -> str:

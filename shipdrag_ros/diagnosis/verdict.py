@@ -24,7 +24,7 @@ from shipdrag_ros.diagnosis.result import (
     RunSize,
 )
 from shipdrag_ros.diagnosis.words import names_text, probability, sentence
-from shipdrag_ros.display import mistaken_units
+from shipdrag_ros.display import mistaken_units, ship_speed
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
 from shipdrag_ros.inference.decision import (
     NONE,
@@ -50,10 +50,12 @@ from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fit, F
 from shipdrag_ros.posterior.effects import EffectWay
 from shipdrag_ros.posterior.hypotheses import IN_SPEED, Explanation
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import UNITS_CHECKED
 from shipdrag_ros.simulation.columns import RUN_DOWNS
 
 _SHARE = 0.95  # of a size, below its limit
+_AGAIN = 'Import it again with its unit, as in --map speed_through_water=COLUMN:kn'
 _RIVALS = 40  # likeliest effects of which it is found from what size on they are named
 
 
@@ -236,8 +238,29 @@ def asked(ratio: float) -> str:
         return ''
     return (
         f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
-        'one of them wrong? Import it again with its unit, as in '
-        f'--map speed_through_water=COLUMN:kn; if it is right, say so with --fact {UNITS_CHECKED}'
+        f'one of them wrong? {_AGAIN}; if it is right, say so with --fact {UNITS_CHECKED}'
+    )
+
+
+def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
+    """
+    Ask about the unit of a speed that no resistance is known for; else return ''.
+
+    Parameters
+    ----------
+    speed_m_s
+        Before the stop, as it was read.
+    ship
+        With a baseline.
+    """
+    low, high = ship.baseline_range_m_s
+    if low <= speed_m_s <= high:
+        return ''
+    read, least, most = (ship_speed(each, ship.mass_kg) for each in (speed_m_s, low, high))
+    return (
+        f'the speed before the stop was read as {speed_m_s:.3g} m/s ({read}), and resistance is '
+        f'known for {low:.3g} to {high:.3g} m/s ({least.partition(" ")[0]} to {most}): is the '
+        f'unit wrong? {_AGAIN}; if it is right, state a `baseline` that holds this speed'
     )
 
 

@@ -31,6 +31,7 @@ _CHANNELS = {
 }
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
+_ANY_ROUGHER = ' What is called fouling here is any hull rougher than usual, be it clean or not.'
 _LEAST = 0.001  # probability that is stated
 _MOST_LIMITS = 5
 _LARGE_N = 1e4  # from here on a force is stated in kN
@@ -44,7 +45,8 @@ def sentence(found: DiagnosisResult) -> str:
         right = f'; if the unit is right: {_listed(found.held)}' if found.held else ''
         return f'{found.question}. The verdict waits for the answer{right}.'
     if found.baseline == 'fitted_here':
-        return f'{NO_CLEAN_HULL} {_verdict(found)}'
+        fouled = any('fouling' in each.names for each in found.held)
+        return f'{NO_CLEAN_HULL}{_ANY_ROUGHER if fouled else ""} {_verdict(found)}'
     return _verdict(found)
 
 

@@ -89,7 +89,7 @@ def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
         date = f'{date}: ' if len(usable) > 1 else ''
         lines.append(
             f'{date}{force.at(force.near(usual))} Known from {low} to {high}, '
-            f'{conditions(each)}; ± is two standard deviations.'
+            f'{conditions(each)}; ± is two standard deviations.{_force_in_calm(each, ship, usual)}'
         )
         missing = missing or no_clean_text(ship, force)
     return (*lines, missing) if missing else tuple(lines)
@@ -97,15 +97,36 @@ def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
 
 def conditions(estimate: Estimate) -> str:
     """
-    Say of which conditions the figures are that are shown.
+    Say of which conditions the figures are that are shown: each force that is left in them.
     """
-    unknown = estimate.reference.unknown
-    if not unknown:
+    known = estimate.reference
+    if not known.unknown:
         return 'of the ship in calm deep water'
+    if not known.measured:
+        return (
+            f'of the ship in the {" and ".join(known.unknown)} of the run, which '
+            f'{"are" if len(known.unknown) > 1 else "is"} not known'
+        )
+    (read,), (unknown,) = known.measured, known.unknown
     return (
-        f'of the ship in the {" and ".join(unknown)} of the run, which '
-        f'{"are" if len(unknown) > 1 else "is"} not known'
+        f'of the ship in the wind and depth of the run, with the {read}, which was measured, left '
+        f'in as well as the {unknown}, which is not known'
     )
+
+
+def _force_in_calm(estimate: Estimate, ship: Ship, speed_m_s: float) -> str:
+    """
+    Say what she needs in calm deep water; '' where that is what is shown.
+    """
+    known, curve = estimate.reference, estimate.valid_calm
+    if not (known.unknown and estimate.sigma_parts and len(curve)):
+        return ''
+    force = Force.of(curve, ship)
+    said = force.at(force.near(speed_m_s))
+    how = 'whatever the weather was'
+    if known.measured:
+        how = f'with the {known.measured[0]} taken out'
+    return f' In calm deep water, {how}: {said[0].lower()}{said[1:]}'
 
 
 def in_calm(estimate: Estimate, speed_m_s: float) -> str:

@@ -407,7 +407,7 @@ class _Judged:
         case, stated = self.case, self.case.comparing.as_stated
         if next(iter(kinds)) == case.of_kind(NONE):
             return None
-        return where(case.seen, case.comparing, case.found, stated, of_force=of_force)
+        return where(case.seen, case.comparing, case.found, stated, stated, (), of_force=of_force)
 
     def _percent(self, best: Names) -> float:
         """Return how large a form is, of the resistance, where it is largest."""

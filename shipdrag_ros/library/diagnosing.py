@@ -29,7 +29,7 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, told_beside
+from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, ship_of, told_beside
 from shipdrag_ros.replay.words import cut_lines, run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import UNITS_CHECKED, overriding
@@ -90,7 +90,7 @@ def diagnose_runs(
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = _sailing(runs, None, f'No coastdown was found: {why}.', facts, progress)
         return _unused(sailing, facts, earlier), None
-    seen = _found(listener, runs, given, progress, stop)
+    seen = _found(listener, runs, given, progress, stop, facts)
     alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
     of_whole = partial(
         diagnose,
@@ -279,6 +279,7 @@ def _found(
     given: Ship | None,
     progress: Progress,
     stop: StopTime | None = None,
+    facts: Sequence[Fact] = (),
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     seen: list[_OfRun] = []
@@ -289,10 +290,12 @@ def _found(
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
-        # recorded outputs are not looked at, nor what is estimated while a coastdown runs
-        result = replay(each, ship=ship, window=window, stop=stop, compare=False, progress=stage)
-        ship, parameters = ship or result.ship, parameters or result.parameters
+        ship = ship_of(each, ship)
         sheet, of_run = _sheet(listener, each, ship)
+        told = replace(ship, facts=overriding(ship.facts, sheet.facts, facts))
+        # recorded outputs are not looked at, nor what is estimated while a coastdown runs
+        result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
+        parameters = parameters or result.parameters
         lines = [*_cuts(result, window), *run_warnings(result)]
         lines += [
             f'the clock of {name} is too slow or too fast, and on board it is rejected; it is '

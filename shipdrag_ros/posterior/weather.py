@@ -66,8 +66,16 @@ class Reference:
     @property
     def unknown(self) -> tuple[str, ...]:
         """Which of wind and depth are not known."""
+        return self._of(Knowledge.UNKNOWN)
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Which of wind and depth were read."""
+        return self._of(Knowledge.MEASURED)
+
+    def _of(self, known: Knowledge) -> tuple[str, ...]:
         both = list(vars(self).items())[:2]
-        return tuple(name for name, how in both if how is Knowledge.UNKNOWN)
+        return tuple(name for name, how in both if how is known)
 
 
 class MeasuredWind(NamedTuple):

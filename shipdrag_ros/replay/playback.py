@@ -252,7 +252,7 @@ def settings_of(
     """
     if not any(topic.input for topic in run.topics):
         raise BagError(_no_input(run))
-    used = checked(_ship(run, ship))
+    used = checked(ship_of(run, ship))
     return used, recorded_parameters(run) if parameters is None else parameters
 
 
@@ -394,7 +394,10 @@ def _counts(
     return counts
 
 
-def _ship(run: Run, given: Ship | None) -> Ship:
+def ship_of(run: Run, given: Ship | None) -> Ship:
+    """
+    Return the ship that is given, else the one attached to a bag.
+    """
     if given is not None:
         return given
     if SHIP_FILE not in run.attachments:
@@ -421,7 +424,7 @@ def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
     """Say whether these are what the bag was recorded with, as far as it says so."""
     if run.node is None:
         return False
-    own_ship = SHIP_FILE not in run.attachments or _ship(run, None).to_yaml() == ship.to_yaml()
+    own_ship = SHIP_FILE not in run.attachments or ship_of(run, None).to_yaml() == ship.to_yaml()
     return own_ship and (
         PARAMETERS_FILE not in run.attachments or recorded_parameters(run) == parameters
     )

@@ -35,7 +35,7 @@ def law_of(ship: Ship, speed_m_s: float) -> SurgeLaw:
     low, high = ship.baseline_range_m_s
     if not low <= speed_m_s <= high:
         raise SimulationError(
-            f'speed_m_s is {speed_m_s!r}, the baseline is stated for '
+            f'speed_m_s is {round(speed_m_s, 3)}, the baseline is stated for '
             f'{low:.4g}..{high:.4g} m/s; choose a speed inside or extend the baseline'
         )
     speeds = np.linspace(low, min(high, _RANGE * speed_m_s), _CELLS + 1)

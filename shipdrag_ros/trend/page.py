@@ -32,7 +32,7 @@ Links = Mapping[tuple[str, int], str]
 _HOW = display.Section(
     'How to read it',
     lines=(
-        'Added resistance is the resistance of the hull through the water over that of the clean '
+        'Added resistance is the resistance of the hull in calm deep water over that of the clean '
         'hull, at the speed stated. It is what coastdowns show, without the propeller.',
         'The band holds what is known of the hull, not of a single run: weather and draught make '
         'runs scatter about it.',
@@ -134,7 +134,8 @@ def _sentence(trends: Sequence[ShipTrend]) -> str:
     first = trends[0]
     cost = f'; it costs {words.amount(first.costs.usd_per_year)} USD a year' if first.costs else ''
     return (
-        f'{first.series.name} first: {words.percent(first.now)} % over the clean hull'
+        f'{first.series.name} first: {words.percent(first.now)} % over the clean hull '
+        'in calm deep water'
         f'{words.speed_loss(first)}{cost}.'
     )
 

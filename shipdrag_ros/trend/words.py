@@ -80,8 +80,9 @@ def lines(trend: ShipTrend) -> list[str]:
     if trend.now is not None:
         knots = series.reference_speed_m_s / M_S_PER_KNOT
         found.append(
-            f'Added resistance {percent(trend.now)} % over {_CLEAN[series.clean]}, at '
-            f'{knots:.1f} kn ({series.reference_speed_m_s:.2f} m/s); growth between cleanings '
+            f'Added resistance in calm deep water {percent(trend.now)} % over '
+            f'{_CLEAN[series.clean]}, at {knots:.1f} kn ({series.reference_speed_m_s:.2f} m/s); '
+            'growth between cleanings '
             f'{percent(trend.growth_per_year)} % a year{_SPREAD}.'
         )
     if trend.scatter is not None:

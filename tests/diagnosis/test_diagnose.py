@@ -55,6 +55,18 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
         diagnose([run(lead_in_s=120.0)], SHIP, PARAMETERS)
 
 
+def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
+    log_alone = run('log_scale=0.9438').window.without('position', 'not on board')
+    for facts in ((), (Fact('units_checked'),)):
+        found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=facts)
+        said = words.sentence(found)
+        assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
+        assert '(0.0 to 19.4 knots): is the unit wrong?' in said
+        assert '--map speed_through_water=COLUMN:kn' in said
+        assert '15.50' not in said
+    assert not found.candidates
+
+
 def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
     straight = run()
     assert straight.window.before is not None
@@ -70,6 +82,7 @@ def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
     window = replace(straight.window, position=bent(straight.window.position), before=before)
     found = diagnose([CoastRun('bent', window)], SHIP, PARAMETERS)
     assert found.verdict not in (Verdict.NONE, Verdict.NAMED)
+    assert found.where is None or NONE not in [each.names for each in found.held]
     assert any('wander apart' in note for note in found.notes)
 
 
@@ -227,6 +240,8 @@ def test_what_is_hidden_is_named_with_its_size(text: str, parameter: str, size: 
     found = answer(text)
     name = text.partition('=')[0]
     assert [effect.name for effect in found.effects] == [name]
+    assert found.where is not None
+    assert found.where.channel == 'log'
     known = found.effects[0].parameters[parameter]
     assert abs(known.value - size) < 4.0 * known.sd
     assert found.after is not None

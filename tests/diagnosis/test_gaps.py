@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.gaps import _channel, gap_of, held_out
+from shipdrag_ros.diagnosis.gaps import _channel, _falsified, gap_of, held_out
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
@@ -90,3 +90,18 @@ def test_log_and_radar_are_not_told_apart_where_either_explains_as_much(behind, 
     for smooth, less in behind.items():
         fits.append(Fitted(Explanation(smooth=smooth), np.zeros(0), log_evidence=-less))
     assert _channel(ComparedHypotheses((), tuple(fits))) == channel
+
+
+@pytest.mark.parametrize(
+    ('named', 'channel'),
+    [
+        (('log_scale',), 'log'),
+        (('log_lag', 'time_offset'), 'log'),
+        (('radar_scale',), 'radar'),
+        (('log_scale', 'radar_scale'), 'log_radar'),
+        (('log_scale', 'fouling'), ''),
+        ((), ''),
+    ],
+)
+def test_an_instrument_that_is_named_is_where_they_disagree(named, channel):
+    assert _falsified(named) == channel

@@ -138,3 +138,11 @@ def test_a_place_before_the_stop_ends_at_zero_and_not_at_minus_zero() -> None:
     before = replace(found, where=Where('log', (-1786.0, 0.0), (7.2, 7.2)))
     assert '1786 to 0 s before the stop' in place(before)
     assert '12 to 900 s after the stop' in place(found)
+
+
+def test_without_a_clean_hull_a_share_of_fouling_is_said_to_be_of_any_rougher_hull() -> None:
+    fouled = diagnosis(Verdict.ONE_OF, (('fouling',), 0.5), (('wind',), 0.49))
+    said = sentence(replace(fouled, baseline='fitted_here'))
+    assert 'What is called fouling here is any hull rougher than usual' in said
+    other = diagnosis(Verdict.ONE_OF, (('waves',), 0.5), (('wind',), 0.49))
+    assert 'is any hull' not in sentence(replace(other, baseline='fitted_here'))

@@ -10,6 +10,7 @@ import pytest
 
 from shipdrag_ros.estimation import words
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.ship import Ship, TableBaseline
 
 
@@ -47,6 +48,24 @@ def test_the_summary_says_what_is_over_the_clean_hull(estimate: Estimate, ship: 
     high = TableBaseline((8.5, 9.0), (1e5, 2e5), 0.03)
     _, why, _ = estimate.summary(replace(ship, baseline=high))
     assert 'from 16.5 knots to 17.5 knots and this curve is outside' in why
+
+
+def test_wind_that_was_read_and_left_in_is_named_and_taken_out(estimate, ship) -> None:
+    speed = np.linspace(1.0, 9.0, 30)
+    baseline = TableBaseline(tuple(speed), tuple(ship.mass_kg * speed**2 / 3600.0), 0.03)
+    calm = replace(estimate.calm, resistance_m_s2=estimate.calm.speed_m_s**2 / 3600.0)
+    read = Reference(Knowledge.MEASURED, Knowledge.UNKNOWN)
+    parts = {'wind': np.zeros(len(calm.speed_m_s))}
+    windy = replace(estimate, calm=calm, reference=read, sigma_parts=parts)
+    first, _ = windy.summary(replace(ship, baseline=baseline))
+    of_run, in_calm = first.split(' In calm deep water, with the wind taken out: ')
+    assert '20.0 ± 9.8 % over the clean hull' in of_run
+    assert (
+        'the wind, which was measured, left in as well as the depth, which is not known' in of_run
+    )
+    assert '(no difference that shows)' in in_calm
+    unread, _ = replace(windy, reference=Reference()).summary(replace(ship, baseline=baseline))
+    assert unread.endswith(f' In calm deep water, whatever the weather was: {in_calm}')
 
 
 def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, ship: Ship) -> None:

@@ -113,6 +113,7 @@ def test_what_ranks_stands_first_with_its_error(priced):
     assert spread == pytest.approx([2.0 * each.sd for each in costs], rel=0.05)
     now = trends[0].now
     assert f' ± {200.0 * now.sd:.1f} % over' in words.lines(trends[0])[0]
+    assert 'in calm deep water' in words.lines(trends[0])[0]
     assert words.lines(trends[0])[0].endswith('; ± is two standard deviations.')
     for trend, each in zip(trends, costs, strict=True):  # linear in what was added
         assert each.sd / each.value == pytest.approx(trend.now.sd / trend.now.value)
