@@ -21,6 +21,7 @@ from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
+from shipdrag_ros.simulation.effect import Scope
 from shipdrag_ros.simulation.effects import find
 
 _CHANNELS = {
@@ -31,7 +32,7 @@ _CHANNELS = {
 }
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
-_ANY_ROUGHER = ' What is called fouling here is any hull rougher than usual, be it clean or not.'
+_ANY_HULL = ' What is named of the hull here is against a usual hull, clean or not.'
 _LEAST = 0.001  # probability that is stated
 _MOST_LIMITS = 5
 _LARGE_N = 1e4  # from here on a force is stated in kN
@@ -45,8 +46,9 @@ def sentence(found: DiagnosisResult) -> str:
         right = f'; if the unit is right: {_listed(found.held)}' if found.held else ''
         return f'{found.question}. The verdict waits for the answer{right}.'
     if found.baseline == 'fitted_here':
-        fouled = any('fouling' in each.names for each in found.held)
-        return f'{NO_CLEAN_HULL}{_ANY_ROUGHER if fouled else ""} {_verdict(found)}'
+        names = {name for each in found.held if each.names != UNKNOWN for name in each.names}
+        of_hull = any(find(name).scope is Scope.HULL for name in names)
+        return f'{NO_CLEAN_HULL}{_ANY_HULL if of_hull else ""} {_verdict(found)}'
     return _verdict(found)
 
 

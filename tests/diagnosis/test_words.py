@@ -140,9 +140,9 @@ def test_a_place_before_the_stop_ends_at_zero_and_not_at_minus_zero() -> None:
     assert '12 to 900 s after the stop' in place(found)
 
 
-def test_without_a_clean_hull_a_share_of_fouling_is_said_to_be_of_any_rougher_hull() -> None:
+def test_without_a_clean_hull_what_is_named_of_it_is_said_to_be_against_a_usual_one() -> None:
     fouled = diagnosis(Verdict.ONE_OF, (('fouling',), 0.5), (('wind',), 0.49))
     said = sentence(replace(fouled, baseline='fitted_here'))
-    assert 'What is called fouling here is any hull rougher than usual' in said
+    assert 'named of the hull here is against a usual hull' in said
     other = diagnosis(Verdict.ONE_OF, (('waves',), 0.5), (('wind',), 0.49))
-    assert 'is any hull' not in sentence(replace(other, baseline='fitted_here'))
+    assert 'a usual hull' not in sentence(replace(other, baseline='fitted_here'))

@@ -45,7 +45,7 @@ def test_replay_gives_the_live_figures_bit_for_bit(recording, ship, parameters):
     assert len(updates) > 10
     # speed, resistance, curve, forecast and path of each; the last three once more at the end
     count = 5 * len(updates) + 3
-    assert result.recorded == Recorded(count, count, None, by=__version__)
+    assert result.recorded == Recorded(count, count, None, by=__version__, beside=count)
     assert result.parameters == parameters
     assert result.ship == ship
     (coastdown,) = result.coastdowns

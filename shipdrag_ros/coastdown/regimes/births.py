@@ -410,7 +410,7 @@ def _children(
         _lies(bank, i, s.THE_LOG, n.LIES * hours)
         _lies(bank, i, s.THE_TRACK, n.LIES * hours)
     if setting.shafts > 0 and not claimed and f.liar == s.NOBODY:
-        _lies(bank, i, s.THE_SHAFTS, n.LIES * hours)
+        _lies(bank, i, s.THE_SHAFTS, n.SHAFT_DIES * hours)
     fades = is_fade(bank.row[i])
     if regime == s.LEVEL and not fades and age_s > n.SETTLED_S * setting.pace:
         f.regime = regime = s.DRIVEN

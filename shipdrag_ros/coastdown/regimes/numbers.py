@@ -106,6 +106,7 @@ BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
 BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
 WIDE = _grid('WIDE', (0.05, 3.0), '1', 'share of readings that scatter more, and by what factor')
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
+SHAFT_DIES = _number('SHAFT_DIES', 0.01, '1/h', 'the same of the sensor of a shaft')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
 AMID = _grid(

@@ -246,9 +246,9 @@ def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
         chance = found.chance(name)
         if chance > 0.5:
             share = _held_unit(found) if name == HELD_FORCE else 1.0
-            # where it acts: it is 0 where not
+            # where it acts: it is 0 where not; one that is all but certain is rounding
             mean = found.mean[at] / chance
-            spread = (sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2
+            spread = max((sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2, 0.0)
             yield (
                 f'{what} {100.0 * share * mean:.0f} ± {200.0 * share * math.sqrt(spread):.0f} % '
                 f'of the resistance at the stop (probability {chance:.2g}): it is no part of r, '
