@@ -246,7 +246,8 @@ def _acting_notes(found: RunPosterior, sd: Float64) -> Iterator[str]:
         chance = found.chance(name)
         if chance > 0.5:
             share = _held_unit(found) if name == HELD_FORCE else 1.0
-            # where it acts: it is 0 where not; one that is all but certain is rounding
+            # where it acts: it is 0 where not. The moments leave out models of little weight,
+            # the chance does not: of one that is all but certain nothing may be left
             mean = found.mean[at] / chance
             spread = max((sd[at] ** 2 + found.mean[at] ** 2) / chance - mean**2, 0.0)
             yield (
