@@ -31,7 +31,7 @@ from shipdrag_ros.diagnosis.verdict import (
     runs_differ,
     waiting,
 )
-from shipdrag_ros.diagnosis.words import names_text
+from shipdrag_ros.diagnosis.words import names_text, of_the_earth
 from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict, smallest_set
 from shipdrag_ros.inference.rows import LOG
@@ -236,6 +236,9 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
                 'standard deviation), as water seldom makes them; one of them is wrong, and as '
                 'much of the coastdown as is like it passes for noise'
             )
+    ruled_out = [each for each in effects_of(case.seen[0].ship).values() if not each.in_geodetic]
+    if ruled_out and _geodetic(case.seen):
+        yield of_the_earth(ruled_out)
     if not stated:
         yield (
             'the ship file has no baseline: the runs are compared with all hulls of her length '
@@ -297,8 +300,14 @@ def effects_about(seen: Sequence[Observation]) -> list[Effect]:
     return [
         effect
         for effect in effects_of(ship).values()
-        if not effect.missing(ship) and (not effect.errs_in or read.intersection(effect.errs_in))
+        if not effect.missing(ship)
+        and (not effect.errs_in or read.intersection(effect.errs_in))
+        and (effect.in_geodetic or not _geodetic(seen))
     ]
+
+
+def _geodetic(seen: Sequence[Observation]) -> bool:
+    return all(run.geodetic for run in seen)
 
 
 def stated_in(

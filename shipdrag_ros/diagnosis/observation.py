@@ -92,6 +92,8 @@ class Observation:
         What is measured besides.
     ship
         As she was in this run, without effects.
+    geodetic
+        Whether positions came as latitude and longitude.
     notes
         A sentence for each input that is left out.
     """
@@ -110,6 +112,7 @@ class Observation:
     across_whitener: Float64
     context: Context
     ship: Ship
+    geodetic: bool = False
     notes: tuple[str, ...] = ()
 
     @property
@@ -200,6 +203,7 @@ class Observation:
             else whitener_of(aside, ship, speed_m_s, lead_in_s, run_down.stop_sd_s),
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
+            'position' in window.geodetic,
             record.notes,
         )
 

@@ -23,6 +23,7 @@ from shipdrag_ros.diagnosis.result import (
 )
 from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, StandingLog, shown
 from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
+from shipdrag_ros.diagnosis.words import of_the_earth
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import OUTLIER
@@ -168,12 +169,8 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
             'without position and heading the courses are not known: a current and an offset '
             'of the log look alike'
         )
-    ruled_out = [effect.name for effect in shown() if effect not in model.effects]
-    if ruled_out:
-        found.append(
-            'the positions are latitude and longitude, whose scale is that of the Earth: '
-            f'{", ".join(ruled_out)} is ruled out'
-        )
+    if ruled_out := [effect for effect in shown() if effect not in model.effects]:
+        found.append(of_the_earth(ruled_out))
     return found
 
 

@@ -21,7 +21,7 @@ from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
-from shipdrag_ros.simulation.effect import Scope
+from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import find
 
 _CHANNELS = {
@@ -351,6 +351,16 @@ def names_text(names: Sequence[str]) -> str:
     if names == UNKNOWN:
         return UNNAMED
     return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
+
+
+def of_the_earth(ruled_out: Sequence[Effect]) -> str:
+    """
+    Say what latitude and longitude rule out.
+    """
+    return (
+        'the positions are latitude and longitude, whose scale is that of the Earth: '
+        f'{", ".join(effect.name for effect in ruled_out)} is ruled out'
+    )
 
 
 def probability(value: float) -> str:

@@ -87,6 +87,8 @@ class Window:
         What was left out, a sentence each.
     further
         Series of further instruments, by the name of the input; of those heard.
+    geodetic
+        Inputs of position that came as latitude and longitude.
     doubted_log, log_doubt
         The log most probably in a wrong scale, and that probability.
     told_ns
@@ -114,6 +116,7 @@ class Window:
     depth: Series
     notes: tuple[str, ...] = ()
     further: Mapping[str, Series] = field(default_factory=dict)
+    geodetic: frozenset[str] = frozenset()
     doubted_log: str = 'speed_through_water'
     log_doubt: float = 0.0
     told_ns: int | None = None
@@ -316,6 +319,7 @@ class Window:
                     channel.input: positions(channel) if channel in GEODETIC else series(channel)
                     for channel in further
                 },
+                geodetic=geodetic,
             )
 
         since_ns = start_ns if before_ns is None else min(before_ns, start_ns)
@@ -329,11 +333,16 @@ class Window:
             metres: (series(metres), series(degrees)) for metres, degrees in GEODETIC.items()
         }
 
+        geodetic = frozenset(
+            channel.input
+            for channel, (metres, degrees) in each_position.items()
+            if len(degrees) > len(metres)
+        )
+
         def positions(channel: Channel) -> Series:
-            metres, degrees = each_position[channel]
-            if len(degrees) <= len(metres):
+            if channel.input not in geodetic:
                 return series(channel)
-            return _local_plane(series(GEODETIC[channel]), degrees.value[0])
+            return _local_plane(series(GEODETIC[channel]), each_position[channel][1].value[0])
 
         notes = tuple(
             f'{channel.input} came as metres ({len(metres)}) and as latitude and longitude '

@@ -119,6 +119,17 @@ GROUND_LAG = Declared(
     'lambda_g', 'filter of a speed over ground', normal(3.0, mean=1.0), 's', '1 to 8 s, or none'
 )
 
+GROUND_SCALE = Declared(
+    'g', 'scale of a wrong radar or plotter, less one', normal(0.03), '', 'the effect of it'
+)
+GROUND_SCALE_CHANCE = Declared(
+    'g',
+    'chance of one; none where places are latitude and longitude',
+    0.04,
+    '',
+    'the effect of it',
+)
+
 
 def any_log_lag() -> tuple[float, float]:
     """

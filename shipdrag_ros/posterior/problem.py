@@ -9,7 +9,7 @@ probability. All families share the rows and the unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -148,6 +148,7 @@ class RunModel:
         speed_m_s: float,
         range_m_s: tuple[float, float],
         weather: Weather | None = None,
+        geodetic: Iterable[int] = (),
     ) -> RunModel:
         """
         Set up the model of a run.
@@ -167,7 +168,9 @@ class RunModel:
         range_m_s
             Over which the law reaches: from the lowest to the highest speed, of other runs too.
         weather
-            None: wind and depth are part of r, and no unseen force acts.
+            None: wind and depth are part of r, no unseen force acts and no ground scale is wrong.
+        geodetic
+            Codes of the positions that are latitude and longitude.
         """
         law = HullLaw.of(ship, *range_m_s)
         tau_s = _tau_s(stop)
@@ -187,7 +190,9 @@ class RunModel:
                 place = rows.value[rows.kind == code]
                 at = np.searchsorted(rows.time_s[rows.kind == code], 0.0)
                 start[k + motion.own(code) + motion.PLACE] = place[min(int(at), len(place) - 1)]
-        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds))
+        scaled = {motion.own(code) for code in kinds if code % KIND_COUNT != LOG}
+        scaled = scaled - set(map(motion.own, geodetic)) if weather is not None else set()
+        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds, sorted(scaled)))
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -272,6 +277,7 @@ def _all_families(
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
+    scaled: Sequence[int],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
@@ -289,11 +295,13 @@ def _all_families(
         precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
         chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
-        for lag, force in product(_lags(kinds), _after_stop(stop, added, hull.level)):
+        for lag, force, ground in product(
+            _lags(kinds), _after_stop(stop, added, hull.level), _ground_scales(scaled)
+        ):
             own, known = mean.copy(), precision.copy()
-            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown):
+            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *ground.unknown):
                 own[extra + place], known[extra + place] = prior_mean, prior_sd**-2.0
-            part = chance * lag.chance * force.chance
+            part = chance * lag.chance * force.chance * ground.chance
             yield Family(force.name or hull.name, part, own, known, hull.level, usual)
 
 
@@ -343,6 +351,14 @@ def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
         (1.0 - unfiltered, priors.LOG_LAG),
     ):
         yield _Option(chance, ((motion.LAG, lag.mean, lag.sd),))
+
+
+def _ground_scales(scaled: Sequence[int]) -> Iterator[_Option]:
+    """Yield which ground source has a wrong scale: none, or one of those that may."""
+    scale, wrong = priors.GROUND_SCALE, priors.GROUND_SCALE_CHANCE.mean
+    yield _Option(1.0 - wrong * len(scaled))
+    for own in scaled:
+        yield _Option(wrong, ((own + motion.GROUND_SCALE, scale.mean, scale.sd),))
 
 
 class _Hull(NamedTuple):

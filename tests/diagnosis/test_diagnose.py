@@ -25,7 +25,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import LIBRARY, parse
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -180,6 +180,21 @@ def test_an_error_of_the_log_that_swings_is_in_the_log(cargo: Ship) -> None:
     assert (found.verdict, found.unnamed > 0.9) == (Verdict.UNKNOWN, True)
     assert found.where is not None
     assert found.where.channel == 'log'
+
+
+def test_latitude_and_longitude_are_in_the_scale_of_the_earth(cargo: Ship) -> None:
+    scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
+    truth = simulate(cargo, scenario, effects=[parse('radar_scale=0.08')])
+    block = sense(truth, standard_sensors(), seed=2)
+    window = Window.from_block(
+        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
+    )
+    of_earth = replace(window, geodetic=frozenset({'position'}))
+    for given, may in ((window, True), (of_earth, False)):
+        found = diagnose([CoastRun('run', given)], cargo, Parameters(), advise=False)
+        assert any('radar_scale' in each.names for each in found.candidates) == may
+        said = [note for note in found.notes if 'radar_scale is ruled out' in note]
+        assert len(said) == (not may)
 
 
 FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2

@@ -16,7 +16,13 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POS
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
-from shipdrag_ros.posterior.priors import HELD, HELD_CHANCE, HELD_FORCE
+from shipdrag_ros.posterior.priors import (
+    GROUND_SCALE,
+    GROUND_SCALE_CHANCE,
+    HELD,
+    HELD_CHANCE,
+    HELD_FORCE,
+)
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64
@@ -29,6 +35,7 @@ def problem_of(
     seed: int = 0,
     codes: Sequence[int] = (LOG, OVER_GROUND, POSITION),
     weather: Weather | None = None,
+    geodetic: Sequence[int] = (),
 ) -> RunModel:
     """Set up 120 rows of the model's own motion, of instruments with white noise."""
     rng = np.random.default_rng(seed)
@@ -45,6 +52,7 @@ def problem_of(
         speed_m_s=8.0,
         range_m_s=(4.0, 8.0),
         weather=weather,
+        geodetic=geodetic,
     )
     empty = of_run(rows)
     exact = -predict(empty.forces, empty.start, empty.grid_s, rows)[0][0]
@@ -61,6 +69,7 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
     now[:k] += 0.01
     now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
     now[k + motion.SCALE], now[k + motion.CURRENT], now[k + motion.LEFT] = 0.01, 0.2, 0.3
+    now[k + motion.GROUND_SCALE] = 0.05
 
     def predicted(unknowns: Float64) -> Float64:
         return -predict(problem.forces, unknowns, problem.grid_s, problem.rows)[0][0]
@@ -107,6 +116,22 @@ def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_curren
         assert not np.any(line[~mine]), name
     current = table[1 + k + motion.CURRENT] != 0.0
     assert np.array_equal(current, ~rows.of(LOG))
+
+
+def test_a_ground_source_may_be_in_a_wrong_scale_but_for_latitude_and_longitude(ship):
+    codes = LOG, OVER_GROUND, POSITION, CODES['position_2']
+    at, second = motion.GROUND_SCALE, motion.GROUND_SCALE + motion.own(codes[3])
+    for geodetic, may in (((), {at, second}), ((POSITION,), {second}), (codes[2:], set())):
+        problem = problem_of(ship, codes=codes, weather=Weather(None, None), geodetic=geodetic)
+        k = problem.coefficients
+        for place in (at, second):
+            open_ = [
+                each for each in problem.families if each.precision[k + place] < 1e8
+            ]  # sd above 1e-4
+            part = sum(each.chance for each in open_)
+            assert part == pytest.approx(GROUND_SCALE_CHANCE.mean * (place in may))
+            for each in open_:
+                assert each.precision[k + place] ** -0.5 == pytest.approx(GROUND_SCALE.sd)
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:
