@@ -141,7 +141,9 @@ def would_be_named(found: DiagnosisResult) -> str:
     if not shown:
         return ' No single effect of any size would have been named by these runs.'
     sizes = ', '.join(f'{names_text([name])} {edge}' for _, name, edge in shown[:_MOST_LIMITS])
-    return f' These runs would have named, nine times in ten: {sizes}.'
+    several = any(len(find(name).parameters) > 1 for _, name, _ in shown[:_MOST_LIMITS])
+    usual = ', other parameters as usual' if several else ''
+    return f' These runs would have named, nine times in ten{usual}: {sizes}.'
 
 
 def _from(least: float, quantity: Parameter, limit: Limit) -> str:
