@@ -140,9 +140,9 @@ def _limits(found: DiagnosisResult) -> Iterator[Section]:
     if not found.limits:
         return
     caption = (
-        'Each size is that of 19 in 20, given that the effect is there; from the next size on, its '
-        'other parameters as usual, nine of ten such runs would have named it. - : no size is '
-        'named, as another effect leaves about the same trace'
+        'Each size is that of 19 in 20, given that the effect is there; from the next size on, '
+        'with its other parameters as usual, nine of ten such runs would have named it. - : no '
+        'size is named, as another effect leaves about the same trace'
     )
     yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
 

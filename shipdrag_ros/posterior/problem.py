@@ -9,7 +9,7 @@ probability. All families share the rows and the unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -61,7 +61,7 @@ class Family:
     A prior of all unknowns: mean and precision (p,), and the probability of the family.
 
     `level` is that of the hull over the generic one, about which the prior is; `usual` says
-    whether wind and depth are in their first state.
+    whether wind and depth are in their first state, and no scale is wrong.
     """
 
     name: str
@@ -133,7 +133,7 @@ class RunModel:
 
     @property
     def usual(self) -> RunModel:
-        """The same in the first state of wind and depth: a fit climbs there."""
+        """The same with wind, depth and scales as they usually are: a fit climbs there."""
         return replace(self, families=tuple(each for each in self.families if each.usual))
 
     @classmethod
@@ -168,7 +168,7 @@ class RunModel:
         range_m_s
             Over which the law reaches: from the lowest to the highest speed, of other runs too.
         weather
-            None: wind and depth are part of r, no unseen force acts and no ground scale is wrong.
+            None: wind and depth are part of r, no unseen force acts and no scale is wrong.
         geodetic
             Codes of the positions that are latitude and longitude.
         """
@@ -190,9 +190,8 @@ class RunModel:
                 place = rows.value[rows.kind == code]
                 at = np.searchsorted(rows.time_s[rows.kind == code], 0.0)
                 start[k + motion.own(code) + motion.PLACE] = place[min(int(at), len(place) - 1)]
-        scaled = {motion.own(code) for code in kinds if code % KIND_COUNT != LOG}
-        scaled = scaled - set(map(motion.own, geodetic)) if weather is not None else set()
-        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds, sorted(scaled)))
+        scales = _scales(kinds, geodetic) if weather is not None else {}
+        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds, scales))
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -277,7 +276,7 @@ def _all_families(
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
-    scaled: Sequence[int],
+    errors: Mapping[int, Declared],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
@@ -295,14 +294,15 @@ def _all_families(
         precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
         chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
-        for lag, force, ground in product(
-            _lags(kinds), _after_stop(stop, added, hull.level), _ground_scales(scaled)
+        for lag, force, wrong in product(
+            _lags(kinds), _after_stop(stop, added, hull.level), _wrong_scales(errors)
         ):
             own, known = mean.copy(), precision.copy()
-            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *ground.unknown):
+            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *wrong.unknown):
                 own[extra + place], known[extra + place] = prior_mean, prior_sd**-2.0
-            part = chance * lag.chance * force.chance * ground.chance
-            yield Family(force.name or hull.name, part, own, known, hull.level, usual)
+            part = chance * lag.chance * force.chance * wrong.chance
+            plain = usual and not wrong.unknown
+            yield Family(force.name or hull.name, part, own, known, hull.level, plain)
 
 
 class _Option(NamedTuple):
@@ -353,12 +353,25 @@ def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
         yield _Option(chance, ((motion.LAG, lag.mean, lag.sd),))
 
 
-def _ground_scales(scaled: Sequence[int]) -> Iterator[_Option]:
-    """Yield which ground source has a wrong scale: none, or one of those that may."""
-    scale, wrong = priors.GROUND_SCALE, priors.GROUND_SCALE_CHANCE.mean
-    yield _Option(1.0 - wrong * len(scaled))
-    for own in scaled:
-        yield _Option(wrong, ((own + motion.GROUND_SCALE, scale.mean, scale.sd),))
+def _scales(kinds: Iterable[int], geodetic: Iterable[int]) -> dict[int, Declared]:
+    """Return, by the place of the unknown, the scales that may be wrong."""
+    of_earth = set(map(motion.own, geodetic))
+    found = {}
+    for code in sorted(kinds):
+        own = motion.own(code)
+        if code % KIND_COUNT == LOG:
+            found[own + motion.SCALE] = priors.WRONG_LOG_SCALE
+        elif own not in of_earth:
+            found[own + motion.GROUND_SCALE] = priors.WRONG_GROUND_SCALE
+    return found
+
+
+def _wrong_scales(scales: Mapping[int, Declared]) -> Iterator[_Option]:
+    """Yield which instrument is in a wrong scale: none, or one."""
+    chance = priors.WRONG_SCALE.mean
+    yield _Option(1.0 - chance * len(scales))
+    for place, size in scales.items():
+        yield _Option(chance, ((place, size.mean, size.sd),))
 
 
 class _Hull(NamedTuple):

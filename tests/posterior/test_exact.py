@@ -17,11 +17,12 @@ from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
 from shipdrag_ros.posterior.priors import (
-    GROUND_SCALE,
-    GROUND_SCALE_CHANCE,
     HELD,
     HELD_CHANCE,
     HELD_FORCE,
+    WRONG_GROUND_SCALE,
+    WRONG_LOG_SCALE,
+    WRONG_SCALE,
 )
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.weather import Weather
@@ -118,20 +119,22 @@ def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_curren
     assert np.array_equal(current, ~rows.of(LOG))
 
 
-def test_a_ground_source_may_be_in_a_wrong_scale_but_for_latitude_and_longitude(ship):
+def test_each_scale_may_be_wrong_but_that_of_latitude_and_longitude(ship: Ship) -> None:
     codes = LOG, OVER_GROUND, POSITION, CODES['position_2']
-    at, second = motion.GROUND_SCALE, motion.GROUND_SCALE + motion.own(codes[3])
-    for geodetic, may in (((), {at, second}), ((POSITION,), {second}), (codes[2:], set())):
+    second = motion.GROUND_SCALE + motion.own(codes[3])
+    sizes = {motion.SCALE: WRONG_LOG_SCALE, motion.GROUND_SCALE: WRONG_GROUND_SCALE}
+    sizes[second] = WRONG_GROUND_SCALE
+    of_earth = {motion.GROUND_SCALE: {POSITION}, second: {codes[3]}}
+    for geodetic in ((), (POSITION,), codes[2:]):
         problem = problem_of(ship, codes=codes, weather=Weather(None, None), geodetic=geodetic)
-        k = problem.coefficients
-        for place in (at, second):
-            open_ = [
-                each for each in problem.families if each.precision[k + place] < 1e8
-            ]  # sd above 1e-4
-            part = sum(each.chance for each in open_)
-            assert part == pytest.approx(GROUND_SCALE_CHANCE.mean * (place in may))
-            for each in open_:
-                assert each.precision[k + place] ** -0.5 == pytest.approx(GROUND_SCALE.sd)
+        assert sum(each.chance for each in problem.families) == pytest.approx(1.0)
+        for place, size in sizes.items():
+            at = problem.coefficients + place
+            wide = [each for each in problem.families if each.precision[at] ** -0.5 > 0.025]
+            may = not of_earth.get(place, set()) & set(geodetic)
+            assert sum(each.chance for each in wide) == pytest.approx(WRONG_SCALE.mean * may)
+            for each in wide:
+                assert each.precision[at] ** -0.5 == pytest.approx(size.sd)
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:
