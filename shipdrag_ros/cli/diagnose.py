@@ -100,9 +100,8 @@ def run(options: argparse.Namespace) -> int:
     _show(output, found, ship)
     if options.report is not None:
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.tables import Score
 
-        write_diagnosis(options.report, found, ship, score=Score.published())
+        write_diagnosis(options.report, found, ship)
         output.log(f'report in {options.report}')
     if options.write is not None and ship is not None and found.verdict is Verdict.NAMED:
         text = with_effects(ship, found.effects).to_yaml()
