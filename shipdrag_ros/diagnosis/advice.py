@@ -23,7 +23,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import softmax
 
-from shipdrag_ros.diagnosis.context import Context, Measured
+from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
@@ -485,9 +485,9 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
         case Measure.SHAFT:
             return all(len(run.context.at_shaft) for run in seen)
         case Measure.LOG:
-            return any((run.along.rows.kind == LOG).any() for run in seen)
+            return any((run.rows.kind == LOG).any() for run in seen)
         case Measure.RADAR:
-            return any((run.along.rows.kind != LOG).any() for run in seen)
+            return any((run.rows.kind != LOG).any() for run in seen)
         case _:
             return False
 
@@ -531,7 +531,7 @@ def _read(
     for run, window in zip(case.seen, windows, strict=True):
         context = Context.of(window, case.ship, run.time_s, run.context.stop)
         alone = replace(context, value=np.zeros(len(context)))
-        seen.append(replace(run, across=None, context=alone))
+        seen.append(replace(run, context=alone))
     return of_instrument(case.comparing, fits, ship_runs(seen, case.ship).runs)
 
 
@@ -543,15 +543,9 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
         first,
         heading_rad=heading_rad,
         speed_m_s=speed_m_s,
-        along=_empty(first.along),
-        across=None if first.across is None else _empty(first.across),
+        rows=first.rows._replace(value=np.zeros(len(first.rows.value))),
         context=replace(context, stop=stop, value=np.zeros(len(context))),
     )
-
-
-def _empty(measured: Measured) -> Measured:
-    rows = measured.rows
-    return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))
 
 
 def _windows(measure: Measure, case: Undecided, *, after: float = 0.0) -> list[Window]:

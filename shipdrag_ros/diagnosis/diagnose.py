@@ -325,7 +325,7 @@ def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
 
 def _has_both(run: Observation) -> bool:
     """Say whether a run has a log and the way over ground, to be held against each other."""
-    by_log = run.along.rows.kind == LOG
+    by_log = run.rows.kind == LOG
     return bool(by_log.any() and not by_log.all())
 
 

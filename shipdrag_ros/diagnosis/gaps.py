@@ -41,13 +41,14 @@ def gap_of(seen: Sequence[Observation], residuals: Sequence[RunResidual]) -> Gap
     """
     speeds, places = [], []
     for run, residual in zip(seen, residuals, strict=True):
-        kind, after = run.along.rows.kind, run.along.rows.time_s >= run.lead_in_s
+        kind, after = run.rows.kind, run.rows.time_s >= run.lead_in_s
         speeds.append(residual.along[after & (kind == LOG)])
         ahead = residual.along[after & (kind == POSITION)]
-        if run.across is not None and len(ahead):
-            when = run.along.rows.time_s[after & (kind == POSITION)]
-            to_port = residual.rest[: len(run.across)]
-            places.append(np.hypot(ahead, np.interp(when, run.across.rows.time_s, to_port)))
+        port_s = run.context.port_s
+        if len(port_s) and len(ahead):
+            when = run.rows.time_s[after & (kind == POSITION)]
+            to_port = np.interp(when, port_s, residual.rest[: len(port_s)])
+            places.append(np.hypot(ahead, to_port))
     whole = np.concatenate([each.whitened for each in residuals])
     return Gap(_rms(speeds), _rms(places), float(np.mean(whole**2)))
 
@@ -159,7 +160,7 @@ def where(
     times, speeds = [], []
     residuals = comparing.residuals(before)
     for run, residual, table in zip(seen, residuals, after.linear, strict=True):
-        since = (run.along.rows.time_s - run.lead_in_s) / run.duration_s
+        since = (run.rows.time_s - run.lead_in_s) / run.duration_s
         part = np.clip((since * _PARTS).astype(int), 0, _PARTS - 1)
         rows = np.flatnonzero(since >= 0.0)
         excess = np.zeros(_PARTS)
@@ -235,7 +236,7 @@ def _compared(
     fit: Fitted,
 ) -> list[Compared]:
     """Return each quantity that was measured in a run."""
-    table, rows = fit.linear[j], run.along.rows
+    table, rows = fit.linear[j], run.rows
     sd = comparing.noise_sd(j, table)
     n = len(rows.time_s)
     found = [
@@ -253,17 +254,17 @@ def _compared(
         for quantity, code in CODES.items()
         if (own := rows.kind == code).any()
     ]
-    if run.across is not None:
-        a, across = len(run.across), run.across.rows
-        noise = np.linalg.inv(run.across_whitener)
+    port_s, a = run.context.port_s, len(run.context.port_s)
+    if a:
+        noise, places = np.linalg.inv(run.context.whitener[:a, :a]), run.context.value[:a]
         found.append(
             Compared(
                 'position_across',
-                across.time_s - run.lead_in_s,
-                np.interp(across.time_s, rows.time_s, table.speed_m_s),
-                across.value,
-                across.value - before.rest[:a],
-                across.value - after.rest[:a],
+                port_s - run.lead_in_s,
+                np.interp(port_s, rows.time_s, table.speed_m_s),
+                places,
+                places - before.rest[:a],
+                places - after.rest[:a],
                 np.sqrt(np.sum(noise**2, axis=1)),
                 before.whitened[n : n + a],
                 after.whitened[n : n + a],

@@ -291,7 +291,7 @@ def ratio_before_the_stop(seen: Observation) -> float:
     seen
         A run.
     """
-    rows = seen.along.rows
+    rows = seen.rows
     steady = rows.time_s < seen.lead_in_s
     of_log = rows.value[steady & (rows.kind == LOG)]
     ground = rows.value[steady & (rows.kind == OVER_GROUND)]

@@ -254,7 +254,7 @@ def kind_text(kind: tuple[str, str, str]) -> str:
 
 def _span(seen: Sequence[Observation]) -> Span:
     """Return what runs hold, by which forms may be told apart."""
-    rows = [run.along.rows.kind for run in seen]
+    rows = [run.rows.kind for run in seen]
     days = [day_of(run) for run in seen]
     depths = [run.context.depth_m or 0.0 for run in seen]
     several = len(seen) >= _MANY
