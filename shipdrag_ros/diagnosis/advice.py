@@ -24,6 +24,7 @@ import numpy as np
 from scipy.special import softmax
 
 from shipdrag_ros.diagnosis.context import Context
+from shipdrag_ros.diagnosis.earlier import Carried
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
@@ -48,7 +49,6 @@ from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import advice as fact_advice
 from shipdrag_ros.simulation.effect import COSTS, Cost, Measure, Scope
 from shipdrag_ros.simulation.effects import discriminating_measurements, inseparable
@@ -307,22 +307,20 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
 @dataclass(frozen=True)
-class Undecided(ComparedRuns):
+class DiagnosedRuns(ComparedRuns):
     """
-    Runs that cannot be decided.
+    Runs, with what else is known of them.
 
     Attributes
     ----------
-    ship
     facts
         That are stated.
-    candidates
-        That the runs cannot separate.
+    earlier
+        What earlier diagnoses say.
     """
 
-    ship: Ship
     facts: Facts
-    candidates: Sequence[Candidate]
+    earlier: Carried | None
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
@@ -340,13 +338,17 @@ class Undecided(ComparedRuns):
         }
 
 
-def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
+def advice(
+    case: DiagnosedRuns, candidates: Sequence[Candidate], progress: Progress = silent
+) -> tuple[Advice, ...]:
     """
     Return what would decide; first what is likely to cost the crew least.
 
     Parameters
     ----------
     case
+    candidates
+        That the runs cannot separate.
     progress
         Called with how many measurements are tried.
 
@@ -378,16 +380,16 @@ def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
-    for each in declared(case.candidates):
+    for each in declared(candidates):
         measure = Measure(each.measure)
         if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
-            ranked[each] = _reach(measure, case.candidates, case.inseparable)
+            ranked[each] = _reach(measure, candidates, case.inseparable)
     for name, named in _facts(case).items():
         ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
     return _by_cost(ranked)
 
 
-def _facts(case: Undecided) -> dict[str, float]:
+def _facts(case: DiagnosedRuns) -> dict[str, float]:
     """Return the facts that would name something, and how probably."""
 
     def decided(after: Mapping[Names, float]) -> bool:
@@ -492,7 +494,9 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
             return False
 
 
-def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOutcome]], list[int]]:
+def _settings(
+    measure: Measure, case: DiagnosedRuns
+) -> tuple[list[list[PredictedOutcome]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
     first, fits, same = case.seen[0], list(case.rivals.values()), [0] * len(case.rivals)
     if measure in _RUNS:
@@ -524,7 +528,7 @@ def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOut
 
 
 def _read(
-    windows: Sequence[Window], case: Undecided, fits: Sequence[Fitted]
+    windows: Sequence[Window], case: DiagnosedRuns, fits: Sequence[Fitted]
 ) -> tuple[list[PredictedOutcome], list[Float64]]:
     """Return what rivals predict of an instrument in each run."""
     seen = []
@@ -548,7 +552,7 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
     )
 
 
-def _windows(measure: Measure, case: Undecided, *, after: float = 0.0) -> list[Window]:
+def _windows(measure: Measure, case: DiagnosedRuns, *, after: float = 0.0) -> list[Window]:
     """Return what an instrument may read in each run; `after` is the shaft after its fall."""
     windows = []
     channel, draught_m = _INSTRUMENTS[measure], case.ship.draught_m or math.nan

@@ -45,7 +45,7 @@ def _port_covariance(rows: Rows, variance: Float64, ship: Ship, stop: Stop) -> F
     steady = time < lead_in_s - stop.sd_s
     damping, inertia = damping_of(ship, np.array([speed_m_s]))
     seen = of_steady(
-        Rows(*(each[steady] for each in rows)),
+        Rows(time[steady], rows.kind[steady], rows.value[steady]),
         variance[steady],
         float(damping[0]),
         float(inertia[0]),

@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import FORCE, Compared, Gap, RunTrace, Where
+from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.inference.linear import solve_scaled
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
@@ -125,9 +126,7 @@ def _given_shared(
 
 
 def where(
-    seen: Sequence[Observation],
-    comparing: Comparing,
-    found: ComparedHypotheses[Fitted],
+    case: ComparedRuns,
     before: Fitted,
     after: Fitted,
     named: Collection[str],
@@ -139,9 +138,7 @@ def where(
 
     Parameters
     ----------
-    seen
-    comparing, found
-        Of these runs.
+    case
     before
         The ship as stated.
     after
@@ -156,10 +153,10 @@ def where(
     Where
         The ends hold 90 % of the excess over noise.
     """
-    channel = FORCE if of_force else _falsified(named) or _channel(found)
+    channel = FORCE if of_force else _falsified(named) or _channel(case.found)
     times, speeds = [], []
-    residuals = comparing.residuals(before)
-    for run, residual, table in zip(seen, residuals, after.linear, strict=True):
+    residuals = case.comparing.residuals(before)
+    for run, residual, table in zip(case.seen, residuals, after.linear, strict=True):
         since = (run.rows.time_s - run.lead_in_s) / run.duration_s
         part = np.clip((since * _PARTS).astype(int), 0, _PARTS - 1)
         rows = np.flatnonzero(since >= 0.0)
@@ -175,8 +172,8 @@ def where(
         times.append(ends * run.duration_s)
         speeds.append(np.interp(ends, since, table.speed_m_s))
     if not times:
-        whole = max(run.duration_s for run in seen)
-        return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in seen)))
+        whole = max(run.duration_s for run in case.seen)
+        return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in case.seen)))
     return Where(
         channel,
         (float(np.min(times)), float(np.max(times))),
@@ -207,23 +204,19 @@ def _channel(found: ComparedHypotheses[Fitted]) -> str:
     return _CHANNELS.get(place_of(best.hypothesis.smooth), FORCE)
 
 
-def traces(
-    seen: Sequence[Observation], comparing: Comparing, before: Fitted, after: Fitted
-) -> tuple[RunTrace, ...]:
+def traces(case: ComparedRuns, before: Fitted, after: Fitted) -> tuple[RunTrace, ...]:
     """
     Return each run as it was measured and as two hypotheses have it.
 
     Parameters
     ----------
-    seen
-    comparing
-        Of these runs.
+    case
     before, after
     """
-    left = zip(comparing.residuals(before), comparing.residuals(after), strict=True)
+    left = zip(case.comparing.residuals(before), case.comparing.residuals(after), strict=True)
     return tuple(
-        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, comparing, j, *both, after)))
-        for j, (run, both) in enumerate(zip(seen, left, strict=True))
+        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, case.comparing, j, *both, after)))
+        for j, (run, both) in enumerate(zip(case.seen, left, strict=True))
     )
 
 
