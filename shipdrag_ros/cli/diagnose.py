@@ -133,12 +133,11 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
         return
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))
-    if found.effects:
-        output.heading('How large; sd is one standard deviation')
-        output.table(diagnosis_cells.parameters(found.effects))
-    elif diagnosis_cells.sizes(found).rows:
-        output.heading('How large, were it the one; sd is one standard deviation')
-        output.table(diagnosis_cells.sizes(found))
+    sizes = diagnosis_cells.sizes(found)
+    if sizes.rows:
+        were = '' if found.effects else ', were it the one'
+        output.heading(f'How large{were}; sd is one standard deviation')
+        output.table(sizes)
     if found.limits:
         output.heading('Effects that are not named: how large they can be; sizes in SI')
         output.table(diagnosis_cells.limits(found))

@@ -216,23 +216,19 @@ def with_known(
     list of PredictedOutcome
         With one row more for each unknown that is shown.
     """
-    k, found = comparing.runs.coefficients, []
+    k, places, found = comparing.runs.coefficients, comparing.runs.places, []
+    shown = [
+        (place[k + unknown], each)
+        for unknown, known in sd.items()
+        for place, each in zip(places, known, strict=True)
+        if each > 0.0
+    ]
+    at, known_sd = (np.array(column) for column in zip(*shown)) if shown else (np.arange(0),) * 2
     for fit, outcome in zip(fits, outcomes, strict=True):
-        mean, slope = [], []
-        for unknown, known in sd.items():
-            for place, each in zip(comparing.runs.places, known, strict=True):
-                if each > 0.0:
-                    mean.append(float(fit.at[place[k + unknown]]) / each)
-                    slope.append(np.zeros(len(fit.at)))
-                    slope[-1][place[k + unknown]] = 1.0 / each
-        rows = np.array(slope).reshape(len(mean), len(fit.at)).T
-        found.append(
-            replace(
-                outcome,
-                mean=np.concatenate([outcome.mean, mean]),
-                slope=np.hstack([outcome.slope, rows]),
-            )
-        )
+        rows = np.zeros((len(fit.at), len(at)))
+        rows[at, np.arange(len(at))] = 1.0 / known_sd
+        mean = np.concatenate([outcome.mean, fit.at[at] / known_sd])
+        found.append(replace(outcome, mean=mean, slope=np.hstack([outcome.slope, rows])))
     return found
 
 

@@ -58,7 +58,7 @@ def _port_covariance(rows: Rows, variance: Float64, ship: Ship, stop: Stop) -> F
     whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
     shaken = np.linalg.inv(whitener.T)
     sailed = np.tril(np.broadcast_to(speed * np.diff(time, prepend=time[0]), shaken.shape))
-    wandered = sailed @ yaw_wander(time) @ sailed.T
+    wandered = sailed @ _yaw_wander(time) @ sailed.T
     return np.asarray(shaken @ shaken.T + wandered, np.float64)
 
 
@@ -70,15 +70,11 @@ def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     return np.interp(after_s, glided_s, speed)
 
 
-def yaw_wander(time_s: Float64) -> Float64:
+def _yaw_wander(time_s: Float64) -> Float64:
     """
     Return the covariance (n, n) of what a heading, and the course with it, wanders by.
 
     A steady record shows it while she is steered with way on, not as she glides.
-
-    Parameters
-    ----------
-    time_s : (n,)
     """
     apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
     return priors.YAW_WANDERS.sd**2 * np.exp(-apart)
@@ -240,7 +236,8 @@ class Context:
             blocks.append(np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
-        blocks.append(_yaw_covariance(yaw_s))
+        # what she yaws by from bin to bin, and what she and her compass wander by
+        blocks.append(_yaw_wander(yaw_s) + np.eye(len(yaw_s)) * priors.YAW.sd**2)
         run_down_s = ship.propulsion.run_down_s if ship.propulsion and stop.shaft_s else None
         if run_down_s is not None:
             values.append(np.log([stop.shaft_s]))
@@ -380,11 +377,6 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     turned = priors.WIND_TURNED.sd**2 * np.outer(other, other)
     gain = priors.WIND_GAIN.sd**2 * np.outer(values, values)
     return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
-
-
-def _yaw_covariance(time_s: Float64) -> Float64:
-    """Return what a ship yaws by from bin to bin, and what she and her compass wander by."""
-    return yaw_wander(time_s) + np.eye(len(time_s)) * priors.YAW.sd**2
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:

@@ -204,10 +204,6 @@ def _nothing_compared(
     """Return the diagnosis of runs that no hypothesis can be compared with."""
     return DiagnosisResult(
         verdict=Verdict.ONE_OF,
-        effects=(),
-        candidates=(),
-        nothing=0.0,
-        unnamed=0.0,
         before=Gap(None, None, math.nan),
         baseline=baseline,
         notes=notes,

@@ -191,7 +191,11 @@ class Observation:
             lead_in_s,
             times,
             run_down.stop_sd_s,
-            *(_stated_run_down(ship) or (run_down.shaft_s, run_down.shaft_sd_s)),
+            *(
+                (run_down.shaft_s, run_down.shaft_sd_s)
+                if ship.propulsion is None
+                else (ship.propulsion.run_down_s, ship.propulsion.sd)
+            ),
             heading_rad,
             heading_sd,
             speed_m_s,
@@ -217,11 +221,6 @@ def _usable(window: Window, record: RunRows) -> Window:
         if name not in record.white_sd:  # a note of the record says why
             window = window.without(name, 'not used')
     return window
-
-
-def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
-    """Return the run-down of the thrust and its sd, where the ship file states it."""
-    return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
 
 
 def _heading(window: Window, since_ns: int, position_sd_m: float) -> tuple[float, float]:

@@ -128,12 +128,11 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
     if not shown:
         return
     declared = [find(name) for name in dict.fromkeys(each.name for each in shown)]
-    sizes = tables.parameters(shown) if found.effects else tables.sizes(found)
     yield Section(
         'How large it is',
         text=() if found.effects else ('Of each candidate, were it the one:',),
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
-        tables=[('In SI; sd is one standard deviation', sizes)],
+        tables=[('In SI; sd is one standard deviation', tables.sizes(found))],
     )
 
 
@@ -142,8 +141,8 @@ def _limits(found: DiagnosisResult) -> Iterator[Section]:
     if not found.limits:
         return
     caption = (
-        'Each size is that of 19 in 20, given that the effect is there; from the next size on, its '
-        'other parameters as usual, nine of ten such runs would have named it. - : no size is '
+        'Each size is that of 19 in 20, given that the effect is there; from the next size on, '
+        'its other parameters as usual, nine of ten such runs would have named it. - : no size is '
         'named, as another effect leaves about the same trace'
     )
     yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])

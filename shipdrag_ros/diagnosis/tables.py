@@ -39,8 +39,10 @@ def parameters(effects: Sequence[EffectEstimate]) -> Table:
 
 def sizes(found: DiagnosisResult) -> Table:
     """
-    Show how large each candidate would be, were it the one.
+    Show how large what is named is, or each candidate would be, were it the one.
     """
+    if found.effects:
+        return parameters(found.effects)
     rows = [
         (
             words.names_text(each.names),

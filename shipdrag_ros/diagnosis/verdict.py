@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.result import (
     Limit,
     RunSize,
 )
-from shipdrag_ros.diagnosis.words import names_text, probability, sentence
+from shipdrag_ros.diagnosis.words import listed, probability, sentence
 from shipdrag_ros.display import mistaken_units, ship_speed
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
 from shipdrag_ros.inference.decision import (
@@ -432,11 +432,7 @@ def _besides(force: DiagnosisResult) -> str:
     """Say what the force shows besides."""
     if force.verdict is Verdict.UNKNOWN:
         return f'in the force besides: {sentence(force)}'
-    likely = ', '.join(
-        f'{names_text(each.names)} ({probability(each.probability)})'
-        for each in force.candidates
-        if each.names
-    )
+    likely = listed([each for each in force.candidates if each.names])
     return f'in the force besides, compared with all hulls of her length and volume: {likely}'
 
 

@@ -316,7 +316,7 @@ def test_a_result_says_what_its_file_says(tmp_path: Path, alone: DiagnosisResult
     unsure = replace(alone, candidates=(Candidate(UNKNOWN, 0.3), *alone.candidates[:1]))
     path = write(tmp_path, json_text(document(unsure, SHIP)))
     assert EarlierDiagnosis.of(unsure, SHIP, name=str(path)) == read_earlier(path)
-    with pytest.raises(DiagnosisError, match='waits for the answer: .is it'):
+    with pytest.raises(DiagnosisError, match="waits for the answer: 'is it"):
         EarlierDiagnosis.of(replace(alone, question='is it?'), SHIP, name='then')
 
 
