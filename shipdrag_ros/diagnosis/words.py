@@ -43,7 +43,7 @@ def sentence(found: DiagnosisResult) -> str:
     Return the verdict in a sentence; first a question, or that there is no clean hull.
     """
     if found.question:
-        right = f'; if the unit is right: {_listed(found.held)}' if found.held else ''
+        right = f'; if the unit is right: {listed(found.held)}' if found.held else ''
         return f'{found.question}. The verdict waits for the answer{right}.'
     if found.baseline == 'fitted_here':
         names = {name for each in found.held if each.names != UNKNOWN for name in each.names}
@@ -87,9 +87,7 @@ def _verdict(found: DiagnosisResult) -> str:
             ]
             rest = [each for each in seen if each.names != NONE]
             if len(rest) == len(seen):
-                return (
-                    f'Missing is one of these: {_listed(rest)}. These runs cannot separate them.'
-                )
+                return f'Missing is one of these: {listed(rest)}. These runs cannot separate them.'
             said = f'{"Nothing else" if fitted else "Nothing"} is missing'
             if found.baseline == 'none':  # the force was not examined
                 said = 'Log and track agree'
@@ -97,9 +95,9 @@ def _verdict(found: DiagnosisResult) -> str:
             if not rest:
                 return f'{said}.'
             if seen[0].names == NONE:  # the most probable comes first
-                return f'{said}, or {_listed(rest)}. These runs cannot separate them.'
+                return f'{said}, or {listed(rest)}. These runs cannot separate them.'
             return (
-                f'Missing is one of these: {_listed(rest)}; or {said[0].lower()}{said[1:]}. '
+                f'Missing is one of these: {listed(rest)}; or {said[0].lower()}{said[1:]}. '
                 'These runs cannot separate them.'
             )
         case Verdict.UNKNOWN:
@@ -435,7 +433,10 @@ def _on_board(quantity: Parameter, found: Parameter) -> str:
     return text
 
 
-def _listed(candidates: Sequence[Candidate]) -> str:
+def listed(candidates: Sequence[Candidate]) -> str:
+    """
+    Name candidates, each with its probability.
+    """
     return ', '.join(
         f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
     )

@@ -215,7 +215,7 @@ def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo
     )
     run = CoastRun('run', window)
     (seen,), notes = observed([run], cargo, Parameters(), lambda *_: None)
-    assert set(seen.along.rows.kind.tolist()) == {LOG, POSITION}
+    assert set(seen.rows.kind.tolist()) == {LOG, POSITION}
     if first_heard:
         (note,) = notes
         beside = 'run: speed_through_water_2 is not used beside speed_through_water, against '
