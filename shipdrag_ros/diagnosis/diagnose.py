@@ -132,9 +132,7 @@ def diagnose(
         f'{run.name}: {ask}'
         for j, run in enumerate(seen)
         if not checked & {None, j}
-        and (
-            ask := asked(ratio_before_the_stop(run)) or asked_of_speed(run.speed_m_s, run.ship)
-        )
+        and (ask := asked(ratio_before_the_stop(run)) or asked_of_speed(run.speed_m_s, run.ship))
     ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]

@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis.diagnose import compare, observed
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, SimulationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import NONE, Verdict
@@ -57,14 +57,15 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
 
 def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
     log_alone = run('log_scale=0.9438').window.without('position', 'not on board')
-    for facts in ((), (Fact('units_checked'),)):
-        found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=facts)
-        said = words.sentence(found)
-        assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
-        assert '(0.0 to 19.4 knots): is the unit wrong?' in said
-        assert '--map speed_through_water=COLUMN:kn' in said
-        assert '15.50' not in said
+    found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS)
+    said = words.sentence(found)
+    assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
+    assert '(0.0 to 19.4 knots): is the unit wrong?' in said
+    assert '--map speed_through_water=COLUMN:kn' in said
+    assert '15.50' not in said
     assert not found.candidates
+    with pytest.raises(SimulationError, match='the baseline is stated for'):
+        diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=[Fact('units_checked')])
 
 
 def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
