@@ -333,8 +333,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         steady,
         own,
         stop,
-        speed_m_s=run.speed_m_s,
-        range_m_s=(low, top),
+        speeds_m_s=(low, run.speed_m_s, top),
     )
     # whether a free propeller stands is the ship's, not the run's: it is odd once
     odd = next((each for each in seen if each.context.odd), None) is run

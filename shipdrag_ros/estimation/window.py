@@ -319,30 +319,24 @@ class Window:
                     channel.input: positions(channel) if channel in GEODETIC else series(channel)
                     for channel in further
                 },
-                geodetic=geodetic,
+                geodetic=frozenset(origins),
             )
 
         since_ns = start_ns if before_ns is None else min(before_ns, start_ns)
-        heard = (block.stamp_ns >= since_ns) & (block.stamp_ns <= end_ns)
-        there = [Channel(code) for code in np.unique(block.channel[heard]).tolist()]
-        further = [Channel[each.name.replace('_GEODETIC', '')] for each in there]
-        further = sorted(
-            {each for each in further if each.input in FURTHER}, key=lambda c: (c.kind, c.input)
-        )
+        further = _further(block, since_ns, end_ns)
         each_position = {
             metres: (series(metres), series(degrees)) for metres, degrees in GEODETIC.items()
         }
-
-        geodetic = frozenset(
-            channel.input
+        origins = {
+            channel.input: degrees.value[0]
             for channel, (metres, degrees) in each_position.items()
             if len(degrees) > len(metres)
-        )
+        }
 
         def positions(channel: Channel) -> Series:
-            if channel.input not in geodetic:
+            if channel.input not in origins:
                 return series(channel)
-            return _local_plane(series(GEODETIC[channel]), each_position[channel][1].value[0])
+            return _local_plane(series(GEODETIC[channel]), origins[channel.input])
 
         notes = tuple(
             f'{channel.input} came as metres ({len(metres)}) and as latitude and longitude '
@@ -355,6 +349,16 @@ class Window:
             return window
         inside = (block.stamp_ns >= before_ns) & (block.stamp_ns < start_ns)
         return replace(window, before=part(before_ns, start_ns))
+
+
+def _further(block: Block, since_ns: int, end_ns: int) -> list[Channel]:
+    """Return the channels of further instruments that speak."""
+    heard = (block.stamp_ns >= since_ns) & (block.stamp_ns <= end_ns)
+    there = [Channel(code) for code in np.unique(block.channel[heard]).tolist()]
+    found = {Channel[each.name.replace('_GEODETIC', '')] for each in there}
+    return sorted(
+        (each for each in found if each.input in FURTHER), key=lambda c: (c.kind, c.input)
+    )
 
 
 def _local_plane(geodetic: Series, origin: Float64) -> Series:

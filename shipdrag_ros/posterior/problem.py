@@ -145,8 +145,7 @@ class RunModel:
         ship: Ship,
         stop: StopPrior,
         *,
-        speed_m_s: float,
-        range_m_s: tuple[float, float],
+        speeds_m_s: tuple[float, float, float],
         weather: Weather | None = None,
         geodetic: Iterable[int] = (),
     ) -> RunModel:
@@ -163,16 +162,16 @@ class RunModel:
             How many of them are before the stop.
         ship
         stop
-        speed_m_s
-            At the stop, roughly.
-        range_m_s
-            Over which the law reaches: from the lowest to the highest speed, of other runs too.
+        speeds_m_s
+            Roughly: the lowest, that at the stop, and the highest that the law reaches, of other
+            runs too.
         weather
             None: wind and depth are part of r, no unseen force acts and no scale is wrong.
         geodetic
             Codes of the positions that are latitude and longitude.
         """
-        law = HullLaw.of(ship, *range_m_s)
+        low_m_s, speed_m_s, high_m_s = speeds_m_s
+        law = HullLaw.of(ship, low_m_s, high_m_s)
         tau_s = _tau_s(stop)
         adds: tuple[Influence, ...] = ()
         if weather is not None:
@@ -200,7 +199,7 @@ class RunModel:
             _grid(end, tau_s),
             start,
             families,
-            range_m_s[0],
+            low_m_s,
             speed_m_s,
             law,
             adds,

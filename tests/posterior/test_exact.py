@@ -50,8 +50,7 @@ def problem_of(
         steady=40,
         ship=ship,
         stop=StopPrior(5.0, 8.0, 2.0),
-        speed_m_s=8.0,
-        range_m_s=(4.0, 8.0),
+        speeds_m_s=(4.0, 8.0, 8.0),
         weather=weather,
         geodetic=geodetic,
     )

@@ -164,10 +164,10 @@ def estimate(
         len(record.steady.time_s),
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
-        speed_m_s=guess.speed_m_s,
         # the stop may be before the window: the law reaches up to the speed there
-        range_m_s=(
+        speeds_m_s=(
             guess.lowest * guess.speed_m_s,
+            guess.speed_m_s,
             max(guess.speed_m_s, _speed_before(record.steady)),
         ),
         weather=weather,
