@@ -35,12 +35,17 @@ from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
 from benchmarks.worlds.hidden import cases as cases_a
 from benchmarks.worlds.hidden_b import cases as cases_b
 from benchmarks.worlds.hidden_b.plans import plans_of
+from shipdrag_ros.simulation.effect import Scope
+from shipdrag_ros.simulation.effects import LIBRARY
 
 OWN = (
     'fouling', 'shallow_water', 'towed_cable', 'locked_propeller', 'windmilling_propeller',
     'displacement',
 )  # fmt: skip
 """What is part of r(v), and nothing else beside it."""
+ROWS = {
+    Scope.HULL: 'hull', Scope.EARTH: 'weather', Scope.SENSOR: 'instrument', Scope.RUN: 'manoeuvre',
+}  # fmt: skip
 WIDE = 1.96
 
 
@@ -230,27 +235,34 @@ def summary(scores: Sequence[Score], runs: int) -> dict[str, float]:
     }
 
 
-def table(rows: Sequence[tuple[int, int, Score | None, str]]) -> Iterator[str]:
+def row_of(names: Sequence[str]) -> str:
     """
-    Yield the lines of the report: all runs, and apart those with and without anything hidden.
+    Return the row of the report for what is hidden.
     """
-    clean = {
-        number for number, _, each, _ in rows if each is not None and each.hidden == 'nothing'
-    }
-    groups = {'all': rows}
-    for name, inside in (('nothing hidden', True), ('something hidden', False)):
-        part = [row for row in rows if (row[0] in clean) == inside]
-        if part and len(part) < len(rows):
-            groups[name] = part
+    if len(names) != 1:
+        return 'pair' if names else 'nothing hidden'
+    return ROWS[LIBRARY[names[0]].scope] if names[0] in LIBRARY else 'stranger'
+
+
+def table(
+    rows: Sequence[tuple[int, int, Score | None, str]], names: Callable[[int], Sequence[str]]
+) -> Iterator[str]:
+    """
+    Yield the lines of the report: all runs, and those of each row of what is hidden.
+    """
+    groups = {'all': list(rows)}
+    for row in sorted(rows, key=lambda row: row_of(names(row[0]))):
+        groups.setdefault(row_of(names(row[0])), []).append(row)
     columns = {
         name: summary([each for _, _, each, _ in part if each is not None], len(part))
         for name, part in groups.items()
     }
+    heads = list(columns['all'])
     cells = (
-        [name, *(f'{each[name]:.3g}' if name in each else '-' for each in columns.values())]
-        for name in columns['all']
+        [name, *(f'{each[head]:.3g}' if head in each else '-' for head in heads)]
+        for name, each in columns.items()
     )
-    yield from markdown(['', *columns], cells)
+    yield from markdown(['', *heads], cells)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -276,7 +288,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     for error in sorted({error for *_, error in rows if error})[:5]:
         print(error)
-    print(*table(rows), sep='\n')
+    print(*table(rows, world.names), sep='\n')
 
 
 if __name__ == '__main__':
