@@ -231,7 +231,7 @@ class Monitor:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
-                    events += self._stop_at_last_sample(EndedBy.DATA_STOP)
+                    events += self._bear_silence(int(stamp_ns[at]), EndedBy.DATA_STOP)
             elif stop == WalkEvent.SLOPE:
                 source = int(channel[at])
                 self._wake(source, int(self._memory.bins.closed[source]))
@@ -277,24 +277,31 @@ class Monitor:
         str
             Why it is of no use; '' where it is weighed.
         """
-        source, tally = int(self._watch.seen_source), self._memory.tally
+        source = int(self._watch.seen_source)
         if source == NEVER:
             return 'no speed was read yet, so there is nothing to weigh the stop with'
         if self._regimes is None:
             self._wake(source, int(self._watch.seen))
         assert self._regimes is not None
-        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
-        clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
-        self._regimes.tell((receive_ns + clock_ns) / SECOND_NS)
+        self._regimes.tell(self._stamp_ns(source, receive_ns) / SECOND_NS)
         return ''
 
-    def fall_silent(self) -> list[Event]:
+    def fall_silent(self, receive_ns: int) -> list[Event]:
         """
-        End a coastdown, or what may be one, at the last sample of its speed source.
+        Take it that nothing was heard up to now, for longer than `data_stop_s`.
 
-        For whoever has a clock and knows that all sources are silent; the memory stays.
+        What runs, or may be a coastdown, goes on unread, and ends at the last sample of its
+        speed source once it has probably ended by itself. The memory stays.
+
+        Parameters
+        ----------
+        receive_ns
+            Now [ns], by the clock of the times of arrival.
         """
-        return self._stop_at_last_sample(EndedBy.SILENCE)
+        if self._regimes is None:
+            return []
+        now_ns = self._stamp_ns(int(self._watch.source), receive_ns)
+        return self._bear_silence(now_ns, EndedBy.SILENCE)
 
     def finish(self) -> list[Event]:
         """
@@ -378,7 +385,8 @@ class Monitor:
         slow = slow_s is not None
         if self._running is not None:
             # a glide that is born since is not the one that was announced
-            same = regimes.gliding_since(self._running.onset.detected_ns / SECOND_NS)
+            detected_s = self._running.onset.detected_ns / SECOND_NS
+            same = regimes.gliding_since(detected_s, self._tuning.speed_min)
             glides = regimes.gliding > again or same > over
             if glides and not slow and not regimes.full:
                 return []
@@ -428,8 +436,6 @@ class Monitor:
                 found.append(each)
             elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
                 rest = each.since(since_s)
-                if self._ended_by in (EndedBy.DATA_STOP, EndedBy.SILENCE):
-                    rest = each.since(regimes.read_after(since_s), since_s)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
         return [each for each in found if each.begin_s < min(last_s, each.end_s)]
@@ -593,13 +599,32 @@ class Monitor:
         told_ns = None if self._regimes is None else self._regimes.told_ns
         return replace(window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns)
 
+    def _stamp_ns(self, source: int, receive_ns: int) -> int:
+        """Return a time of arrival by the clock that stamps a source."""
+        tally = self._memory.tally
+        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
+        return receive_ns + int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
+
     # how a coastdown ends
+
+    def _bear_silence(self, now_ns: int, ended_by: EndedBy) -> list[Event]:
+        """Go on without readings, as long as a glide that was not over may still go on."""
+        last_s = int(self._memory.guard.last_ns[self._watch.source]) / SECOND_NS
+        number = now_ns // SECOND_NS
+        events = self._vouching.explained(self._judged(number, number))
+        self._watch.silent_ns = now_ns
+        over, regimes = float(numbers.ANNOUNCE[2]), self._regimes
+        if regimes is None or regimes.gliding_since(last_s, self._tuning.speed_min) > over:
+            return events
+        return events + self._stop_at_last_sample(ended_by)
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
         if self._regimes is None:
             return []
         end_ns = int(self._memory.guard.last_ns[self._watch.source])
+        if ended_by is EndedBy.RECORD_END and int(self._watch.silent_ns) > end_ns:
+            ended_by = EndedBy.DATA_STOP
         number = end_ns // SECOND_NS
         events = self._judged(number + 1, number)  # what came since the last bin that was judged
         regimes = self._regimes

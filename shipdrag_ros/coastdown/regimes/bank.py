@@ -11,6 +11,7 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.births import (
+    THIN_EVERY,
     amid,
     bear,
     brakes,
@@ -171,6 +172,18 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
+def _may_switch(bank: Histories, said: Float64) -> bool:
+    """Say whether histories are born in this bin: in a silence no date is sharp."""
+    before, heard = bank.clock[1], False
+    for each in said:
+        heard = heard or not np.isnan(each)
+    bank.clock[1] = 0 if heard else before + 1
+    since = min(before - THIN_EVERY, (bank.clock[0] - 1) % THIN_EVERY)
+    bank.clock[2] = 1 + max(since, 0)
+    return heard or before < THIN_EVERY or bank.clock[0] % THIN_EVERY == 0
+
+
+@compiled(uncounted=True)
 def _pushes_or_not(bank: Histories, i: int, setting: BankSetting, now_s: float) -> None:
     """
     Write down when the screw of a lower level ceases to push, and when it pushes again.
@@ -261,7 +274,7 @@ def step(bank: Bank, setting: BankSetting) -> float:
     all_.clock[0] += 1
     _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
-    if all_.clock[0] > 1:
+    if all_.clock[0] > 1 and _may_switch(all_, said):
         bear(all_, setting, both, not (np.isnan(said[s.RATE]) and np.isnan(said[s.RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0

@@ -18,7 +18,7 @@ _PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have childr
 LOST = 16.0
 """Nats below the best of a history that is dropped."""
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
-_THIN_EVERY = 6  # bins
+THIN_EVERY = 6  # bins
 _HALVINGS = 24  # in search of the weight of the last that is kept
 _NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
@@ -236,8 +236,9 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     if engaged:
         base = balance(bank.mean[i], f, now_s)[0]
         if not claimed and regime != s.AMID and not is_fade(bank.row[i]):
-            if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
-                _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
+            if bank.clock[0] % THIN_EVERY == 0:  # its begin is no sharper
+                often = THIN_EVERY / max(bank.clock[2], 1)
+                _fades(bank, i, setting, now_s, often * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     kinds = 1 if claimed else 2  # torque that is held is any power there
@@ -403,7 +404,7 @@ def _children(
     f = bank.row[i]
     claimed = setting.engine > 0.0
     # a window is as long as a person finds it worth, and manoeuvres with it
-    hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
+    hours = bank.clock[2] * (n.BIN_S if claimed else setting.step_s) / 3600.0
     regime = f.regime
     age_s = now_s - f.since if f.count > 0 else np.inf
     if both and f.liar == s.NOBODY:
@@ -507,7 +508,7 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     norm = best + math.log(total)
     for i in range(count):
         bank.row[i].weight -= norm
-    if bank.clock[0] % _THIN_EVERY == 0:
+    if bank.clock[0] % THIN_EVERY == 0:
         _keep(bank, -LOST)
         _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
     _keep(bank, _least_of_the_best(bank))  # or the next births find no room

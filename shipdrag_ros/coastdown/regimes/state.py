@@ -89,8 +89,10 @@ class Histories(NamedTuple):
 
     Attributes
     ----------
-    used, clock : (1,)
-        Histories; bins since the start.
+    used : (1,)
+        Histories.
+    clock : (3,)
+        Bins since the start, those in a row that said nothing, those that births are of.
     mean, spread
         (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
     row : (ROOM,)
@@ -117,7 +119,7 @@ class Histories(NamedTuple):
         past = np.zeros(ROOM, _PAST)
         return cls(
             np.zeros(1, np.int64),
-            np.zeros(1, np.int64),
+            np.zeros(3, np.int64),
             np.zeros((ROOM, STATES)),
             np.zeros((ROOM, STATES, STATES)),
             past['row'],

@@ -87,8 +87,6 @@ class Dated(NamedTuple):
         the glide.
     ended_by
         What followed; None where she glides on.
-    unread_s
-        From when on nothing was read until it begins; NaN where it does not follow a gap.
     """
 
     stop_s: float
@@ -98,11 +96,10 @@ class Dated(NamedTuple):
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
-    unread_s: float = math.nan
 
-    def since(self, begin_s: float, unread_s: float = math.nan) -> Dated:
+    def since(self, begin_s: float) -> Dated:
         """
-        Return the part of it after its begin, or after a gap.
+        Return the part of it after its begin.
         """
         return self._replace(
             stop_s=begin_s,
@@ -110,25 +107,19 @@ class Dated(NamedTuple):
             begin_s=begin_s,
             begin_sd_s=0.0,
             ran_down=False,
-            unread_s=unread_s,
         )
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
-        """The gap before it, or its run-down if that was a long one."""
-        if not math.isnan(self.unread_s):
-            first_s, reason = self.unread_s, Dismissal.GAP
-            text = 'nothing was read in it, so what she did is not known'
-        elif self.ran_down:
-            first_s, reason = self.stop_s, Dismissal.THRUST
-            text = (
-                f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
-                f'end of that, ± {self.begin_sd_s:.0f} s'
-            )
-        else:
+        """Its run-down, if that was a long one."""
+        if not self.ran_down:
             return ()
-        first_ns, last_ns = round(first_s * SECOND_NS), round(self.begin_s * SECOND_NS)
-        return (NotCoastdown(first_ns, last_ns, reason, text),)
+        text = (
+            f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
+            f'end of that, ± {self.begin_sd_s:.0f} s'
+        )
+        first_ns, last_ns = round(self.stop_s * SECOND_NS), round(self.begin_s * SECOND_NS)
+        return (NotCoastdown(first_ns, last_ns, Dismissal.THRUST, text),)
 
 
 class RegimeFilter:
@@ -240,9 +231,9 @@ class RegimeFilter:
         row = all_.row[: int(all_.used[0])]
         return float(np.exp(row['weight'][row['liar'] == s.THE_SHAFTS]).sum())
 
-    def gliding_since(self, second: float) -> float:
+    def gliding_since(self, second: float, speed_m_s: float) -> float:
         """
-        Return the probability of a glide that began before a second [s since the epoch].
+        Return the probability of a glide, above a speed, that began before a second [s].
         """
         all_ = self._bank.histories
         used = int(all_.used[0])
@@ -250,35 +241,31 @@ class RegimeFilter:
         switched = all_.switched[each, last]
         glides = (last >= 0) & (switched['what'] == s.GLIDE)
         before = self._zero_s + switched['at'] <= second
-        return float(np.exp(all_.row['weight'][:used])[glides & before].sum())
+        return float(self._faster(speed_m_s)[glides & before].sum())
 
-    def slow_since(self, speed_m_s: float) -> float | None:
-        """
-        Return since when she is below a speed [s since the epoch]; None where she may not be.
-
-        It has to be as sure as the end of a glide, of which nothing is taken back either.
-        """
-        if not self._out or float(self._bank.out[SPEED]) >= speed_m_s:
-            return None
+    def _faster(self, speed_m_s: float) -> Float64:
+        """Return the probability of each history and a greater speed."""
         from scipy.special import ndtr  # slow to import
 
         all_ = self._bank.histories
         used = int(all_.used[0])
         over = all_.mean[:used, s.LN_U] - math.log(speed_m_s)
         over /= np.sqrt(all_.spread[:used, s.LN_U, s.LN_U])
-        faster = float(np.exp(all_.row['weight'][:used]) @ ndtr(over))
-        if faster > n.ANNOUNCE[1]:
+        return np.asarray(np.exp(all_.row['weight'][:used]) * ndtr(over))
+
+    def slow_since(self, speed_m_s: float) -> float | None:
+        """
+        Return since when she is below a speed [s since the epoch]; None where she may not be.
+
+        It has to be as sure as the end of a glide, of which nothing is taken back either, and
+        is not said where nothing is read.
+        """
+        if not self._out or not self._read[-1] or float(self._bank.out[SPEED]) >= speed_m_s:
+            return None
+        if float(self._faster(speed_m_s).sum()) > n.ANNOUNCE[1]:
             return None
         slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0
         return float(self._zero_s + (len(slow) - int(slow.sum()) + 1) * self._width)
-
-    def read_after(self, second: float) -> float:
-        """
-        Return the begin of the first bin after a second in which motion was read [s].
-        """
-        since = max(math.ceil((second - self._zero_s) / self._width), 0)
-        gap = np.cumsum(self._read[since:]) == 0
-        return float(self._zero_s + (since + int(gap.sum())) * self._width)
 
     def unread_about(self, second: float) -> tuple[float, float]:
         """
