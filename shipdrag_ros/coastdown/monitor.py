@@ -435,13 +435,16 @@ class Monitor:
             if each.begin_s >= since_s:
                 found.append(each)
             elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
-                rest = each.since(since_s)
+                rest = self._as_read(each.since(since_s), regimes)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
         return [each for each in found if each.begin_s < min(last_s, each.end_s)]
 
     def _as_read(self, glide: Dated, regimes: RegimeFilter) -> Dated:
-        """Let a glide that ended while nothing was read end with the last reading."""
+        """Let a glide that began or ended while nothing was read do so with a reading."""
+        first_s, last_s = regimes.unread_about(glide.stop_s)
+        if last_s - first_s > self._parameters.data_stop_s:
+            glide = glide.since(last_s, first_s)
         first_s, last_s = regimes.unread_about(glide.end_s)
         if glide.ended_by is None or last_s - first_s <= self._parameters.data_stop_s:
             return glide

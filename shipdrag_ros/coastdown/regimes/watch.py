@@ -87,6 +87,8 @@ class Dated(NamedTuple):
         the glide.
     ended_by
         What followed; None where she glides on.
+    unread_s
+        From when on nothing was read until it begins; NaN where it does not begin in a gap.
     """
 
     stop_s: float
@@ -96,10 +98,11 @@ class Dated(NamedTuple):
     begin_sd_s: float
     ran_down: bool
     ended_by: EndedBy | None
+    unread_s: float = math.nan
 
-    def since(self, begin_s: float) -> Dated:
+    def since(self, begin_s: float, unread_s: float = math.nan) -> Dated:
         """
-        Return the part of it after its begin.
+        Return the part of it after its begin, or after a gap.
         """
         return self._replace(
             stop_s=begin_s,
@@ -107,19 +110,25 @@ class Dated(NamedTuple):
             begin_s=begin_s,
             begin_sd_s=0.0,
             ran_down=False,
+            unread_s=unread_s,
         )
 
     @property
     def cuts(self) -> tuple[NotCoastdown, ...]:
-        """Its run-down, if that was a long one."""
-        if not self.ran_down:
+        """The gap before it, or its run-down if that was a long one."""
+        if not math.isnan(self.unread_s):
+            first_s, reason = self.unread_s, Dismissal.GAP
+            text = 'nothing was read in it, so what she did is not known'
+        elif self.ran_down:
+            first_s, reason = self.stop_s, Dismissal.THRUST
+            text = (
+                f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
+                f'end of that, ± {self.begin_sd_s:.0f} s'
+            )
+        else:
             return ()
-        text = (
-            f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
-            f'end of that, ± {self.begin_sd_s:.0f} s'
-        )
-        first_ns, last_ns = round(self.stop_s * SECOND_NS), round(self.begin_s * SECOND_NS)
-        return (NotCoastdown(first_ns, last_ns, Dismissal.THRUST, text),)
+        first_ns, last_ns = round(first_s * SECOND_NS), round(self.begin_s * SECOND_NS)
+        return (NotCoastdown(first_ns, last_ns, reason, text),)
 
 
 class RegimeFilter:
