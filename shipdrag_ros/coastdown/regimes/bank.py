@@ -11,7 +11,6 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.births import (
-    THIN_EVERY,
     amid,
     bear,
     brakes,
@@ -173,14 +172,13 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 @compiled(uncounted=True)
 def _may_switch(bank: Histories, said: Float64) -> bool:
-    """Say whether histories are born in this bin: in a silence no date is sharp."""
-    before, heard = bank.clock[1], False
-    for each in said:
-        heard = heard or not np.isnan(each)
-    bank.clock[1] = 0 if heard else before + 1
-    since = min(before - THIN_EVERY, (bank.clock[0] - 1) % THIN_EVERY)
-    bank.clock[2] = 1 + max(since, 0)
-    return heard or before < THIN_EVERY or bank.clock[0] % THIN_EVERY == 0
+    """Say whether histories are born in this bin: no date is sharper than a silence is long."""
+    clock, heard = bank.clock, False
+    for each in (s.LOG, s.GROUND, s.ADVANCE, s.HIGH):
+        heard = heard or not np.isnan(said[each])
+    clock[1] = 0 if heard else clock[1] + 1
+    clock[2] += 1
+    return heard or clock[1] & (clock[1] - 1) == 0
 
 
 @compiled(uncounted=True)

@@ -18,7 +18,7 @@ _PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have childr
 LOST = 16.0
 """Nats below the best of a history that is dropped."""
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
-THIN_EVERY = 6  # bins
+_THIN_EVERY = 6  # bins
 _HALVINGS = 24  # in search of the weight of the last that is kept
 _NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
@@ -236,9 +236,9 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     if engaged:
         base = balance(bank.mean[i], f, now_s)[0]
         if not claimed and regime != s.AMID and not is_fade(bank.row[i]):
-            if bank.clock[0] % THIN_EVERY == 0:  # its begin is no sharper
-                often = THIN_EVERY / max(bank.clock[2], 1)
-                _fades(bank, i, setting, now_s, often * chance * n.FADES_SHARE, base)
+            if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
+                bins = max(_THIN_EVERY / max(bank.clock[2], 1), 1.0)
+                _fades(bank, i, setting, now_s, bins * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     kinds = 1 if claimed else 2  # torque that is held is any power there
@@ -394,6 +394,13 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             if least <= bank.row[i].behind < likelier:
                 _children(bank, setting, i, now_s, both, steered)
         likelier = least
+    bank.clock[2] = 0
+
+
+@compiled(inline=True, uncounted=True)
+def _part(left: float, hours: float) -> float:
+    """Return the hours that a history is there to switch, with the hazard of all switches."""
+    return (1.0 - math.exp(-left * hours)) / left
 
 
 @compiled(uncounted=True)
@@ -418,7 +425,6 @@ def _children(
         f.kind = s.GOVERNED
         f.a0, f.a_var = bank.mean[i, s.LN_A], bank.spread[i, s.LN_A, s.LN_A]
         f.p0, f.p_var = bank.mean[i, s.POWER], bank.spread[i, s.POWER, s.POWER]
-    left = 0.0  # hazard of all that it may switch to
     if regime in (s.DRIVEN, s.LEVEL) or (regime == s.AMID and (claimed or f.count > 0)):
         if regime == s.LEVEL and not fades and age_s < f.ramp_s:  # on its way there
             return
@@ -436,38 +442,40 @@ def _children(
             off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
             told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
             stop, level = stop + n.TOLD[0] * told, level + (1.0 - n.TOLD[0]) * told
-        glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
-        brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
-        levels(bank, i, setting, now_s, level * hours)
+        left = stop + level + turn + (n.FADE_OUT if fades else 0.0)
+        part = _part(left, hours)
+        glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * part)
+        brakes(bank, i, setting, now_s, n.BRAKED * stop * part)
+        levels(bank, i, setting, now_s, level * part)
         if not claimed:
-            _turns(bank, i, now_s, turn * hours, s.TURN)
-        left = stop + level + turn
+            _turns(bank, i, now_s, turn * part, s.TURN)
         if fades:
-            _fade_ends(bank, i, now_s, n.FADE_OUT * hours)
-            left += n.FADE_OUT
+            _fade_ends(bank, i, now_s, n.FADE_OUT * part)
     elif regime == s.GLIDE:
-        levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
-        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
+        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE + (n.GLIDE_TURN if steered else 0.0)
+        part = _part(left, hours)
+        levels(bank, i, setting, now_s, n.GLIDE_LEVEL * part)
         if steered:
-            _turns(bank, i, now_s, n.GLIDE_TURN * hours, s.GLIDE_TURN)
-            left += n.GLIDE_TURN
-        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
+            _turns(bank, i, now_s, n.GLIDE_TURN * part, s.GLIDE_TURN)
+        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * part)
     elif regime == s.BRAKE:
-        glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
-        levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
+        part = _part(left, hours)
+        glides(bank, i, setting, now_s, n.BRAKE_GLIDE * part)
+        levels(bank, i, setting, now_s, n.BRAKE_LEVEL * part)
     elif regime == s.AMID:
-        _settles(bank, i, setting, now_s, n.AMID[2] * hours)
         left = float(n.AMID[2])
+        _settles(bank, i, setting, now_s, left * _part(left, hours))
     else:
-        if regime == s.TURN:
-            _back(bank, i, now_s, n.TURN_OUT * hours)
-        else:
-            glides(bank, i, setting, now_s, n.TURN_OUT * hours)
-            if claimed:
-                levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
         left = float(n.TURN_OUT)
-    f.weight += math.log1p(-min(left * hours, 0.99))
+        part = _part(left, hours)
+        if regime == s.TURN:
+            _back(bank, i, now_s, left * part)
+        else:
+            glides(bank, i, setting, now_s, left * part)
+            if claimed:
+                levels(bank, i, setting, now_s, n.GLIDE_LEVEL * part)
+    f.weight -= left * hours
 
 
 @compiled(uncounted=True)
@@ -508,7 +516,7 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     norm = best + math.log(total)
     for i in range(count):
         bank.row[i].weight -= norm
-    if bank.clock[0] % THIN_EVERY == 0:
+    if bank.clock[0] % _THIN_EVERY == 0:
         _keep(bank, -LOST)
         _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
     _keep(bank, _least_of_the_best(bank))  # or the next births find no room

@@ -288,6 +288,11 @@ class RegimeFilter:
         return self._zero_s + first * self._width, self._zero_s + last * self._width
 
     @property
+    def _heard(self) -> int:
+        """Bins up to the last one in which motion was read."""
+        return int(np.max(np.flatnonzero(self._read), initial=-1)) + 1
+
+    @property
     def even(self) -> bool:
         """Whether she is likelier under even power than not."""
         return not self._out or float(self._bank.out[P_EVEN]) >= _DOUBTED
@@ -360,7 +365,7 @@ class RegimeFilter:
         if not self._out:
             return None
         since = math.ceil(max((since_s - self._zero_s) / self._width, 0.0))
-        table = np.array(self._out)
+        table = np.array(self._out)[: self._heard]
         doubted = since + np.flatnonzero(table[since:, P_EVEN] < _DOUBTED)
         if not len(doubted) or table[doubted, SPEED].argmin() == 0:
             return None
@@ -386,7 +391,7 @@ class RegimeFilter:
         Return the stretches without thrust in which more than one glide is likely [s].
         """
         zero = self._zero_s
-        found = unpowered(self._spans, len(self._out), self._setting)
+        found = unpowered(self._spans, self._heard, self._setting)
         return [(zero + first_s, zero + last_s) for first_s, last_s in found]
 
     def regimes(self) -> Regimes | None:
