@@ -616,8 +616,8 @@ class Monitor:
         number = now_ns // SECOND_NS
         events = self._vouching.explained(self._judged(number, number))
         self._watch.silent_ns = now_ns
-        over, regimes = float(numbers.ANNOUNCE[2]), self._regimes
-        if regimes is None or regimes.gliding_since(last_s, self._tuning.speed_min) > over:
+        again, regimes = float(numbers.ANNOUNCE[1]), self._regimes
+        if regimes is None or regimes.gliding_since(last_s, self._tuning.speed_min) > again:
             return events
         return events + self._stop_at_last_sample(ended_by)
 
