@@ -431,19 +431,20 @@ class Monitor:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
-        for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
+        for k, glide in enumerate(regimes.glides()):
+            each = self._as_read(glide, regimes, again=k > 0)
             if each.begin_s >= since_s:
                 found.append(each)
             elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
-                rest = self._as_read(each.since(since_s), regimes)
+                rest = self._as_read(each.since(since_s), regimes, again=True)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
         return [each for each in found if each.begin_s < min(last_s, each.end_s)]
 
-    def _as_read(self, glide: Dated, regimes: RegimeFilter) -> Dated:
-        """Let a glide that began or ended while nothing was read do so with a reading."""
+    def _as_read(self, glide: Dated, regimes: RegimeFilter, *, again: bool) -> Dated:
+        """Let a glide that ended, or began again, while nothing was read do so with a reading."""
         first_s, last_s = regimes.unread_about(glide.stop_s)
-        if last_s - first_s > self._parameters.data_stop_s:
+        if again and last_s - first_s > self._parameters.data_stop_s:
             glide = glide.since(last_s, first_s)
         first_s, last_s = regimes.unread_about(glide.end_s)
         if glide.ended_by is None or last_s - first_s <= self._parameters.data_stop_s:

@@ -177,8 +177,9 @@ def _may_switch(bank: Histories, said: Float64) -> bool:
     for each in (s.LOG, s.GROUND, s.ADVANCE, s.HIGH):
         heard = heard or not np.isnan(said[each])
     clock[1] = 0 if heard else clock[1] + 1
-    clock[2] += 1
-    return heard or clock[1] & (clock[1] - 1) == 0
+    may = heard or clock[1] & (clock[1] - 1) == 0
+    clock[2] += not may
+    return may
 
 
 @compiled(uncounted=True)

@@ -237,7 +237,7 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         base = balance(bank.mean[i], f, now_s)[0]
         if not claimed and regime != s.AMID and not is_fade(bank.row[i]):
             if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
-                bins = max(_THIN_EVERY / max(bank.clock[2], 1), 1.0)
+                bins = max(_THIN_EVERY / (1 + bank.clock[2]), 1.0)
                 _fades(bank, i, setting, now_s, bins * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
@@ -411,7 +411,7 @@ def _children(
     f = bank.row[i]
     claimed = setting.engine > 0.0
     # a window is as long as a person finds it worth, and manoeuvres with it
-    hours = bank.clock[2] * (n.BIN_S if claimed else setting.step_s) / 3600.0
+    hours = (1 + bank.clock[2]) * (n.BIN_S if claimed else setting.step_s) / 3600.0
     regime = f.regime
     age_s = now_s - f.since if f.count > 0 else np.inf
     if both and f.liar == s.NOBODY:

@@ -674,7 +674,7 @@ def weigh(
     if not np.isnan(said[s.RATE]):
         u = math.exp(x[s.LN_U])
         sd = noise[s.N_RATE]
-        if not np.isnan(said[s.ADVANCE]):  # errors of fixes turn a course by more, the shorter it is
+        if not np.isnan(said[s.ADVANCE]):  # the shorter a way, the more errors of fixes turn it
             sd *= math.exp(min(max(log_first - x[s.LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
         share = 0.9 if turning else n.STEADY_TURNS

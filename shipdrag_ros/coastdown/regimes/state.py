@@ -92,7 +92,7 @@ class Histories(NamedTuple):
     used : (1,)
         Histories.
     clock : (3,)
-        Bins since the start, those in a row without motion or revs, those since births.
+        Bins since the start, those in a row without motion or revs, those without births.
     mean, spread
         (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
     row : (ROOM,)
