@@ -47,6 +47,8 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Reason
 from shipdrag_ros.ship import Ship
 
+_SILENT = (EndedBy.DATA_STOP, EndedBy.SILENCE)
+
 
 class Monitor:
     """
@@ -498,6 +500,8 @@ class Monitor:
         last_ns: int | None = None,
     ) -> list[Event]:
         """End the coastdown that runs; one that goes on at the last sample ends there."""
+        if ended_by in _SILENT and dated.ended_by is EndedBy.DATA_STOP:  # it is this silence
+            dated = dated._replace(ended_by=None)
         if dated.ended_by is None and last_ns is not None:
             dated = dated._replace(end_s=last_ns / SECOND_NS)
         assert self._running is not None
@@ -614,13 +618,14 @@ class Monitor:
     def _bear_silence(self, now_ns: int, ended_by: EndedBy) -> list[Event]:
         """Go on without readings, as long as a glide that was not over may still go on."""
         last_s = int(self._memory.guard.last_ns[self._watch.source]) / SECOND_NS
-        number = now_ns // SECOND_NS
-        events = self._vouching.explained(self._judged(number, number))
+        number, events = now_ns // SECOND_NS, []
+        bins = self._vouching.sound(self._memory.bins)
         self._watch.silent_ns = now_ns
-        again, regimes = float(numbers.ANNOUNCE[1]), self._regimes
-        if regimes is None or regimes.gliding_since(last_s, self._tuning.speed_min) > again:
-            return events
-        return events + self._stop_at_last_sample(ended_by)
+        while (regimes := self._regimes) is not None and regimes.advance(bins, number):
+            if regimes.gliding_since(last_s, self._tuning.speed_min) <= numbers.ANNOUNCE[1]:
+                return events + self._stop_at_last_sample(ended_by)
+            events += self._vouching.explained(self._decide(regimes, number))
+        return events
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""

