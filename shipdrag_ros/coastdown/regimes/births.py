@@ -403,6 +403,21 @@ def _part(left: float, hours: float) -> float:
     return (1.0 - math.exp(-left * hours)) / left
 
 
+@compiled(inline=True, uncounted=True)
+def _told(off_s: float, sd_s: float) -> float:
+    return math.exp(-0.5 * (off_s / sd_s) ** 2) / (ROOT_TWO_PI * sd_s)
+
+
+@compiled(uncounted=True)
+def told_odds(off_s: float) -> float:
+    """
+    Return how much likelier it is that a stop was told, so long before a stop, than without one.
+    """
+    late, late_s = n.TOLD_MINUTES
+    density = (1.0 - late) * _told(off_s, n.TOLD[1]) + late * _told(off_s, late_s)
+    return 1.0 + n.TOLD[0] / (1.0 - n.TOLD[0]) * 3600.0 * density
+
+
 @compiled(uncounted=True)
 def _children(
     bank: Histories, setting: BankSetting, i: int, now_s: float, both: bool, steered: bool
@@ -438,10 +453,13 @@ def _children(
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
         if regime == s.AMID and not claimed:  # it ends at some level, and any turn is part of it
             level, turn = float(n.AMID[2]), 0.0
-        if not np.isnan(setting.told_s):
-            off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
-            told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
+        if claimed:
+            told = 3600.0 * _told(now_s - setting.told_s, n.TOLD[1] * setting.pace) / setting.pace
             stop, level = stop + n.TOLD[0] * told, level + (1.0 - n.TOLD[0]) * told
+        elif not np.isnan(setting.told_s):
+            off_s = now_s - setting.told_s
+            stop *= told_odds(off_s)
+            level += 3600.0 * (1.0 - n.TOLD[0]) * _told(off_s, n.TOLD[1])
         left = stop + level + turn + (n.FADE_OUT if fades else 0.0)
         part = _part(left, hours)
         glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * part)

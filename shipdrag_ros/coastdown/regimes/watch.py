@@ -22,6 +22,7 @@ from shipdrag_ros.coastdown.regimes.bank import (
     Bank,
     step,
 )
+from shipdrag_ros.coastdown.regimes.births import told_odds
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.observe import observe
 from shipdrag_ros.coastdown.regimes.read_out import (
@@ -196,7 +197,17 @@ class RegimeFilter:
         """
         Take it from a person that the engine was stopped [s since the epoch].
         """
-        self._setting = self._setting._replace(told_s=stop_s - self._zero_s)
+        told_s = stop_s - self._zero_s
+        if math.isnan(self._setting.told_s):  # else those since were born by it
+            all_ = self._bank.histories
+            used = int(all_.used[0])
+            switched = all_.switched[:used]
+            stops = np.isin(switched['what'], (s.GLIDE, s.BRAKE))
+            stops[:, 1:] &= ~np.isin(switched['what'][:, :-1], (s.GLIDE, s.BRAKE, s.GLIDE_TURN))
+            stops &= np.arange(s.SWITCHES) < all_.row['count'][:used, np.newaxis]
+            for i, k in np.argwhere(stops).tolist():
+                all_.row['weight'][i] += math.log(told_odds(switched['at'][i, k] - told_s))
+        self._setting = self._setting._replace(told_s=told_s)
 
     @property
     def told_s(self) -> float:
