@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+import numpy as np
+
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -49,6 +51,7 @@ class EndedBy(Enum):
     RESET = 'reset'
     RECORD_END = 'record_end'
     GIVEN = 'given'
+    UNKNOWN = 'unknown'  # she probably glides no more, and no regime is likely instead
 
 
 ENDED_BY = {
@@ -62,7 +65,15 @@ ENDED_BY = {
     EndedBy.RESET: 'the memory was reset',
     EndedBy.RECORD_END: 'the record ended',
     EndedBy.GIVEN: 'the window was given by hand',
+    EndedBy.UNKNOWN: 'the ship probably glided no more, and why is not known',
 }
+
+_BY_REGIME = {
+    EndedBy.ENGINE: ('driven', 're_engaged'),
+    EndedBy.BRAKE: ('braked',),
+    EndedBy.TURN: ('turning',),
+}
+_SOON = 12  # bins after an end, which is dated to some of them
 
 
 class Dismissal(Enum):
@@ -111,6 +122,26 @@ class Regimes:
     probability: Mapping[str, Float64]
     excess: float
     explained: float
+
+    def ends(self, end_ns: int) -> dict[EndedBy, float]:
+        """
+        Return the probability, soon after a glide, of each regime that may have ended it.
+        """
+        soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
+        return {
+            ended_by: float(sum(self.probability[name][soon] for name in names).max(initial=0.0))
+            for ended_by, names in _BY_REGIME.items()
+        }
+
+    def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
+        """
+        Return what is said to have ended a glide if that is likely, else what is; or UNKNOWN.
+        """
+        chances = self.ends(end_ns)
+        if said not in (*chances, EndedBy.UNKNOWN) or chances.get(said, 0.0) > 0.5:
+            return said
+        likeliest = max(chances, key=lambda each: chances[each])
+        return likeliest if chances[likeliest] > 0.5 else EndedBy.UNKNOWN
 
 
 @dataclass(frozen=True)

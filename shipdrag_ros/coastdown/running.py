@@ -129,11 +129,14 @@ class RunningCoastdown:
             estimate = estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             failure = str(error)
+        ended_by = dated.ended_by or otherwise or EndedBy.UNKNOWN
+        if regimes is not None:
+            ended_by = regimes.ended_by(ended_by, end_ns)
         ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            dated.ended_by or otherwise or EndedBy.ENGINE,
+            ended_by,
             estimate,
             failure,
             self._heading_rad,
@@ -162,7 +165,7 @@ class RunningCoastdown:
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            ended_by or EndedBy.ENGINE,
+            ended_by or EndedBy.UNKNOWN,
             None,
             was.text,
             self._heading_rad,

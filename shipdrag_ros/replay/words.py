@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from shipdrag_ros import __version__
 from shipdrag_ros.coastdown.events import (
     ENDED_BY,
-    EndedBy,
     EndedCoastdown,
     Event,
     NotCoastdown,
@@ -33,8 +32,6 @@ _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
-_BY_REGIME = (EndedBy.ENGINE, EndedBy.BRAKE, EndedBy.TURN)
-_SOON = 12  # bins after an end, which is dated to some of them
 _UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
 _SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
@@ -67,14 +64,12 @@ def explained(regimes: Regimes) -> str:
 
 def ended(coastdown: EndedCoastdown) -> str:
     """
-    Say what ended a coastdown; how likely she glided no more, where the regimes alone tell.
+    Say what ended a coastdown, and how likely that is, where the regimes alone tell.
     """
     text, regimes = ENDED_BY[coastdown.ended_by], coastdown.regimes
-    if regimes is None or coastdown.ended_by not in _BY_REGIME:
-        return text
-    gliding = regimes.probability['run_down'] + regimes.probability['gliding']
-    after = gliding[regimes.time_ns > coastdown.end_ns][:_SOON]
-    return f'{text} (P {1.0 - float(after.min()):.2f})' if len(after) else text
+    chances = {} if regimes is None else regimes.ends(coastdown.end_ns)
+    chance = chances.get(coastdown.ended_by, 0.0)
+    return f'{text} (P {chance:.2f})' if chance else text
 
 
 def recorded_sentence(recorded: Recorded) -> str:
