@@ -129,9 +129,12 @@ class Regimes:
         """
         soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
         return {
-            ended_by: float(sum(self.probability[name][soon] for name in names).max(initial=0.0))
+            ended_by: float(np.max(self._of(names)[soon], initial=0.0))
             for ended_by, names in _BY_REGIME.items()
         }
+
+    def _of(self, names: tuple[str, ...]) -> Float64:
+        return np.sum([self.probability[name] for name in names], axis=0, dtype=np.float64)
 
     def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
         """

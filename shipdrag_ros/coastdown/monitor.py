@@ -618,7 +618,8 @@ class Monitor:
     def _bear_silence(self, now_ns: int, ended_by: EndedBy) -> list[Event]:
         """Go on without readings, as long as a glide that was not over may still go on."""
         last_s = int(self._memory.guard.last_ns[self._watch.source]) / SECOND_NS
-        number, events = now_ns // SECOND_NS, []
+        events: list[Event] = []
+        number = now_ns // SECOND_NS
         bins = self._vouching.sound(self._memory.bins)
         self._watch.silent_ns = now_ns
         while (regimes := self._regimes) is not None and regimes.advance(bins, number):

@@ -415,7 +415,7 @@ def told_odds(off_s: float) -> float:
     """
     late, late_s = n.TOLD_MINUTES
     density = (1.0 - late) * _told(off_s, n.TOLD[1]) + late * _told(off_s, late_s)
-    return 1.0 + n.TOLD[0] / (1.0 - n.TOLD[0]) * 3600.0 * density
+    return float(1.0 + n.TOLD[0] / (1.0 - n.TOLD[0]) * 3600.0 * density)
 
 
 @compiled(uncounted=True)
