@@ -134,7 +134,7 @@ class Regimes:
         }
 
     def _of(self, names: tuple[str, ...]) -> Float64:
-        return np.sum([self.probability[name] for name in names], axis=0, dtype=np.float64)
+        return np.asarray(np.sum([self.probability[name] for name in names], axis=0))
 
     def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
         """
