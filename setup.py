@@ -95,7 +95,6 @@ setup(
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
     package_data={
         PACKAGE: ['py.typed', 'data/*'],
-        f'{PACKAGE}.diagnosis': ['*.json'],
         f'{PACKAGE}.report': ['*.html'],
         f'{PACKAGE}.live': ['page/*', 'page/vendor/*'],
     },

@@ -114,8 +114,8 @@ class Parameters:
     )
     data_stop_s: float = _parameter(
         60.0,
-        'a speed source that is silent for longer has stopped: another one is followed, or the '
-        'coastdown goes on unread, up to where it has probably ended',
+        'a coastdown ends when the speed source is silent for longer; shorter: a short loss of '
+        'the signal ends it',
         unit='s',
         low=1.0,
         high=3600.0,

@@ -69,8 +69,7 @@ def model_of(value: Float64) -> RunModel:
         steady,
         Ship.example(),
         STOP,
-        speed_m_s=SPEED_M_S,
-        range_m_s=(LOW_M_S, SPEED_M_S),
+        speeds_m_s=(LOW_M_S, SPEED_M_S, SPEED_M_S),
         weather=Weather(None, None),
     )
 

@@ -8,7 +8,7 @@ states is compared with it.
 
 from __future__ import annotations
 
-from collections import Counter
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from operator import itemgetter
@@ -16,55 +16,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap import records as mcap
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 
+from shipdrag_ros.bags.contents import DECLARED, INDEXES, FileSummary, key_of
 from shipdrag_ros.bags.mcap_file import locate, not_mcap
 from shipdrag_ros.bags.records import (
-    IN_CHUNK,
     MAGIC,
     MESSAGE_HEAD,
     Buffer,
     Damage,
     DamageKind,
     DamageList,
+    OpenChunk,
     Place,
-    attachment_agrees,
     checksum,
-    has_end,
-    read,
+    scan,
 )
 from shipdrag_ros.bags.recover import opened
-from shipdrag_ros.bags.scan import OpenChunk, scan
-from shipdrag_ros.bags.writer import chunk_index, index_of, statistics
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Int64
 
 _NO_ENTRIES = np.empty((0, 2), np.int64)
-_DECLARED = (Schema, Channel)
 # of which the summary says all
-_LISTED = {
-    Schema: 'schema',
-    Channel: 'channel',
-    ChunkIndex: 'chunk_index',
-    AttachmentIndex: 'attachment_index',
-    MetadataIndex: 'metadata_index',
-    Statistics: 'statistics',
-}
+_LISTED = (*DECLARED, *INDEXES, mcap.Statistics)
 
 
 @dataclass(frozen=True)
@@ -136,131 +112,115 @@ def _check_file(path: Path, progress: PartDone) -> FileCheck:
                 raise BagError(not_mcap(path, data[:16]))
             facts.compare()
         damage = tuple(sorted(damages.listed, key=lambda damage: damage.offset))
-        return FileCheck(path, len(data), facts.counts.total(), damage, damages.count)
+        return FileCheck(path, len(data), facts.messages, damage, damages.count)
 
 
 class _Facts:
     """What is in the data of a file, and what its summary states."""
 
     def __init__(self, data: Buffer, damages: DamageList) -> None:
-        self.counts: Counter[int] = Counter()
         self.records = 0
         self._data = data
         self._damages = damages
-        # what the summary should say, by kind and number or place; None where it is not known
-        self._expected: dict[tuple[type, int], Any] = {}
+        self._add = damages.add
+        self._expected = FileSummary()
         self._summary: list[tuple[Place, Any]] = []
-        self._times_ns: tuple[int, ...] = ()  # first and last
         self._ended = 0
-        self._chunk: ChunkIndex | None = None  # whose message indexes may follow
+        self._chunk: mcap.ChunkIndex | None = None  # whose message indexes may follow
         self._entries: dict[int, Int64] = {}  # of it: log times [ns] and offsets, by channel
         self._said: set[str] = set()
 
+    @property
+    def messages(self) -> int:
+        """Whole messages in it."""
+        return self._expected.counts.total()
+
     def gather(self, progress: PartDone) -> None:
         """Walk over the file."""
-        data, damages = self._data, self._damages
-        begin = len(MAGIC)
+        data, begin = self._data, len(MAGIC)
         if data[:begin] == MAGIC and data[begin : begin + 1] != bytes([Opcode.HEADER]):
-            damages.add(begin, 'header', DamageKind.MISSING)
+            self._add(begin, 'header', DamageKind.MISSING)
         if data[-len(MAGIC) :] != MAGIC:
-            damages.add(len(data), 'magic', DamageKind.MISSING, 'not closed, or cut off')
-        for place, chunk in scan(data, damages):
+            self._add(len(data), 'magic', DamageKind.MISSING, 'not closed, or cut off')
+        for place, item, _ in scan(data, self._damages):
             if place.opcode != Opcode.MESSAGE_INDEX:
                 self._close_chunk()
-            if chunk is not None and place.readable:
+            if not place.readable:
+                continue
+            self.records += 1
+            if isinstance(item, OpenChunk):
                 progress(place.offset, len(data))
-                self._open_chunk(chunk)
-            elif place.readable:
-                self._record(data, place, place.offset)
-            self.records += place.readable
+                self._open_chunk(item)
+            elif place.opcode == Opcode.MESSAGE:
+                channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
+                self._count({channel: 1}, place.offset, (log_ns, log_ns))
+            elif place.opcode == Opcode.MESSAGE_INDEX:
+                self._message_index(place)
+            else:
+                self._item(item, place, place.offset)
         self._close_chunk()
 
-    def _record(self, data: Buffer, place: Place, offset: int) -> None:
-        if place.opcode == Opcode.MESSAGE:
-            channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
-            self._count(channel, 1, offset)
-            self._span(log_ns)
-            return
-        if place.opcode == Opcode.MESSAGE_INDEX:
-            self._message_index(place)
-            return
-        record = read(data, place)
-        match record:
-            case None:
-                self._damages.add(offset, place.name, DamageKind.CONTENT)
-            case Schema() | Channel() if not self._ended:
-                self._declaration(record, place, offset)
-            case Attachment() | Metadata():
-                if isinstance(record, Attachment) and not attachment_agrees(data, place):
-                    self._damages.add(offset, place.name, DamageKind.CHECKSUM)
-                index = index_of(record, offset, place.end - place.offset)
-                self._expected[type(index), offset] = index
-            case DataEnd():
+    def _item(self, item: Any, place: Place, offset: int) -> None:
+        """Take note of a record, in a file or in a chunk that lies at the offset."""
+        match item:
+            case mcap.Schema() | mcap.Channel() if not self._ended:
+                if not self._expected.add(item):
+                    self._add(offset, place.name, DamageKind.DISAGREES, f'number {item.id}')
+                if isinstance(item, mcap.Channel) and item.schema_id:
+                    self._refers(offset, place.name, mcap.Schema, item.schema_id)
+            case mcap.Attachment() | mcap.Metadata():
+                self._expected.add_indexed(item, *place.span)
+            case mcap.DataEnd():
                 self._once(place, place.name)
                 self._ended = self._ended or place.end
-                if record.data_section_crc not in (0, checksum(data, 0, offset)):
-                    self._damages.add(offset, place.name, DamageKind.CHECKSUM)
-            case Header():
+                if item.data_section_crc not in (0, checksum(self._data, 0, offset)):
+                    self._add(offset, place.name, DamageKind.CHECKSUM)
+            case mcap.Header():
                 self._once(place, place.name)
+            case None:
+                pass
             case _:
-                self._summary.append((place, record))
+                self._summary.append((place, item))
 
-    def _declaration(self, record: Schema | Channel, place: Place, offset: int) -> None:
-        if self._expected.setdefault((type(record), record.id), record) != record:
-            self._damages.add(offset, place.name, DamageKind.DISAGREES, f'number {record.id}')
-        if isinstance(record, Channel) and record.schema_id:
-            self._refers(offset, place.name, Schema, record.schema_id)
-
-    def _count(self, channel: int, messages: int, offset: int) -> None:
-        self.counts[channel] += messages
-        self._refers(offset, 'message', Channel, channel)
-
-    def _span(self, *times_ns: int) -> None:
-        times_ns = *self._times_ns, *times_ns
-        self._times_ns = min(times_ns), max(times_ns)
+    def _count(self, counts: dict[int, int], offset: int, times_ns: tuple[int, int]) -> None:
+        self._expected.count(counts, *times_ns)
+        for channel in counts:
+            self._refers(offset, 'message', mcap.Channel, channel)
 
     def _refers(self, offset: int, record: str, kind: type, number: int) -> None:
         """Say once what is not there; a thousand messages may refer to it."""
-        target = f'{kind.__name__.lower()} {number}'
-        if (kind, number) not in self._expected and target not in self._said:
-            self._said.add(target)
-            self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
+        if (kind, number) not in self._expected.records:
+            target = f'{kind.__name__.lower()} {number}'
+            if target not in self._said:
+                self._said.add(target)
+                self._add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
 
     def _once(self, place: Place, key: object) -> None:
         if f'{place.name} {key}' in self._said:
-            self._damages.add(place.offset, place.name, DamageKind.DUPLICATE)
+            self._add(place.offset, place.name, DamageKind.DUPLICATE)
         self._said.add(f'{place.name} {key}')
 
     def _open_chunk(self, chunk: OpenChunk) -> None:
         offset = chunk.place.offset
         self._entries = {}
-        self._expected[ChunkIndex, offset] = None  # of a damaged one nothing is known
+        self._expected.records[mcap.ChunkIndex, offset] = None  # of a damaged one nothing is known
         if chunk.damage is not None:
             return
-        if chunk.notes or any(each.opcode not in IN_CHUNK for each in chunk.others):
-            for each in chunk.walk():
-                if each.damage is not None:
-                    where = f'at byte {each.offset} of the unpacked chunk'
-                    self._damages.add(offset, each.name, each.damage, where)
-        for each in chunk.others:
-            if each.opcode in IN_CHUNK:
-                self._record(chunk.records, each, offset)
+        for place, item, _ in chunk.scan(self._damages, sound=True):
+            self._item(item, place, offset)
         self._entries = chunk.entries()
-        for channel, of_channel in self._entries.items():
-            self._count(channel, len(of_channel), offset)
-        record, span = chunk.chunk, chunk.times_ns
-        if record is None or chunk.place.damage is not None:
+        times_ns = chunk.times_ns
+        if times_ns is not None:
+            self._count({it: len(each) for it, each in self._entries.items()}, offset, times_ns)
+        if chunk.chunk is None or chunk.place.damage is not None:
             return
-        if not has_end(record):
-            self._damages.add(offset, 'chunk', DamageKind.COMPRESSION)
-        if span is not None:
-            self._span(*span)
-            stated = record.message_start_time, record.message_end_time
-            if stated != span:
-                text = f'times {stated}, in it are {span}'
-                self._damages.add(offset, 'chunk', DamageKind.DISAGREES, text)
-        self._chunk = chunk_index(record, offset, chunk.place.end - offset)
-        self._expected[ChunkIndex, offset] = self._chunk
+        if not chunk.ended:
+            self._add(offset, 'chunk', DamageKind.COMPRESSION)
+        stated = chunk.chunk.message_start_time, chunk.chunk.message_end_time
+        if times_ns not in (None, stated):
+            text = f'times {stated}, in it are {times_ns}'
+            self._add(offset, 'chunk', DamageKind.DISAGREES, text)
+        self._chunk = self._expected.add_chunk(chunk.chunk, *chunk.place.span)
 
     def _message_index(self, place: Place) -> None:
         if self._chunk is None:
@@ -268,14 +228,14 @@ class _Facts:
         channel = int.from_bytes(self._data[place.start : place.start + 2], 'little')
         listed = np.frombuffer(self._data[place.start + 6 : place.end], np.uint8)
         if channel in self._chunk.message_index_offsets:
-            self._damages.add(place.offset, 'message_index', DamageKind.DUPLICATE)
+            self._add(place.offset, 'message_index', DamageKind.DUPLICATE)
         self._chunk.message_index_offsets[channel] = place.offset
         self._chunk.message_index_length += place.end - place.offset
         actual = self._entries.get(channel, _NO_ENTRIES)
         stated = listed[: len(listed) // 16 * 16].view(np.int64).reshape(-1, 2)
         if not np.array_equal(_sorted(stated), _sorted(actual)):
             text = f'channel {channel}'
-            self._damages.add(place.offset, 'message_index', DamageKind.MISPLACED, text)
+            self._add(place.offset, 'message_index', DamageKind.MISPLACED, text)
 
     def _close_chunk(self) -> None:
         chunk, self._chunk = self._chunk, None
@@ -285,14 +245,14 @@ class _Facts:
         if missing:
             text = f'channels {missing}'
             offset = chunk.chunk_start_offset + chunk.chunk_length
-            self._damages.add(offset, 'message_index', DamageKind.MISSING, text)
+            self._add(offset, 'message_index', DamageKind.MISSING, text)
 
     def compare(self) -> None:
         """Compare the summary with what is there."""
-        add = self._damages.add
+        add = self._add
         if not self._ended:
             add(len(self._data), 'data_end', DamageKind.MISSING)
-        footers = [(place, it) for place, it in self._summary if isinstance(it, Footer)]
+        footers = [(place, it) for place, it in self._summary if isinstance(it, mcap.Footer)]
         if not footers:
             add(len(self._data), 'footer', DamageKind.MISSING)
             return
@@ -305,61 +265,57 @@ class _Facts:
         if start != self._ended:
             text = f'it begins at {self._ended}, not {start}'
             add(place.offset, 'summary', DamageKind.MISPLACED, text)
-        stated = {(type(record), _key(record)) for _, record in self._summary}
-        self._expect_totals(stated)
+        stated = {key_of(record) for _, record in self._summary}
+        self._expect_totals()
         for place, record in self._summary:
-            self._once(place, _key(record))
+            self._once(place, key_of(record)[1])
             self._compare(place, record)
         kinds = {kind for kind, _ in stated}
-        for kind, name in _LISTED.items():
-            if kind in _DECLARED and kind not in kinds:
+        for kind in _LISTED:
+            if kind in DECLARED and kind not in kinds:
                 continue  # none at all is a choice of the writer
-            here = {key for key in self._expected.keys() - stated if key[0] is kind}
+            here = {key for key in self._expected.records.keys() - stated if key[0] is kind}
             for _, key in sorted(here, key=itemgetter(1)):
-                text = '' if kind is Statistics else f'of {key}'
-                at = self._ended if kind in (*_DECLARED, Statistics) else key
-                add(at, name, DamageKind.MISSING, text)
+                text = '' if kind is mcap.Statistics else f'of {key}'
+                at = self._ended if kind in (*DECLARED, mcap.Statistics) else key
+                add(at, _name(kind), DamageKind.MISSING, text)
 
-    def _expect_totals(self, stated: set[tuple[type, int]]) -> None:
+    def _expect_totals(self) -> None:
         """Expect what the summary says of all records, and of itself."""
-        # a topic without messages may be declared in the summary alone
-        declared = {key for key in stated if key[0] in _DECLARED}
-        kinds = Counter(kind for kind, _ in self._expected.keys() | declared)
-        self._expected[Statistics, 0] = statistics(kinds, self.counts, self._times_ns)
+        for _, record in self._summary:
+            if isinstance(record, DECLARED):  # a topic without messages may be declared here alone
+                self._expected.add(record)
+        self._expected.add(self._expected.statistics())
         begin: dict[int, int] = {}
         for place, _ in self._summary:
             first = begin.setdefault(place.opcode, place.offset)
-            self._expected[SummaryOffset, place.opcode] = SummaryOffset(
-                place.opcode, first, place.end - first
-            )
+            offset = mcap.SummaryOffset(place.opcode, first, place.end - first)
+            self._expected.records[key_of(offset)] = offset
 
     def _compare(self, place: Place, stated: Any) -> None:
-        key = type(stated), _key(stated)
-        if isinstance(stated, Footer) or (key not in self._expected and key[0] in _DECLARED):
+        if isinstance(stated, mcap.Footer):
             return
-        actual = self._expected.get(key, ())
+        key = key_of(stated)
+        actual = self._expected.records.get(key, ())
         kind, text = DamageKind.DISAGREES, f'{stated}, in the data {actual}'
-        if isinstance(stated, Statistics):
+        if isinstance(stated, mcap.Statistics):
             counts = {number: n for number, n in stated.channel_message_counts.items() if n}
             stated = replace(
                 stated, channel_message_counts=counts or actual.channel_message_counts
             )
             text = f'{stated}, in the data {actual}'
-        elif isinstance(stated, SummaryOffset):
+        elif isinstance(stated, mcap.SummaryOffset):
             kind, text = DamageKind.MISPLACED, ''
             actual = actual if stated.group_length else None
         elif actual == ():
             kind, text = DamageKind.MISPLACED, f'nothing of that kind is at byte {key[1]}'
         if actual not in (None, stated):  # of a damaged chunk nothing is known
-            self._damages.add(place.offset, place.name, kind, text)
+            self._add(place.offset, place.name, kind, text)
 
 
-def _key(record: Any) -> int:
-    """Return what a record of the summary is about: a number, or a place."""
-    for name in ('id', 'chunk_start_offset', 'offset', 'group_opcode'):
-        if hasattr(record, name):
-            return int(getattr(record, name))
-    return 0
+def _name(kind: type) -> str:
+    """Return the name of a kind of records, as in the specification."""
+    return re.sub('(?<!^)(?=[A-Z])', '_', kind.__name__).lower()
 
 
 def _sorted(entries: Int64) -> Int64:

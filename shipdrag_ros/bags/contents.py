@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What is in an MCAP file and where: from its index, or from a walk through it.
+What is in an MCAP file and where: as its summary says, or as a pass over it finds.
 
-Both give the same `Contents`; the walk costs a pass over the file, needs no
-index, and goes on behind a damaged record.
+The pass needs no summary, and goes on behind a damaged record.
 """
 
 from __future__ import annotations
@@ -13,55 +12,152 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
-from mcap import records as mcap_records
+from mcap import records as mcap
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 
 from shipdrag_ros.bags.records import (
+    HEAD,
     MAGIC,
     MESSAGE_HEAD,
     READ_ERRORS,
     TIME_LIMIT_NS,
     Buffer,
+    Damage,
     DamageKind,
     DamageList,
+    OpenChunk,
     Place,
     attachment_agrees,
     footer_of,
+    place_at,
     read,
+    release,
+    scan,
     summary_agrees,
+    unpack,
     walk,
 )
-from shipdrag_ros.bags.scan import OpenChunk, scan
 
 _SEGMENT_BYTES = 1 << 20
 _NOT_USED = 'read from its beginning, without an index'
 
 
-class FileChannel(NamedTuple):
-    """A channel of a file; the encoding is 'cdr' where ROS 2 wrote it."""
-
-    topic: str
-    type: str
-    encoding: str
+DECLARED = (mcap.Schema, mcap.Channel)
+INDEXES = (mcap.ChunkIndex, mcap.AttachmentIndex, mcap.MetadataIndex)
 
 
-class FileSegment(NamedTuple):
+def key_of(record: Any) -> tuple[type, int]:
     """
-    A chunk, or consecutive messages outside chunks.
+    Return what a record of a summary is about: its kind, and a number or a place.
+    """
+    for name in ('id', 'chunk_start_offset', 'offset', 'group_opcode'):
+        if hasattr(record, name):
+            return type(record), int(getattr(record, name))
+    return type(record), 0
 
-    Sorts by the earliest log time [ns], then by place [bytes]. `size` is that of its
-    records [bytes]; `channels` are those in it, empty where that is not known.
+
+class FileSummary:
+    """
+    Declarations, indexes and counts; of two declarations that differ the better witnessed counts.
+
+    Attributes
+    ----------
+    records
+        Declarations by their number, indexes by the place of what they are about; None of
+        a chunk that is known to be there and no more.
+    counts
+        Messages by channel.
+    times_ns
+        Log times, the first and the last [ns]; none without messages.
     """
 
-    start_ns: int
-    offset: int
-    end: int
-    end_ns: int
-    size: int
-    channels: frozenset[int] = frozenset()
+    def __init__(self) -> None:
+        self.records: dict[tuple[type, int], Any] = {}
+        self.counts: Counter[int] = Counter()
+        self.times_ns: tuple[int, ...] = ()
+        self._verified: set[tuple[type, int]] = set()
+
+    def of(self, *kinds: type) -> list[Any]:
+        """
+        Return the records of some kinds, in the order in which they were added.
+        """
+        return [record for (kind, _), record in self.records.items() if kind in kinds]
+
+    def add(self, record: Any, *, verified: bool = False) -> bool:
+        """
+        Take note of a declaration or an index; return whether it agrees with what is known.
+
+        Parameters
+        ----------
+        record
+            Of a file.
+        verified
+            Whether a checksum vouches for it.
+        """
+        key = key_of(record)
+        before = self.records.setdefault(key, record)
+        better = verified and key not in self._verified
+        if better:
+            self.records[key] = record
+            self._verified.add(key)
+        return better or before == record
+
+    def add_indexed(self, record: mcap.Attachment | mcap.Metadata, at: int, length: int) -> None:
+        """
+        Take note of a record at a place [bytes].
+        """
+        if isinstance(record, mcap.Metadata):
+            self.add(mcap.MetadataIndex(at, length, record.name))
+            return
+        times, about = (record.log_time, record.create_time), (record.name, record.media_type)
+        self.add(mcap.AttachmentIndex(at, length, *times, len(record.data), *about))
+
+    def add_chunk(self, chunk: mcap.Chunk, at: int, length: int) -> mcap.ChunkIndex:
+        """
+        Take note of a chunk at a place [bytes]; return its index, but for its message indexes.
+        """
+        index = mcap.ChunkIndex(
+            chunk_length=length,
+            chunk_start_offset=at,
+            compression=chunk.compression,
+            compressed_size=len(chunk.data),
+            message_end_time=chunk.message_end_time,
+            message_index_length=0,
+            message_index_offsets={},
+            message_start_time=chunk.message_start_time,
+            uncompressed_size=chunk.uncompressed_size,
+        )
+        self.records[mcap.ChunkIndex, at] = index
+        return index
+
+    def count(self, counts: Mapping[int, int], first_ns: int, last_ns: int) -> None:
+        """
+        Count messages, of each channel so many, whose first and last log times are known [ns].
+        """
+        for channel, count in counts.items():
+            self.counts[channel] += count
+        first, last = self.times_ns or (first_ns, last_ns)
+        self.times_ns = min(first, first_ns), max(last, last_ns)
+
+    def statistics(self) -> mcap.Statistics:
+        """
+        Return what a summary says of the whole file.
+        """
+        kinds = Counter(kind for kind, _ in self.records)
+        return mcap.Statistics(
+            attachment_count=kinds[mcap.AttachmentIndex],
+            channel_count=kinds[mcap.Channel],
+            channel_message_counts=dict(self.counts),
+            chunk_count=kinds[mcap.ChunkIndex],
+            message_count=self.counts.total(),
+            message_end_time=max(self.times_ns, default=0),
+            message_start_time=min(self.times_ns, default=0),
+            metadata_count=kinds[mcap.MetadataIndex],
+            schema_count=kinds[mcap.Schema],
+        )
 
 
 @dataclass
@@ -74,48 +170,27 @@ class Contents:
     indexed
         Whether that was found by the index of the file.
     channels
-        By their number in the file.
+        Topic and type by number in the file; a type in another encoding is another type.
     counts
         Messages of each channel.
     attachments
         Content by name; of several with a name, the last.
     metadata
-        Metadata records by name.
-    compressions
-        Of the chunks, '' for none.
+        mcap.Metadata records by name.
     segments
-        Where messages are, in the order of their first times.
+        Where messages are, in the order of their first times: chunks, and consecutive
+        messages outside of chunks, of which no channels are known.
     warnings
         What is wrong with the file, a sentence each.
     """
 
     indexed: bool = True
-    channels: dict[int, FileChannel] = field(default_factory=dict)
+    channels: dict[int, tuple[str, str]] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
     attachments: dict[str, bytes] = field(default_factory=dict)
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
-    compressions: set[str] = field(default_factory=set)
-    segments: list[FileSegment] = field(default_factory=list)
+    segments: list[mcap.ChunkIndex] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    _schemas: dict[int, str] = field(default_factory=dict)
-
-    def add(self, record: Any) -> None:
-        """
-        Take note of a schema, a channel, an attachment or metadata.
-        """
-        match record:
-            case mcap_records.Schema():
-                self._schemas[record.id] = record.name
-            case mcap_records.Channel():
-                self.channels[record.id] = FileChannel(
-                    record.topic,
-                    _full_name(self._schemas.get(record.schema_id, '')),
-                    record.message_encoding,
-                )
-            case mcap_records.Attachment():
-                self.attachments[record.name] = record.data
-            case mcap_records.Metadata():
-                self.metadata[record.name] = record.metadata
 
 
 class _BadIndexError(Exception):
@@ -126,18 +201,33 @@ def contents_of(data: Buffer) -> Contents:
     """
     Return what is in a file; what is wrong with it is stated in `warnings`.
     """
-    warnings = []
+    found = Contents()
+    summary = None
     try:
-        contents = _by_index(data) or _by_walk(data)
+        summary = _stated(data)
     except _BadIndexError as error:
-        warnings = [f'{error}: {_NOT_USED}']
-        contents = _by_walk(data)
-    contents.warnings[:0] = warnings
-    contents.segments.sort()
-    return contents
+        found.warnings.append(f'{error}: {_NOT_USED}')
+    if summary is None:
+        found.indexed = False
+        summary = _walked(data, found.warnings)
+    found.counts = summary.counts
+    names = {schema.id: _full_name(schema.name) for schema in summary.of(mcap.Schema)}
+    for each in summary.of(mcap.Channel):
+        topic = each.topic if each.topic.startswith('/') else f'/{each.topic}'
+        other = '' if each.message_encoding == 'cdr' else f' ({each.message_encoding})'
+        found.channels[each.id] = topic, names.get(each.schema_id, '') + other
+    for each in summary.of(mcap.AttachmentIndex, mcap.MetadataIndex):
+        match read(data, place_at(data, each.offset)):
+            case mcap.Attachment() as it:
+                found.attachments[it.name] = it.data
+            case mcap.Metadata() as it:
+                found.metadata[it.name] = it.metadata
+    place = attrgetter('message_start_time', 'chunk_start_offset')
+    found.segments = sorted(summary.of(mcap.ChunkIndex), key=place)
+    return found
 
 
-def _by_index(data: Buffer) -> Contents | None:
+def _stated(data: Buffer) -> FileSummary | None:
     """Return what the summary says; None where it does not say all, as the format allows."""
     if data[-len(MAGIC) :] != MAGIC or len(data) < 2 * len(MAGIC):
         raise _BadIndexError('the file was not closed, or it is cut off')
@@ -148,166 +238,149 @@ def _by_index(data: Buffer) -> Contents | None:
         return None
     if not summary_agrees(data, footer):
         raise _BadIndexError('the index has a wrong checksum')
-    summary: dict[type, list[Any]] = {}
+    summary = FileSummary()
+    stream = BytesIO(data[footer.summary_start :])
     try:
-        reader = StreamReader(
-            BytesIO(data[footer.summary_start :]), skip_magic=True, emit_chunks=True
-        )
-        for record in reader.records:
-            summary.setdefault(type(record), []).append(record)
+        for record in StreamReader(stream, skip_magic=True, emit_chunks=True).records:
+            if not summary.add(record) and isinstance(record, (*DECLARED, *INDEXES)):
+                raise _misplaced(key_of(record)[1])
     except READ_ERRORS as error:
         raise _BadIndexError(f'the index is damaged ({error})') from error
-    if not _says_all(summary):
-        return None
-    contents = Contents()
-    for record in summary.get(mcap_records.Schema, []) + summary.get(mcap_records.Channel, []):
-        contents.add(record)
+    for statistics in summary.of(mcap.Statistics):
+        summary.counts.update(statistics.channel_message_counts)
+        if not _says_all(summary, statistics):
+            return None
+        _follow(data, summary)
+        return summary
+    return None
+
+
+def _says_all(summary: FileSummary, stated: mcap.Statistics) -> bool:
+    """Say whether everything that the statistics count is indexed."""
+    # messages outside chunks have no index
+    unchunked = stated.chunk_count == 0 and stated.message_count > 0
+    listed = summary.statistics()
+    fields = 'schema_count', 'channel_count', 'chunk_count', 'attachment_count', 'metadata_count'
+    return not unchunked and all(getattr(listed, it) == getattr(stated, it) for it in fields)
+
+
+def _follow(data: Buffer, summary: FileSummary) -> None:
+    """Look whether everything is where the index says, nothing in another."""
+    chunks = summary.of(mcap.ChunkIndex)
+    listed = [(it.chunk_start_offset, it.chunk_length, Opcode.CHUNK) for it in chunks]
     for kind, opcode in _INDEXED.items():
-        for index in summary.get(kind, []):
-            contents.add(_indexed(data, index.offset, opcode))
-    at = 0
-    for chunk in sorted(
-        summary.get(mcap_records.ChunkIndex, []), key=attrgetter('chunk_start_offset')
-    ):
-        contents.segments.append(_segment(data, chunk, at))
-        contents.compressions.add(chunk.compression)
-        at = contents.segments[-1].end
-    contents.counts.update(summary[mcap_records.Statistics][0].channel_message_counts)
-    return contents
+        listed += [(it.offset, it.length, opcode) for it in summary.of(kind)]
+    end = 0
+    for offset, length, opcode in sorted(listed):
+        place = next(walk(data, offset, len(data)), None)
+        begin, end = end, offset + length
+        if offset < begin or place != Place(opcode, offset, offset + HEAD.size, end):
+            raise _misplaced(offset)
+        if opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
+            raise _BadIndexError(f'the attachment at byte {offset} has a wrong checksum')
+    for it in chunks:
+        if max(it.message_start_time, it.message_end_time) >= TIME_LIMIT_NS:
+            raise _misplaced(it.chunk_start_offset)
 
 
 _INDEXED = {
-    mcap_records.AttachmentIndex: Opcode.ATTACHMENT,
-    mcap_records.MetadataIndex: Opcode.METADATA,
+    mcap.AttachmentIndex: Opcode.ATTACHMENT,
+    mcap.MetadataIndex: Opcode.METADATA,
 }
 
 
-def _says_all(summary: Mapping[type, list[Any]]) -> bool:
-    """Say whether everything that the statistics count is indexed."""
-    if mcap_records.Statistics not in summary:
-        return False
-    statistics = summary[mcap_records.Statistics][0]
-    counts = {
-        mcap_records.Schema: statistics.schema_count,
-        mcap_records.Channel: statistics.channel_count,
-        mcap_records.ChunkIndex: statistics.chunk_count,
-        mcap_records.AttachmentIndex: statistics.attachment_count,
-        mcap_records.MetadataIndex: statistics.metadata_count,
-    }
-    # messages outside chunks have no index
-    unchunked = statistics.chunk_count == 0 and statistics.message_count > 0
-    return not unchunked and all(len(summary.get(it, [])) == n for it, n in counts.items())
+def _misplaced(offset: int) -> _BadIndexError:
+    return _BadIndexError(f'the record at byte {offset} is not what the index says')
 
 
-def _place(data: Buffer, offset: int, opcode: int) -> Place:
-    for place in walk(data, offset, len(data)):
-        if place.opcode == opcode and place.damage is None:
-            return place
-        break
-    raise _BadIndexError(f'the record at byte {offset} is not what the index says')
-
-
-def _indexed(data: Buffer, offset: int, opcode: int) -> Any:
-    place = _place(data, offset, opcode)
-    if opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
-        raise _BadIndexError(f'the attachment at byte {offset} has a wrong checksum')
-    return read(data, place)
-
-
-def _segment(data: Buffer, chunk: mcap_records.ChunkIndex, least: int) -> FileSegment:
-    offset, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
-    late = max(chunk.message_start_time, chunk.message_end_time) >= TIME_LIMIT_NS
-    if late or offset < least or _place(data, offset, Opcode.CHUNK).end != end:
-        raise _BadIndexError(f'the record at byte {offset} is not what the index says')
-    channels = frozenset(chunk.message_index_offsets)
-    return FileSegment(
-        chunk.message_start_time,
-        offset,
-        end,
-        chunk.message_end_time,
-        chunk.uncompressed_size,
-        channels,
-    )
-
-
-def _by_walk(data: Buffer) -> Contents:
-    """Return what is there; what is damaged is left out and stated in `warnings`."""
-    contents = Contents(indexed=False)
-    damages = DamageList()
-    stray = False  # a message that is found in or behind a damaged chunk may be part of anything
-    for place, chunk in scan(data, damages):
-        stray = stray or (place.damage is not None and bool(contents.compressions))
-        if place.damage is not None:
+def _walked(data: Buffer, warnings: list[str]) -> FileSummary:
+    """Return what is there; what is damaged is left out and stated."""
+    summary, damages = FileSummary(), DamageList()
+    loose: mcap.ChunkIndex | None = None
+    chunked = damaged = False
+    for place, item, sound in scan(data, damages):
+        chunked = chunked or isinstance(item, OpenChunk)
+        damaged = damaged or place.damage is not None
+        loose_message = place.opcode == Opcode.MESSAGE and not (chunked and damaged)
+        if place.damage is not None or not (sound or loose_message):
             continue
         if place.opcode == Opcode.DATA_END:
             break
-        if chunk is not None:
-            _add_chunk(chunk, contents)
-        elif place.opcode == Opcode.MESSAGE and not stray:
-            _add_message(data, place, contents)
-        elif place.opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
-            contents.warnings.append(
-                f'the attachment {getattr(read(data, place), "name", "")!r} has a wrong checksum: '
-                'left out'
-            )
-        elif place.opcode in _DECLARATIONS:
-            contents.add(read(data, place))
+        if loose_message:
+            channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
+            if log_ns < TIME_LIMIT_NS:
+                summary.counts[channel] += 1
+                loose = _with_message(loose, place, log_ns, summary)
+            else:
+                warnings.append(
+                    f'the message at byte {place.offset} has no possible log time: left out'
+                )
+        elif isinstance(item, OpenChunk):
+            _add_chunk(item, summary)
+            warnings += item.notes
+        elif isinstance(item, DECLARED):
+            summary.add(item)
+        elif isinstance(item, mcap.Attachment | mcap.Metadata):
+            summary.add_indexed(item, *place.span)
     first = {each.offset: each for each in reversed(damages.listed)}  # of each place
-    contents.warnings += (
-        left_out(each.record, each.offset, each.kind) for each in reversed(first.values())
-    )
-    strangers = sum(n for number, n in contents.counts.items() if number not in contents.channels)
+    warnings += [left_out(each) for each in reversed(first.values())]
+    known = {channel.id for channel in summary.of(mcap.Channel)}
+    strangers = sum(n for number, n in summary.counts.items() if number not in known)
     if strangers:
-        contents.warnings.append(f'{strangers} messages of topics that are not declared: left out')
-    return contents
+        warnings.append(f'{strangers} messages of topics that are not declared: left out')
+    return summary
 
 
-_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA)
-
-
-def _add_message(data: Buffer, place: Place, contents: Contents) -> None:
-    """Lengthen the last segment by a message outside of chunks, or begin one."""
-    channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
-    if log_ns >= TIME_LIMIT_NS:
-        contents.warnings.append(
-            f'the message at byte {place.offset} has no possible log time: left out'
-        )
+def _add_chunk(opened: OpenChunk, summary: FileSummary) -> None:
+    if opened.chunk is None or opened.damage is not None:
         return
-    contents.counts[channel] += 1
-    segment = FileSegment(log_ns, place.offset, place.end, log_ns, place.end - place.offset)
-    last = contents.segments[-1] if contents.segments else segment
-    if last.end == place.offset < last.offset + _SEGMENT_BYTES and not last.channels:
-        contents.segments.pop()
-        first_ns, end_ns = min(last.start_ns, log_ns), max(last.end_ns, log_ns)
-        size = place.end - last.offset
-        segment = FileSegment(first_ns, last.offset, place.end, end_ns, size)
-    contents.segments.append(segment)
-
-
-def _add_chunk(chunk: OpenChunk, contents: Contents) -> None:
-    if chunk.chunk is None or chunk.damage is not None:
-        return
-    contents.compressions.add(chunk.chunk.compression)
-    for place in chunk.others:
-        if place.opcode in _DECLARATIONS:
-            contents.add(read(chunk.records, place))
-    counts = Counter(chunk.messages.channel.tolist())
-    contents.counts.update(counts)
-    times_ns = chunk.times_ns
+    for place in opened.others:
+        record = read(opened.records, place)
+        if isinstance(record, DECLARED):
+            summary.add(record, verified=opened.verified)
+    times_ns = opened.times_ns
     if times_ns is not None:
-        first, last = times_ns
-        _, offset, _, end, _ = chunk.place
-        size = len(chunk.records)
-        contents.segments.append(FileSegment(first, offset, end, last, size, frozenset(counts)))
-    contents.warnings += chunk.notes
+        index = summary.add_chunk(opened.chunk, *opened.place.span)
+        index.message_start_time, index.message_end_time = times_ns
+        counts = Counter(opened.messages.channel.tolist())
+        index.message_index_offsets = dict.fromkeys(counts, 0)
+        summary.counts.update(counts)
 
 
-def left_out(record: str, offset: int, why: DamageKind) -> str:
+def _with_message(
+    last: mcap.ChunkIndex | None, place: Place, log_ns: int, summary: FileSummary
+) -> mcap.ChunkIndex:
+    """Lengthen the last segment by a message outside of chunks, or begin one."""
+    follows = last is not None and last.chunk_start_offset + last.chunk_length == place.offset
+    if last is None or not follows or last.chunk_length >= _SEGMENT_BYTES:
+        last = summary.add_chunk(mcap.Chunk('', b'', log_ns, log_ns, 0, 0), place.offset, 0)
+    last.chunk_length += place.end - place.offset
+    last.uncompressed_size = last.chunk_length
+    last.message_start_time = min(last.message_start_time, log_ns)
+    last.message_end_time = max(last.message_end_time, log_ns)
+    return last
+
+
+def opened_segment(data: Buffer, segment: mcap.ChunkIndex) -> OpenChunk:
+    """
+    Return the records of a segment.
+    """
+    place = place_at(data, segment.chunk_start_offset)
+    if place.opcode == Opcode.CHUNK:
+        return unpack(data, place)
+    place = place._replace(end=place.offset + segment.chunk_length)
+    release(data, place.offset, place.end)
+    return OpenChunk(place, records=data[place.offset : place.end])
+
+
+def left_out(damage: Damage) -> str:
     """
     Return the sentence of a warning.
     """
-    name = record.replace('unknown', 'record')
-    return f'the {name} at byte {offset} is damaged ({why.value}): left out'
+    if damage.record == 'attachment' and damage.kind is DamageKind.CHECKSUM:
+        return f'the attachment {damage.detail} has a wrong checksum: left out'
+    name = damage.record.replace('unknown', 'record')
+    return f'the {name} at byte {damage.offset} is damaged ({damage.kind.value}): left out'
 
 
 def _full_name(type_name: str) -> str:

@@ -21,6 +21,7 @@ from uuid import uuid4
 
 from mcap.records import DataEnd, Footer
 
+from shipdrag_ros.bags.contents import DECLARED
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.bags.writer import (
@@ -100,7 +101,7 @@ class LiveFile(BagWriter):
         for message in messages:
             self.put(message)
         if self.size_bytes - self._declared_at > DECLARE_BYTES:
-            self._write(as_bytes(*self._declared.values()))
+            self._write(as_bytes(*self._summary.of(*DECLARED)))
             self._declared_at = self.size_bytes
         self._end_chunk()
         self._messages += len(messages)
@@ -279,17 +280,16 @@ class DurableRecording:
         self._limits = limits
         self._earlier: Iterator[EncodedMessage] | None = iter(earlier)
         self._queue_bytes = queue_bytes
-        self._wanted = False  # a file
         self._recording_id = uuid4().hex
         self._file: LiveFile | None = None
         self._told = RecordingProgress(directory)
-        # handed over -> queue -> due to be written -> written, not yet safe -> safe
         self._lock = threading.Lock()
-        self._queue: list[EncodedMessage] = []
-        self._due: list[EncodedMessage] = []
-        self._unsynced: list[EncodedMessage] = []
-        self._held_bytes = self._accepted = 0
-        self._oldest_s = self._taken_s = self._synced_s = monotonic()
+        # what is not safe yet, in order, each with the moment it came; the first are in the file
+        self._held: list[tuple[float, EncodedMessage]] = []
+        self._held_bytes = self._written = 0
+        self._before = 0  # of these, those that came before all that were handed over
+        self._begun_s: float | None = None  # since when there is something worth a file
+        self._synced_s = monotonic()
         self._retry_s = 0.0
         self._uncompacted: list[LiveFile] = []
         self._compactor: threading.Thread | None = None
@@ -311,21 +311,15 @@ class DurableRecording:
             Whether it is worth a file; of those that are not, the latest
             `KEPT_BEFORE` wait for one that is.
         """
-        size = _held_bytes([message])
         with self._lock:
-            if begins and not self._wanted:
-                self._wanted, self._oldest_s = True, monotonic()
-            elif not self._wanted and len(self._queue) >= KEPT_BEFORE:
-                self._held_bytes -= _held_bytes([self._queue.pop(0)])
-                self._accepted -= 1
-            if self._held_bytes + size > self._queue_bytes:
+            if begins and self._begun_s is None:
+                self._begun_s = monotonic()
+            elif self._begun_s is None and len(self._held) >= KEPT_BEFORE:
+                self._let_go(1)
+            if self._held_bytes + _bytes_of(message) > self._queue_bytes:
                 self._told.lost += 1
-                return
-            if self._accepted == self._told.messages:
-                self._oldest_s = monotonic()
-            self._queue.append(message)
-            self._held_bytes += size
-            self._accepted += 1
+            else:
+                self._hold(len(self._held), [message])
 
     def stop(self) -> None:
         """
@@ -351,14 +345,24 @@ class DurableRecording:
         Return how the recording stands; asks no disk.
         """
         with self._lock:
-            waiting = self._accepted - self._told.messages if self._wanted else 0
+            begun_s, now_s = self._begun_s, monotonic()
+            waiting = 0 if begun_s is None else len(self._held)
             return replace(
                 self._told,
                 waiting=waiting,
-                oldest_s=monotonic() - self._oldest_s if waiting else 0.0,
+                oldest_s=now_s - max(begun_s or 0.0, self._held[0][0]) if waiting else 0.0,
                 uncompacted=len(self._uncompacted),
                 why_uncompacted=self._told.why_uncompacted if self._uncompacted else '',
             )
+
+    def _hold(self, place: int, messages: Sequence[EncodedMessage]) -> None:
+        now_s = monotonic()
+        self._held[place:place] = [(now_s, message) for message in messages]
+        self._held_bytes += sum(map(_bytes_of, messages))
+
+    def _let_go(self, count: int) -> None:
+        self._held_bytes -= sum(_bytes_of(message) for _, message in self._held[:count])
+        del self._held[:count]
 
     def _run(self) -> None:
         while True:
@@ -377,45 +381,44 @@ class DurableRecording:
         self._finish()
 
     def _take(self) -> None:
-        """Take over what was handed over, the earlier messages before all others."""
-        if self._earlier is not None and not self._due:
-            self._due = list(islice(self._earlier, EARLIER_AT_ONCE))
-            with self._lock:
-                self._accepted += len(self._due)
-                self._held_bytes += _held_bytes(self._due)
-            if self._due:
-                self._wanted = True
-            else:
-                self._earlier = None
-        if self._earlier is None and self._wanted:
-            with self._lock:
-                self._due += self._queue
-                self._queue = []
-                self._taken_s = monotonic()
+        """Take some of the earlier messages, and put them before what was handed over."""
+        if self._earlier is None or self._before > self._written:
+            return
+        some = list(islice(self._earlier, EARLIER_AT_ONCE))
+        with self._lock:
+            if some and self._begun_s is None:
+                self._begun_s = monotonic()
+            self._hold(self._before, some)
+        self._before += len(some)
+        if not some:
+            self._earlier = None
 
     def _write(self) -> None:
-        if not self._wanted:
+        if self._begun_s is None:
             self._make_directory()
             self._tried.set()
             return
         file = self._file or self._open()
-        while self._due:
-            fitting = self._fitting(file)
-            if not fitting:
+        with self._lock:
+            end = len(self._held) if self._earlier is None else self._before
+            due = [message for _, message in self._held[self._written : end]]
+        while due:
+            fitting = self._fitting(file, due)
+            if fitting:
+                file.append(due[:fitting])
+                self._written += fitting
+                del due[:fitting]
+            else:
                 self._end_part(file)
                 file = self._open()
-                continue
-            file.append(self._due[:fitting])
-            self._unsynced += self._due[:fitting]
-            del self._due[:fitting]
 
-    def _fitting(self, file: LiveFile) -> int:
-        """Return how many of the messages that are due the part takes as one chunk."""
+    def _fitting(self, file: LiveFile, due: Sequence[EncodedMessage]) -> int:
+        """Return how many messages the part takes as one chunk."""
         room = min(CHUNK_BYTES, self._limits.size_bytes - file.size_bytes)
-        begin_ns = self._due[0].log_ns if file.first_log_ns is None else file.first_log_ns
+        begin_ns = due[0].log_ns if file.first_log_ns is None else file.first_log_ns
         end_ns = begin_ns + round(self._limits.duration_s * 1e9)
         fitting = 0
-        for message in self._due:
+        for message in due:
             empty = file.first_log_ns is None and not fitting  # takes one, whatever its size
             if not empty and (room <= 0 or message.log_ns > end_ns):
                 break
@@ -424,14 +427,14 @@ class DurableRecording:
         return fitting
 
     def _sync(self) -> None:
-        if self._file is not None and self._unsynced:
+        if self._file is not None and self._written:
             self._file.sync()
             with self._lock:
-                self._told.messages += len(self._unsynced)
-                self._held_bytes -= _held_bytes(self._unsynced)
-                self._oldest_s = self._taken_s
+                self._told.messages += self._written
                 self._told.size_bytes = self._file.synced_bytes
-            self._unsynced = []
+                self._let_go(self._written)
+            self._before -= self._written
+            self._written = 0
         self._synced_s = monotonic()
         self._told.error = ''
 
@@ -488,8 +491,7 @@ class DurableRecording:
             file.abandon()
             if file.synced_messages and not self._gone(file):
                 self._leave(file)
-        self._due = self._unsynced + self._due
-        self._unsynced = []
+        self._written = 0
         self._told.error = reason_of(error)
         self._retry_s = monotonic() + RETRY_S
         self._tried.set()
@@ -502,9 +504,8 @@ class DurableRecording:
             except Exception as error:  # what is safe already is counted below
                 self._fail(error)
         with self._lock:
-            if self._wanted:
-                self._told.lost += self._accepted - self._told.messages
-            self._accepted = self._told.messages
+            self._told.lost += 0 if self._begun_s is None else len(self._held)
+            self._let_go(len(self._held))
         if self._compactor is not None:
             self._compactor.join()
         self._compact()
@@ -529,10 +530,9 @@ class DurableRecording:
         with self._lock:
             self._told.vanished += 1
             self._told.lost += file.synced_messages
-            self._accepted -= file.synced_messages
             self._told.messages -= file.synced_messages
         return True
 
 
-def _held_bytes(messages: Iterable[EncodedMessage]) -> int:
-    return sum(len(message.payload) + _MESSAGE_BYTES for message in messages)
+def _bytes_of(message: EncodedMessage) -> int:
+    return len(message.payload) + _MESSAGE_BYTES

@@ -11,12 +11,10 @@ left without its `metadata.yaml` by a crash is taken for what its files say.
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
@@ -26,21 +24,19 @@ from typing import IO, Any
 
 import numpy as np
 import zstandard
-from mcap.opcode import Opcode
+from mcap.records import ChunkIndex
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.bags.contents import FileSegment, contents_of, left_out
+from shipdrag_ros.bags.contents import contents_of, left_out, opened_segment
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
-    HEAD,
     MAGIC,
     Buffer,
+    Damage,
     DamageKind,
-    Place,
-    Unpacked,
-    release,
-    unpack,
+    DamageList,
+    OpenChunk,
 )
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.samples import UInt8
@@ -57,9 +53,7 @@ _FOREIGN = {
     b'SQLite format 3\0': 'is a bag in sqlite3 storage',
     b'#ROSBAG V2.0': 'is a bag of ROS 1',
 }
-_THREADS = 3
 _PIECE_BYTES = 1 << 12  # of a packed file; little of it is lost at a damage
-_AHEAD_BYTES = 1 << 22  # unpacked, so that it is still in the cache of the processor
 
 
 class McapFile:
@@ -84,7 +78,10 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._source = unpacked_file(path, self._refuse)
+        damages = DamageList()
+        self._source = unpacked_file(path, damages)
+        for damage in damages.listed:
+            raise BagError(f'{str(path)!r} cannot be unpacked: {damage.detail}')
         with self._data() as data:
             head = data[:16]
             if not head.startswith(MAGIC):
@@ -97,7 +94,7 @@ class McapFile:
         segments = self.contents.segments
         if not segments:
             return None
-        return segments[0].start_ns, max(segment.end_ns for segment in segments)
+        return segments[0].message_start_time, max(each.message_end_time for each in segments)
 
     def messages(
         self, channels: Collection[int], *, start_ns: int = 0, end_ns: int = sys.maxsize
@@ -114,19 +111,24 @@ class McapFile:
         """
         wanted = frozenset(channels)
         in_time = [
-            s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
+            each
+            for each in self.contents.segments
+            if each.message_end_time >= start_ns and each.message_start_time <= end_ns
         ]
-        segments = [s for s in in_time if not s.channels or s.channels & wanted]
+        left = deque(
+            each
+            for each in in_time
+            if not each.message_index_offsets or each.message_index_offsets.keys() & wanted
+        )
         table = np.zeros(CHANNELS, np.uint8)
         table[list(wanted)] = 1
         read = 0
         waiting: Messages | None = None
         with self._data() as data:
-            groups = deque(_grouped(segments))
-            unpacked = _unpacked_ahead(data, tuple(groups))
-            while groups:
+            while left:
                 # as much again as waits, so that what overlaps is not sorted over and over
-                loaded = self._load(unpacked, groups, table, len(waiting.data) if waiting else 0)
+                least_bytes = max(_WORTHWHILE_BYTES, len(waiting.data) if waiting else 0)
+                loaded = self._load(data, left, table, least_bytes)
                 read += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
@@ -135,8 +137,8 @@ class McapFile:
                     waiting = None
                 loaded = loaded.in_arrival_order()
                 ready = len(loaded)
-                if groups:  # the next may begin before this one ends
-                    ready = int(np.searchsorted(loaded.log_ns, groups[0][0].start_ns))
+                if left:  # the next may begin before this one ends
+                    ready = int(np.searchsorted(loaded.log_ns, left[0].message_start_time))
                 if ready < len(loaded):
                     waiting = loaded[ready:].packed()
                     if len(waiting.data) > _WAITING_LIMIT_BYTES:
@@ -151,25 +153,20 @@ class McapFile:
             self._warn(f'{read} messages are there where the index lists {expected}')
 
     def _load(
-        self,
-        unpacked: Iterator[list[Unpacked]],
-        groups: deque[list[FileSegment]],
-        wanted: UInt8,
-        least_bytes: int,
+        self, data: Buffer, left: deque[ChunkIndex], wanted: UInt8, least_bytes: int
     ) -> Messages:
-        """Take groups off the queue, one or as many as are worth it."""
-        sound: list[bytes] = []
-        offsets: list[int] = []
+        """Take segments off the queue, as many as are worth it."""
+        sound: list[OpenChunk] = []
         size = 0
-        while groups and (not size or size < least_bytes):
-            for segment, chunk in zip(groups.popleft(), next(unpacked), strict=True):
-                size += 1 + len(chunk.records)
-                if chunk.damage is not None:
-                    self._warn(left_out('chunk', segment.offset, chunk.damage))
-                    continue
-                sound.append(chunk.records)
-                offsets.append(segment.offset)
-        indexed = index_messages(sound, offsets, wanted)
+        while left and size < least_bytes:
+            chunk = opened_segment(data, left.popleft())
+            size += len(chunk.records)
+            if chunk.damage is None:
+                sound.append(chunk)
+            else:
+                self._warn(left_out(Damage(chunk.place.offset, 'chunk', chunk.damage)))
+        places = [chunk.place.offset for chunk in sound]
+        indexed = index_messages([chunk.records for chunk in sound], places, wanted)
         for text in indexed.damage:
             self._warn(text)
         return indexed.messages
@@ -177,9 +174,6 @@ class McapFile:
     def _warn(self, text: str) -> None:
         if text not in self.contents.warnings:  # a file may be read twice
             self.contents.warnings.append(text)
-
-    def _refuse(self, kind: DamageKind, why: str) -> None:
-        raise BagError(f'{str(self.path)!r} cannot be unpacked: {why}')
 
     @contextmanager
     def _data(self) -> Iterator[Buffer]:
@@ -226,57 +220,7 @@ def not_mcap(path: Path, head: bytes) -> str:
     )
 
 
-def _grouped(segments: Sequence[FileSegment]) -> Iterator[list[FileSegment]]:
-    """Put small segments together: what each costs beside its bytes is then small."""
-    group: list[FileSegment] = []
-    size = 0
-    for segment in segments:
-        group.append(segment)
-        size += segment.size
-        if size >= _WORTHWHILE_BYTES or segment is segments[-1]:
-            yield group
-            group, size = [], 0
-
-
-def _unpacked_ahead(data: Buffer, groups: Sequence[list[FileSegment]]) -> Iterator[list[Unpacked]]:
-    """
-    Yield the records of each group in order, unpacked on other cores meanwhile.
-
-    Decompression and checksum leave Python's lock to others.
-    """
-
-    def unpacked(group: list[FileSegment]) -> list[Unpacked]:
-        return [_unpacked(data, segment) for segment in group]
-
-    threads = min(len(os.sched_getaffinity(0)) - 1, _THREADS)
-    if threads < 1 or len(groups) < 2:
-        yield from map(unpacked, groups)
-        return
-    with ThreadPoolExecutor(threads, 'shipdrag-unpack') as pool:
-        ahead: deque[tuple[int, Future[list[Unpacked]]]] = deque()
-        waiting = 0
-        for group in groups:
-            size = sum(segment.size for segment in group)
-            while ahead and waiting + size > _AHEAD_BYTES:
-                done, future = ahead.popleft()
-                waiting -= done
-                yield future.result()
-            ahead.append((size, pool.submit(unpacked, group)))
-            waiting += size
-        while ahead:
-            yield ahead.popleft()[1].result()
-
-
-def _unpacked(data: Buffer, segment: FileSegment) -> Unpacked:
-    if data[segment.offset] == Opcode.CHUNK:
-        start = segment.offset + HEAD.size
-        return unpack(data, Place(Opcode.CHUNK, segment.offset, start, segment.end))
-    records = data[segment.offset : segment.end]
-    release(data, segment.offset, segment.end)
-    return Unpacked(None, records, None, False)
-
-
-def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> IO[bytes] | None:
+def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
     """
     Unpack a file that rosbag2 has packed as a whole, as far as it goes.
 
@@ -284,8 +228,8 @@ def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> I
     ----------
     path
         `.mcap.zstd`; of one that is not packed there is None.
-    damaged
-        Called with what is wrong with it.
+    damages
+        Where is noted what is wrong with it.
 
     Raises
     ------
@@ -302,16 +246,17 @@ def unpacked_file(path: Path, damaged: Callable[[DamageKind, str], object]) -> I
             while not decoder.eof:
                 piece = packed.read(_PIECE_BYTES)
                 if not piece:
-                    damaged(DamageKind.TRUNCATED, 'it is cut off')
+                    damages.add(0, 'file', DamageKind.TRUNCATED, 'it is cut off')
                     break
                 unpacked.write(decoder.decompress(piece))
                 if unpacked.tell() > limit:
-                    damaged(DamageKind.TOO_LARGE, f'it unpacks to more than {limit} bytes')
+                    why = f'it unpacks to more than {limit} bytes'
+                    damages.add(0, 'file', DamageKind.TOO_LARGE, why)
                     break
             unpacked.flush()
     except zstandard.ZstdError as error:
         unpacked.flush()
-        damaged(DamageKind.COMPRESSION, str(error))
+        damages.add(0, 'file', DamageKind.COMPRESSION, str(error))
     return unpacked
 
 
@@ -375,41 +320,33 @@ def locate(path: Path) -> list[BagFiles]:
 
 
 def _rosbag2(path: Path) -> BagFiles:
+    where = str(path / 'metadata.yaml')
     about = _metadata(path / 'metadata.yaml')
     storage = about.get('storage_identifier')
+    packed = str(about.get('compression_format') or '')
+    listed = about.get('relative_file_paths') or []
     if storage != 'mcap':
         how = IMPORT if storage == 'sqlite3' else CONVERT
         raise BagError(f'{str(path)!r} is a bag in {storage!r} storage; {how}')
-    packed = str(about.get('compression_format') or '')
-    mode = str(about.get('compression_mode') or '').lower()
     if packed not in ('', 'zstd'):
         raise BagError(f'{str(path)!r} is compressed with {packed!r}; {CONVERT}')
-    files: list[Path] = []
-    missing: list[str] = []
-    listed = about.get('relative_file_paths') or []
     if not isinstance(listed, list):
         raise BagError(
-            f'{str(path / "metadata.yaml")!r}: relative_file_paths is {listed!r}, expected a list '
+            f'{where!r}: relative_file_paths is {listed!r}, expected a list '
             'of files; remove metadata.yaml to read the .mcap files beside it'
         )
+    files, missing = [], []
     for name in listed:
         # older versions put the directory before the name, or leave the compression out
         file = path / Path(str(name)).name
         found = [each for each in (file, Path(f'{file}.zstd')) if each.is_file()]
-        if found:
-            files.append(found[0])
-        else:
-            missing.append(file.name)
+        files += found[:1]
+        if not found:
+            missing.append(f'{file.name} is listed in metadata.yaml and is not there')
     if not files:
-        raise BagError(
-            f'{str(path / "metadata.yaml")!r} lists no file that is there; restore them'
-        )
-    return BagFiles(
-        str(path),
-        tuple(files),
-        message_compression=packed if mode == 'message' else '',
-        warnings=tuple(f'{name} is listed in metadata.yaml and is not there' for name in missing),
-    )
+        raise BagError(f'{where!r} lists no file that is there; restore them')
+    each = packed if str(about.get('compression_mode') or '').lower() == 'message' else ''
+    return BagFiles(str(path), tuple(files), message_compression=each, warnings=tuple(missing))
 
 
 def _metadata(path: Path) -> dict[str, Any]:

@@ -8,8 +8,9 @@ Every length is checked; a segment is indexed up to its first damage.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,10 @@ _DAMAGE = {
 _U = np.uint64
 
 
-@dataclass(frozen=True)
+_COLUMNS: tuple[Any, ...] = (np.int64, np.int64, np.uint16, np.int64, np.int64)
+
+
+@dataclass(slots=True)
 class Messages:
     """
     Messages in one buffer.
@@ -64,15 +68,13 @@ class Messages:
     def __len__(self) -> int:
         return len(self.log_ns)
 
+    @property
+    def columns(self) -> tuple[NDArray[Any], ...]:
+        """All but the buffer."""
+        return self.log_ns, self.segment, self.channel, self.start, self.end
+
     def __getitem__(self, part: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Messages:
-        return Messages(
-            self.data,
-            self.log_ns[part],
-            self.segment[part],
-            self.channel[part],
-            self.start[part],
-            self.end[part],
-        )
+        return Messages(self.data, *(column[part] for column in self.columns))
 
     def payload(self, number: int) -> bytes:
         """
@@ -80,28 +82,32 @@ class Messages:
         """
         return self.data[self.start[number] : self.end[number]].tobytes()
 
+    def holding(self, payloads: Sequence[bytes | memoryview]) -> Messages:
+        """
+        Return the same with these payloads, in a buffer that holds nothing else.
+        """
+        bounds = _bounds(payloads)
+        data = np.frombuffer(b''.join(payloads), np.uint8)
+        return replace(self, data=data, start=bounds[:-1], end=bounds[1:])
+
     def packed(self) -> Messages:
         """
         Return the same in a buffer that holds nothing else.
         """
-        ends = np.cumsum(self.end - self.start)
-        data = np.empty(int(ends[-1]) if len(self) else 0, np.uint8)
-        _pack(self.data, self.start, self.end, data)
-        starts = ends - (self.end - self.start)
-        return Messages(data, self.log_ns, self.segment, self.channel, starts, ends)
+        data = self.data.data
+        spans = zip(self.start.tolist(), self.end.tolist(), strict=True)
+        return self.holding([data[start:end] for start, end in spans])
 
     def followed_by(self, other: Messages) -> Messages:
         """
         Return these and others in one buffer.
         """
-        joined = [
-            np.concatenate((getattr(self, field.name), getattr(other, field.name)))
-            for field in fields(self)
-        ]
-        start, end = joined[-2:]
-        start[len(self) :] += len(self.data)
-        end[len(self) :] += len(self.data)
-        return Messages(*joined)
+        data = np.concatenate((self.data, other.data))
+        both = zip(self.columns, other.columns, strict=True)
+        joined = [np.concatenate(pair) for pair in both]
+        for places in joined[-2:]:
+            places[len(self) :] += len(self.data)
+        return Messages(data, *joined)
 
     def in_arrival_order(self) -> Messages:
         """
@@ -113,6 +119,11 @@ class Messages:
         if not behind.any() and (self.segment[1:] >= self.segment[:-1]).all():
             return self
         return self[np.lexsort((self.segment, self.log_ns))]
+
+
+def _bounds(pieces: Sequence[bytes | memoryview]) -> Int64:
+    """Return where pieces lie one behind the other."""
+    return np.fromiter(accumulate(map(len, pieces), initial=0), np.int64)
 
 
 class Indexed(NamedTuple):
@@ -152,44 +163,24 @@ def index_messages(
         Not 0 at the numbers of the channels to find.
     """
     data = np.frombuffer(segments[0] if len(segments) == 1 else b''.join(segments), np.uint8)
-    bounds = np.cumsum([0, *map(len, segments)], dtype=np.int64)
     # of these only what is filled takes memory
     most = len(data) // (HEAD_BYTES + MESSAGE_HEAD_BYTES) + 1
-    found = Messages(
-        data,
-        log_ns=np.empty(most, np.int64),
-        segment=np.empty(most, np.int64),
-        channel=np.empty(most, np.uint16),
-        start=np.empty(most, np.int64),
-        end=np.empty(most, np.int64),
-    )
+    found = Messages(data, *(np.empty(most, kind) for kind in _COLUMNS))
     others = np.empty(len(data) // HEAD_BYTES + 1, np.int64)
-    damage = np.empty((len(segments), 2), np.int64)
-    n, m = _index(
-        data,
-        bounds,
-        np.array(offsets, np.int64),
-        wanted,
-        found.log_ns,
-        found.segment,
-        found.channel,
-        found.start,
-        found.end,
-        others,
-        damage,
-    )
+    damage = np.empty((len(segments), 3), np.int64)
+    places = np.array(offsets, np.int64)
+    n, m, damaged = _index(data, _bounds(segments), places, wanted, others, damage, *found.columns)
     notes = [
-        f'{_DAMAGE[kind]} at byte {place} of the chunk at byte {offset}: '
+        f'{_DAMAGE[kind]} at byte {at} of the chunk at byte {offset}: '
         'only what lies before it is used'
-        for (kind, place), offset in zip(damage.tolist(), offsets, strict=True)
-        if kind != _WHOLE
+        for kind, at, offset in damage[:damaged].tolist()
     ]
     return Indexed(found[:n], others[:m], notes)
 
 
 @compiled(
-    f'UniTuple(i8, 2)({OCTETS}, {PLACES}, {PLACES}, {OCTETS}, '
-    'i8[::1], i8[::1], u2[::1], i8[::1], i8[::1], i8[::1], i8[:, ::1])',
+    f'UniTuple(i8, 3)({OCTETS}, {PLACES}, {PLACES}, {OCTETS}, '
+    'i8[::1], i8[:, ::1], i8[::1], i8[::1], u2[::1], i8[::1], i8[::1])',
     uncounted=True,
 )
 def _index(
@@ -197,19 +188,17 @@ def _index(
     bounds: Int64,
     offsets: Int64,
     wanted: UInt8,
+    others: Int64,
+    damage: Int64,
     log_ns: Int64,
     segment: Int64,
     channel: NDArray[np.uint16],
     start: Int64,
     end: Int64,
-    others: Int64,
-    damage: Int64,
-) -> tuple[int, int]:
-    n = 0
-    m = 0
+) -> tuple[int, int, int]:
+    n = m = damaged = 0
     for s in range(len(offsets)):
         at, limit = bounds[s], bounds[s + 1]
-        damage[s, 0] = _WHOLE
         while at < limit:
             content = at + HEAD_BYTES
             kind = _WHOLE
@@ -241,17 +230,10 @@ def _index(
                         end[n] = content + length
                         n += 1
             if kind != _WHOLE:
-                damage[s, 0] = kind
-                damage[s, 1] = at - bounds[s]
+                damage[damaged, 0] = kind
+                damage[damaged, 1] = at - bounds[s]
+                damage[damaged, 2] = offsets[s]
+                damaged += 1
                 break
             at = content + length
-    return n, m
-
-
-@compiled(f'void({OCTETS}, {PLACES}, {PLACES}, u1[::1])', uncounted=True)
-def _pack(data: UInt8, start: Int64, end: Int64, packed: UInt8) -> None:
-    at = 0
-    for i in range(len(start)):
-        for place in range(start[i], end[i]):
-            packed[at] = data[_U(place)]
-            at += 1
+    return n, m, damaged

@@ -3,7 +3,9 @@
 The records of an MCAP file that may be cut off or damaged anywhere, and what is wrong.
 
 A walk never ends at a damage: what does not fit is a place with a `DamageKind`, and
-the walk goes on at the next record. Nothing is unpacked beyond a limit.
+the walk goes on at the next record. A scan is a walk over a file that opens its chunks and
+reads its records: what reads a bag without an index, checks it or saves it begins there.
+Nothing is unpacked beyond a limit.
 """
 
 from __future__ import annotations
@@ -20,12 +22,16 @@ from mmap import MADV_DONTNEED, mmap
 from typing import Any, NamedTuple
 
 import lz4.frame
+import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, Footer
+from mcap.records import Attachment, Chunk, Footer
 from mcap.stream_reader import StreamReader
+
+from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Messages, index_messages
+from shipdrag_ros.samples import Int64
 
 _LISTED = 10_000  # of a file that is damaged everywhere; the others are counted
 
@@ -156,12 +162,12 @@ _POSSIBLE_BYTES = 1 << 32
 _SOUGHT = re.compile(rb'[\x01-\x0f](?=.{4}\0{4})', re.DOTALL)
 _CHUNK_HEAD = struct.Struct('<QQQI')  # first and last log time, unpacked bytes, their checksum
 _COMPRESSIONS = (b'\0\0\0\0', b'\4\0\0\0zstd', b'\3\0\0\0lz4')
-_PIECE_BYTES = 256  # of a damaged chunk; so that little is lost at the damage
 _CRC_BYTES = 1 << 20
 _RELEASE_BYTES = 1 << 24
+_PIECE_BYTES = 256  # of a damaged chunk; so that little is lost at the damage
+_UNPACKING_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
 READ_ERRORS = (McapError, ValueError, struct.error, OverflowError, MemoryError)
 """What `mcap` raises on damaged records."""
-_UNPACKING_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
 
 
 class Place(NamedTuple):
@@ -183,6 +189,11 @@ class Place(NamedTuple):
         """Whether its content may be whole."""
         inferred = (None, DamageKind.OPCODE, DamageKind.LENGTH)
         return self.start > self.offset and self.damage in inferred and self.opcode in KINDS
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """Where the record begins, and how long it is [bytes]."""
+        return self.offset, self.end - self.offset
 
     @property
     def name(self) -> str:
@@ -401,26 +412,171 @@ def _is_chunk(data: Buffer, start: int) -> bool:
     return data[name : name + 8].startswith(_COMPRESSIONS)
 
 
-class Unpacked(NamedTuple):
+class FoundRecord(NamedTuple):
     """
-    What came out of a chunk.
+    What lies at a place of a file.
 
     Attributes
     ----------
+    place
+        Where.
+    item
+        A chunk or a record of `mcap.records`; None of a message and its index, which are
+        not read here, and of what cannot be read.
+    sound
+        Whether it is beyond doubt: neither it nor its bounds are damaged, or its checksum
+        vouches for it.
+    """
+
+    place: Place
+    item: Any
+    sound: bool
+
+
+@dataclass
+class OpenChunk:
+    """
+    A chunk and what came out of it.
+
+    Attributes
+    ----------
+    place
+        Of the chunk in the file.
     chunk
-        As it stands in the file, packed; None where it cannot be read.
+        As it stands there, packed; None where it cannot be read.
     records
         Unpacked, as far as it goes.
     damage
         What is wrong with it.
     verified
         Whether its own checksum vouches for the records.
+    ended
+        Whether the packed bytes end as they should; else other readers refuse it.
+    messages
+        Those in `records` once it is indexed, up to the first damage in them.
+    others
+        Places in `records` that hold something else, up to the same.
+    notes
+        A sentence where the records are not whole.
     """
 
-    chunk: Chunk | None
-    records: bytes
-    damage: DamageKind | None
-    verified: bool
+    place: Place
+    chunk: Chunk | None = None
+    records: bytes = b''
+    damage: DamageKind | None = None
+    verified: bool = False
+    ended: bool = True
+    messages: Messages = field(init=False)
+    others: tuple[Place, ...] = field(init=False)
+    notes: list[str] = field(init=False)
+
+    def index(self) -> None:
+        """
+        Find what is in the records.
+        """
+        self.messages, others, self.notes = index_messages(
+            [self.records], [self.place.offset], EVERY_CHANNEL
+        )
+        self.others = tuple(place_at(self.records, at) for at in others.tolist())
+
+    @property
+    def times_ns(self) -> tuple[int, int] | None:
+        """First and last log time [ns]; None without messages."""
+        times_ns = self.messages.log_ns
+        return (int(times_ns.min()), int(times_ns.max())) if len(times_ns) else None
+
+    def entries(self) -> dict[int, Int64]:
+        """
+        Return what an index lists: log time [ns] and offset, (n, 2), by channel.
+        """
+        channel = self.messages.channel
+        offsets = self.messages.start - (HEAD.size + MESSAGE_HEAD.size)
+        listed = np.column_stack((self.messages.log_ns, offsets))
+        return {number: listed[channel == number] for number in np.unique(channel).tolist()}
+
+    @property
+    def whole(self) -> bool:
+        """Whether the records are what may stand in a chunk, up to their end."""
+        return not self.notes and all(each.opcode in IN_CHUNK for each in self.others)
+
+    def scan(self, damages: DamageList, *, sound: bool) -> Iterator[FoundRecord]:
+        """
+        Yield what lies in the records; where they are whole, all but the messages.
+
+        Parameters
+        ----------
+        damages
+            Where is noted what is damaged.
+        sound
+            Whether the chunk is; else what is damaged in it is the doing of its own damage.
+        """
+        data, offset, whole = self.records, self.place.offset, sound and self.whole
+        for place in self.others if whole else walk(data, 0, len(data), IN_CHUNK):
+            if place.damage is not None and sound:
+                where = f'at byte {place.offset} of the unpacked chunk'
+                damages.add(offset, place.name, place.damage, where)
+            item = None
+            if place.readable and place.opcode != Opcode.MESSAGE:
+                item, _ = read_noting(data, place, offset, damages)
+            yield FoundRecord(place, item, sound and place.damage is None)
+
+
+def scan(data: Buffer, damages: DamageList, *, partly: bool = False) -> Iterator[FoundRecord]:
+    """
+    Yield what lies in a file, without a gap.
+
+    Parameters
+    ----------
+    data
+        The file.
+    damages
+        Where is noted what is damaged.
+    partly
+        Whether damaged chunks are unpacked as far as can be.
+    """
+    begin = len(MAGIC) if data[: len(MAGIC)] == MAGIC else 0
+    if not begin:
+        damages.add(0, 'magic', DamageKind.MISSING, f'{data[:8]!r}')
+    chunked = False
+    for place in walk(data, begin, len(data)):
+        offset, sound, item = place.offset, place.damage is None, None
+        if place.damage is not None:
+            damages.add(offset, place.name, place.damage)
+        if place.opcode == Opcode.CHUNK and place.start > offset:
+            item, chunked = unpack(data, place, partly=partly), True
+            item.index()
+            # of a chunk that cannot be read it matters only to those who unpack what is left of it
+            if item.damage not in (None, place.damage) and (partly or place.readable):
+                damages.add(offset, place.name, item.damage)
+            sound = item.verified or (sound and item.damage is None)
+        elif place.opcode == Opcode.MESSAGE:
+            sound = sound and not chunked  # between chunks it may be part of a damaged one
+        elif place.readable and place.opcode != Opcode.MESSAGE_INDEX:
+            item, agrees = read_noting(data, place, offset, damages)
+            sound = sound and agrees
+        yield FoundRecord(place, item, sound)
+
+
+def read_noting(data: Buffer, place: Place, offset: int, damages: DamageList) -> tuple[Any, bool]:
+    """
+    Read a record and note what is wrong with it; return it and whether nothing is.
+
+    Parameters
+    ----------
+    data, place
+        Where it lies, in a file or a chunk.
+    offset
+        What is noted as its place in the file [bytes].
+    damages
+        Where it is noted.
+    """
+    record = read(data, place)
+    if record is None:
+        damages.add(offset, place.name, DamageKind.CONTENT)
+    elif isinstance(record, Attachment) and not attachment_agrees(data, place):
+        damages.add(offset, place.name, DamageKind.CHECKSUM, repr(record.name))
+        return record, False
+    return record, record is not None
 
 
 class _OfThread(threading.local):
@@ -433,7 +589,7 @@ class _OfThread(threading.local):
 _of_thread = _OfThread()
 
 
-def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
+def unpack(data: Buffer, place: Place, *, partly: bool = False) -> OpenChunk:
     """
     Unpack a chunk that is whole; of another one nothing that can be relied on.
 
@@ -444,28 +600,30 @@ def unpack(data: Buffer, place: Place, *, partly: bool = False) -> Unpacked:
         As much of it as can be, up to `CHUNK_LIMIT_BYTES`.
     """
     if place.start + _CHUNK_HEAD.size + 12 > place.end or not _is_chunk(data, place.start):
-        return Unpacked(None, b'', DamageKind.CONTENT, False)
+        return OpenChunk(place, damage=DamageKind.CONTENT)
     chunk, cut_off = _chunk_at(data, place.start, place.end)
     release(data, place.offset, place.end)
-    records, damage = b'', None
-    try:
-        if chunk.uncompressed_size > CHUNK_LIMIT_BYTES:
-            damage = DamageKind.TOO_LARGE
-        else:
-            records = _decompress(chunk)
-            damage = None if len(records) == chunk.uncompressed_size else DamageKind.SIZE
-    except _UNPACKING_ERRORS:
-        damage = DamageKind.COMPRESSION
-    if partly and damage is not None:
-        records = _decompress_partly(chunk)
-    if len(records) > CHUNK_LIMIT_BYTES:
-        return Unpacked(chunk, b'', DamageKind.TOO_LARGE, False)
-    verified = chunk.uncompressed_crc != 0 and crc32(records) == chunk.uncompressed_crc
-    if cut_off and damage in (None, DamageKind.COMPRESSION):
-        damage = DamageKind.TRUNCATED
-    if chunk.uncompressed_crc and not verified:
-        damage = damage or DamageKind.CHECKSUM
-    return Unpacked(chunk, records, damage, verified)
+    found = OpenChunk(place, chunk)
+    if chunk.uncompressed_size > CHUNK_LIMIT_BYTES:
+        found.damage = DamageKind.TOO_LARGE
+    else:
+        try:
+            found.records, found.ended = _decompress(chunk)
+            if len(found.records) != chunk.uncompressed_size:
+                found.damage = DamageKind.SIZE
+        except _UNPACKING_ERRORS:
+            found.damage = DamageKind.COMPRESSION
+    if partly and found.damage is not None:
+        found.records = _decompress_partly(chunk)
+    if len(found.records) > CHUNK_LIMIT_BYTES:
+        return OpenChunk(place, chunk, damage=DamageKind.TOO_LARGE)
+    stated = chunk.uncompressed_crc
+    found.verified = stated != 0 and crc32(found.records) == stated
+    if cut_off and found.damage in (None, DamageKind.COMPRESSION):
+        found.damage = DamageKind.TRUNCATED
+    if stated and not found.verified:
+        found.damage = found.damage or DamageKind.CHECKSUM
+    return found
 
 
 def _chunk_at(data: Buffer, start: int, end: int) -> tuple[Chunk, bool]:
@@ -494,27 +652,16 @@ def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
     return _of_thread.zstd.decompress(packed, max_output_size=limit_bytes)
 
 
-def has_end(chunk: Chunk) -> bool:
-    """
-    Say whether the packed bytes of a chunk end as they should; else other readers refuse it.
-    """
-    if chunk.compression != 'lz4':  # of the others it is an error to unpack such
-        return True
-    decoder = lz4.frame.LZ4FrameDecompressor()
-    with suppress(*_UNPACKING_ERRORS):
-        decoder.decompress(chunk.data, max_length=chunk.uncompressed_size + 1)
-    return bool(decoder.eof)
-
-
-def _decompress(chunk: Chunk) -> bytes:
-    size = chunk.uncompressed_size
+def _decompress(chunk: Chunk) -> tuple[bytes, bool]:
+    """Return what is in a chunk, and whether its packed bytes end as they should."""
     if chunk.compression == 'zstd':
-        return unpack_zstd(chunk.data, size)
+        return unpack_zstd(chunk.data, chunk.uncompressed_size), True
     if chunk.compression == 'lz4':
         # one byte more than stated, so that a larger one is not cut off in silence
         decoder = lz4.frame.LZ4FrameDecompressor()
-        return bytes(decoder.decompress(chunk.data, max_length=size + 1))
-    return bytes(chunk.data)
+        records = decoder.decompress(chunk.data, max_length=chunk.uncompressed_size + 1)
+        return bytes(records), bool(decoder.eof)
+    return bytes(chunk.data), True
 
 
 def _decompress_partly(chunk: Chunk) -> bytes:

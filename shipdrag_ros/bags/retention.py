@@ -31,8 +31,12 @@ from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
 
 DAY_S = 86_400.0
 SHARE = 0.5  # of the disk, where nobody has said how much
-_PART = re.compile(r'(coastdown_\d{8}T\d{6}Z)_\d{3,}(_\d+)?\.mcap')
-_LEFT = re.compile(rf'\.?{_PART.pattern}{re.escape(SUFFIX)}(\.part)?')  # of a compaction
+_LEFT = re.escape(SUFFIX)
+# a part, or what a compaction left of it
+_NAME = re.compile(
+    rf'(\.(?=.*{_LEFT}))?(?P<recording>coastdown_\d{{8}}T\d{{6}}Z)_\d{{3,}}(_\d+)?\.mcap'
+    rf'(?P<left>{_LEFT}(\.part)?)?'
+)
 _BLOCK_BYTES = 4096  # what even an empty file costs
 
 
@@ -95,6 +99,8 @@ class _BagPart:
     path: Path
     size_bytes: int
     changed_s: float
+    recording: str
+    left: bool  # by a compaction
 
 
 class Retention:
@@ -177,30 +183,28 @@ class Retention:
     def _parts(self) -> list[_BagPart]:
         """Return what compactions left, and the parts in the order of their recording."""
         parts = []
-        paths: list[Path] = []
-        with suppress(FileNotFoundError):  # there is no recording yet
-            paths = sorted(self._directory.iterdir(), key=lambda path: (not _is_left(path), path))
-        for path in paths:
+        for path in self._directory.iterdir() if self._directory.exists() else ():
+            named = _NAME.fullmatch(path.name)
             with suppress(FileNotFoundError):  # somebody has just removed it
                 about = path.lstat()
-                known = _PART.fullmatch(path.name) or _is_left(path)
-                if known and stat.S_ISREG(about.st_mode):
-                    size = max(about.st_size, _BLOCK_BYTES)
-                    parts.append(_BagPart(path, size, about.st_mtime))
-        return parts
+                if named and stat.S_ISREG(about.st_mode):
+                    size, left = max(about.st_size, _BLOCK_BYTES), named['left'] is not None
+                    part = _BagPart(path, size, about.st_mtime, named['recording'], left)
+                    parts.append(part)
+        return sorted(parts, key=lambda part: (not part.left, part.path))
 
     def _worth_keeping(self, parts: list[_BagPart]) -> set[_BagPart]:
         self._holds = {part: self._holds[part] for part in parts if part in self._holds}
         worth = set()
         before: _BagPart | None = None
         for part in parts:
-            if _is_left(part.path):
+            if part.left:
                 continue
             if part not in self._holds and not _is_written(part.path):
                 self._holds[part] = self._judged(part.path)
             if self._holds.get(part, True):
                 worth.add(part)
-                if before is not None and _recording(before.path) == _recording(part.path):
+                if before is not None and before.recording == part.recording:
                     worth.add(before)
             before = part
         return worth
@@ -235,10 +239,6 @@ def _no_link(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
 
 
-def _is_left(path: Path) -> bool:
-    return _LEFT.fullmatch(path.name) is not None
-
-
 def _is_written(path: Path) -> bool:
     """Say whether a process still writes a file, which is locked then."""
     with suppress(OSError), open(path, 'rb', opener=_no_link) as file:
@@ -248,11 +248,6 @@ def _is_written(path: Path) -> bool:
         except BlockingIOError:
             return True
     return False
-
-
-def _recording(path: Path) -> str:
-    found = _PART.fullmatch(path.name)
-    return found[1] if found else path.name
 
 
 @contextmanager
@@ -284,7 +279,7 @@ def _holds_coastdown(path: Path) -> bool:
             return True
         contents = contents_of(data)
     return any(
-        channel.topic.rpartition('/')[2] in (RESISTANCE.name, RESISTANCE_CURVE.name)
+        topic.rpartition('/')[2] in (RESISTANCE.name, RESISTANCE_CURVE.name)
         and contents.counts[number] > 0
-        for number, channel in contents.channels.items()
+        for number, (topic, _) in contents.channels.items()
     )

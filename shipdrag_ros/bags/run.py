@@ -9,7 +9,6 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +16,6 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags.contents import FileChannel
 from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
@@ -25,7 +23,6 @@ from shipdrag_ros.bags.writer import METADATA
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.messages import (
     OUTPUT_TOPICS,
-    TOPICS,
     EventKind,
     MalformedMessage,
     OutputMessage,
@@ -36,7 +33,7 @@ from shipdrag_ros.messages import (
 )
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import FURTHER, Block
+from shipdrag_ros.samples import Block
 
 WindowSpan = tuple[float, float]
 
@@ -99,94 +96,6 @@ def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[Mcap
         warnings=bag.warnings + warnings,
     )
     return joined, ordered
-
-
-@dataclass(frozen=True)
-class BagInfo:
-    """
-    What is in a bag.
-
-    Attributes
-    ----------
-    bag
-        As the user gave it.
-    files
-        Their paths.
-    size_bytes
-        Of all files.
-    start_ns, end_ns
-        First and last time of arrival [ns]; None without messages.
-    duration_s
-        From the first to the last [s]; 0 without messages.
-    messages
-        In all topics.
-    compression
-        Of the chunks: `none`, `lz4`, `zstd`, joined by commas.
-    indexed
-        Whether all files have a sound index.
-    topics
-        By name.
-    missing_inputs
-        Those that it does not hold.
-    attachments
-        Size by name [bytes].
-    software
-        Version of this package that recorded it, None if it was another tool.
-    node
-        Full name of the node whose outputs it holds, None without any.
-    warnings
-        What is wrong with it.
-    """
-
-    bag: str
-    files: tuple[str, ...]
-    size_bytes: int
-    start_ns: int | None
-    end_ns: int | None
-    duration_s: float
-    messages: int
-    compression: str
-    indexed: bool
-    topics: tuple[TopicInfo, ...]
-    missing_inputs: tuple[str, ...]
-    attachments: dict[str, int]
-    software: str | None
-    node: str | None
-    warnings: tuple[str, ...]
-
-
-def info(run: Run) -> BagInfo:
-    """
-    Say what is in a run; nothing but its index is read where it has one, and of a part it.
-    """
-    start_ns, end_ns = run.span_ns or (None, None)
-    topics = run.topics_inside()
-    found = {topic.input for topic in topics}
-    compressions = {kind for part in run.parts for kind in part.contents.compressions}
-    if run.paths != tuple(part.path for part in run.parts):
-        compressions = set()  # those of a bag made for the moment, of a log
-    return BagInfo(
-        bag=run.name,
-        files=tuple(map(str, run.paths)),
-        size_bytes=sum(path.stat().st_size for path in run.paths),
-        start_ns=start_ns,
-        end_ns=end_ns,
-        duration_s=_duration_s(run.span_ns),
-        messages=sum(topic.messages for topic in topics),
-        compression=', '.join(sorted(kind or 'none' for kind in compressions)) or 'none',
-        indexed=all(part.contents.indexed for part in run.parts),
-        topics=topics,
-        missing_inputs=tuple(name for name in TOPICS if name not in found and name not in FURTHER),
-        attachments={name: len(text.encode()) for name, text in run.attachments.items()},
-        software=run.software,
-        node=run.node,
-        warnings=run.warnings,
-    )
-
-
-def _duration_s(span_ns: tuple[int, int] | None) -> float:
-    first, last = span_ns or (0, 0)
-    return (last - first) * 1e-9
 
 
 # messages decoded at once: a chunk as writers make them, and of a giant one a part
@@ -280,8 +189,8 @@ class Run:
         self._warnings = list(bag.warnings)
         counts: Counter[tuple[str, str]] = Counter()
         for part in parts:
-            for number, channel in part.contents.channels.items():
-                counts[_key(channel)] += part.contents.counts[number]
+            for number, key in part.contents.channels.items():
+                counts[key] += part.contents.counts[number]
         try:
             self._matched = match_inputs(counts, remap=remap, own=_is_own(parts))
         except BagError as error:
@@ -309,6 +218,27 @@ class Run:
             max(first, min(start for start, _ in spans)),
             min(last, max(end for _, end in spans)),
         )
+
+    @property
+    def duration_s(self) -> float:
+        """From the first arrival to the last [s]; 0 without messages."""
+        first, last = self.span_ns or (0, 0)
+        return (last - first) * 1e-9
+
+    @property
+    def indexed(self) -> bool:
+        """Whether all files have a sound index."""
+        return all(part.contents.indexed for part in self.parts)
+
+    @property
+    def compression(self) -> str:
+        """Of the chunks: `none`, `lz4`, `zstd`, joined by commas; `none` of a log."""
+        kinds = {
+            each.compression or 'none' for part in self.parts for each in part.contents.segments
+        }
+        if self.paths != tuple(part.path for part in self.parts):
+            return 'none'  # they are those of a bag made for the moment
+        return ', '.join(sorted(kinds)) or 'none'
 
     @property
     def software(self) -> str | None:
@@ -425,16 +355,16 @@ class Run:
         for part in self.parts:
             place_of = np.zeros(CHANNELS, np.uint16)
             wanted = []
-            for number, channel in part.contents.channels.items():
-                if _key(channel) in keys:
-                    place_of[number] = keys.index(_key(channel))
+            for number, key in part.contents.channels.items():
+                if key in keys:
+                    place_of[number] = keys.index(key)
                     wanted.append(number)
             for batch in part.messages(wanted, start_ns=start_ns, end_ns=end_ns):
                 found = replace(batch, channel=place_of[batch.channel])
                 yield _unpacked(found) if self._message_compression else found
 
     def _topic(self, key: tuple[str, str], messages: int) -> TopicInfo:
-        source, duration_s = self._matched.heard.get(key), _duration_s(self.span_ns)
+        source, duration_s = self._matched.heard.get(key), self.duration_s
         return TopicInfo(
             *key,
             messages,
@@ -543,14 +473,6 @@ def _is_own(parts: Sequence[McapFile]) -> bool:
     return any('parameters.yaml' in part.contents.attachments for part in parts)
 
 
-def _key(channel: FileChannel) -> tuple[str, str]:
-    """Return topic and type; a type in another encoding is another type."""
-    topic = channel.topic if channel.topic.startswith('/') else f'/{channel.topic}'
-    if channel.encoding == 'cdr':
-        return topic, channel.type
-    return topic, f'{channel.type} ({channel.encoding})'
-
-
 def _mark(payload: bytes) -> Mark | None:
     try:
         note = read_event(payload)
@@ -567,10 +489,7 @@ def _mark(payload: bytes) -> Mark | None:
 
 def _unpacked(messages: Messages) -> Messages:
     """Unpack each message for itself; one that cannot be is empty, and so malformed."""
-    payloads = [_unpack(messages.payload(number)) for number in range(len(messages))]
-    ends = np.fromiter(accumulate(map(len, payloads), initial=0), np.int64)
-    data = np.frombuffer(b''.join(payloads), np.uint8)
-    return replace(messages, data=data, start=ends[:-1], end=ends[1:])
+    return messages.holding([_unpack(messages.payload(n)) for n in range(len(messages))])
 
 
 def _unpack(payload: bytes) -> bytes:

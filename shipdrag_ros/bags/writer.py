@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum
@@ -25,24 +24,12 @@ import lz4.frame
 import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
+from mcap import records as mcap
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
 
 from shipdrag_ros import __version__
+from shipdrag_ros.bags.contents import DECLARED, INDEXES, FileSummary, key_of
 from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError, disk_errors
@@ -69,12 +56,14 @@ _LATCHED_QOS = """\
 _LATCHED = {(topic.name, topic.type) for topic in OUTPUT_TOPICS if topic.latched}
 
 
-def attachment(name: str, text: str) -> Attachment:
+def attachment(name: str, text: str) -> mcap.Attachment:
     """
     Return the record of an attached text.
     """
     kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
-    return Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
+    return mcap.Attachment(
+        create_time=0, log_time=0, name=name, media_type=kind, data=text.encode()
+    )
 
 
 def as_bytes(*records: Any) -> bytes:
@@ -142,61 +131,6 @@ def content_of(number: int, message: EncodedMessage) -> bytes:
     return MESSAGE_HEAD.pack(number, 0, message.log_ns, publish_ns) + message.payload
 
 
-def index_of(
-    record: Attachment | Metadata, at: int, length: int
-) -> AttachmentIndex | MetadataIndex:
-    """
-    Return what an index says of a record at a place [bytes].
-    """
-    if isinstance(record, Metadata):
-        return MetadataIndex(at, length, record.name)
-    times, about = (record.log_time, record.create_time), (record.name, record.media_type)
-    return AttachmentIndex(at, length, *times, len(record.data), *about)
-
-
-def chunk_index(chunk: Chunk, at: int, length: int) -> ChunkIndex:
-    """
-    Return what an index says of a chunk at a place [bytes], but for its message indexes.
-    """
-    return ChunkIndex(
-        chunk_length=length,
-        chunk_start_offset=at,
-        compression=chunk.compression,
-        compressed_size=len(chunk.data),
-        message_end_time=chunk.message_end_time,
-        message_index_length=0,
-        message_index_offsets={},
-        message_start_time=chunk.message_start_time,
-        uncompressed_size=chunk.uncompressed_size,
-    )
-
-
-def statistics(kinds: Counter[type], counts: Counter[int], times_ns: Sequence[int]) -> Statistics:
-    """
-    Return what a summary says of a file.
-
-    Parameters
-    ----------
-    kinds
-        Declarations and indexes by their type.
-    counts
-        Messages by channel.
-    times_ns
-        Log times, the first and the last among them [ns].
-    """
-    return Statistics(
-        attachment_count=kinds[AttachmentIndex],
-        channel_count=kinds[Channel],
-        channel_message_counts=dict(counts),
-        chunk_count=kinds[ChunkIndex],
-        message_count=counts.total(),
-        message_end_time=max(times_ns, default=0),
-        message_start_time=min(times_ns, default=0),
-        metadata_count=kinds[MetadataIndex],
-        schema_count=kinds[Schema],
-    )
-
-
 class NameTakenError(BagError):
     """A file of this name is there already."""
 
@@ -248,9 +182,8 @@ class RecordWriter:
         self._chunk = bytearray()
         self._times = 0, 0  # first and last of the chunk [ns]
         self._entries: dict[int, list[int]] = {}  # of its index: time and offset, by channel
-        self._declared: dict[bytes, Schema | Channel] = {}
-        self._indexes: list[ChunkIndex | AttachmentIndex | MetadataIndex] = []
-        self._counts: Counter[int] = Counter()
+        self._numbers: dict[bytes, int] = {}
+        self._summary = FileSummary()
         self._unpacked = self.size_bytes = 0
         try:
             # of one that grows, what could not be written must not be tried again on closing
@@ -265,9 +198,9 @@ class RecordWriter:
                 f'{str(path)!r} cannot be made: {error.strerror}; '
                 'give a name in a folder that is there and may be written'
             ) from error
-        self._write(MAGIC + as_bytes(Header(profile, LIBRARY)))
+        self._write(MAGIC + as_bytes(mcap.Header(profile, LIBRARY)))
 
-    def declare(self, channel: Channel, schema: Schema | None) -> int:
+    def declare(self, channel: mcap.Channel, schema: mcap.Schema | None) -> int:
         """
         Write a channel and its schema, unless they are there; return its number.
 
@@ -279,23 +212,25 @@ class RecordWriter:
         number = 0 if schema is None else self._number(schema)
         return self._number(replace(channel, schema_id=number))
 
-    def says(self, record: Schema | Channel) -> bool:
+    def says(self, record: mcap.Schema | mcap.Channel) -> bool:
         """
         Say whether exactly this was declared, with its number.
         """
-        return self._declared.get(as_bytes(replace(record, id=0))) == record
+        return bool(self._summary.records.get(key_of(record)) == record)
 
-    def _number(self, record: Schema | Channel) -> int:
+    def _number(self, record: mcap.Schema | mcap.Channel) -> int:
         """Keep the number of a record where it is free, and give it another where not."""
         key = as_bytes(replace(record, id=0))
-        if key not in self._declared:
-            taken = {it.id for it in self._declared.values() if type(it) is type(record)}
-            if record.id in {0, *taken}:
-                record = replace(record, id=next(n for n in range(1, CHANNELS) if n not in taken))
-            self._declared[key] = record
+        if key not in self._numbers:
+            taken = self._summary.records
+            if not record.id or key_of(record) in taken:
+                free = (n for n in range(1, CHANNELS) if (type(record), n) not in taken)
+                record = replace(record, id=next(free))
+            self._summary.add(record)
+            self._numbers[key] = record.id
             # outside of chunks: any chunk may be damaged and the others sound
-            self._write(as_bytes(self._declared[key]))
-        return int(self._declared[key].id)
+            self._write(as_bytes(record))
+        return self._numbers[key]
 
     def add_content(self, number: int, content: bytes, *, log_ns: int) -> None:
         """
@@ -321,12 +256,12 @@ class RecordWriter:
         if len(chunk) >= self._room:
             self._end_chunk()
 
-    def add(self, record: Attachment | Metadata) -> None:
+    def add(self, record: mcap.Attachment | mcap.Metadata) -> None:
         """
         Write an attachment or metadata, before the first message if it is to survive a crash.
         """
         written = as_bytes(record)
-        self._indexes.append(index_of(record, self.size_bytes, len(written)))
+        self._summary.add_indexed(record, self.size_bytes, len(written))
         self._write(written)
 
     def close(self) -> None:
@@ -342,16 +277,12 @@ class RecordWriter:
             return
         try:
             self._end_chunk()
-            self._write(as_bytes(DataEnd(0)))
-            listed = *self._declared.values(), *self._indexes
-            kinds = Counter(map(type, listed))
-            chunks = [each for each in self._indexes if isinstance(each, ChunkIndex)]
-            times_ns = [each.message_start_time for each in chunks]
-            times_ns += [each.message_end_time for each in chunks]
-            summary = as_bytes(*listed, statistics(kinds, self._counts, times_ns))
+            self._write(as_bytes(mcap.DataEnd(0)))
+            listed = self._summary.of(*DECLARED) + self._summary.of(*INDEXES)
+            summary = as_bytes(*listed, self._summary.statistics())
             start = self.size_bytes
             # its checksum covers the footer too, up to itself
-            covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
+            covered = summary + as_bytes(mcap.Footer(start, 0, 0))[:-4]
             self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
             with disk_errors(self.path, 'written'):
                 self._file.flush()
@@ -364,7 +295,7 @@ class RecordWriter:
         if not self._chunk:
             return
         records, (first_ns, last_ns) = bytes(self._chunk), self._times
-        chunk = Chunk(
+        chunk = mcap.Chunk(
             compression=self._compression.value,
             data=_PACKERS[self._compression](records),
             message_end_time=last_ns,
@@ -377,7 +308,7 @@ class RecordWriter:
         self._entries.clear()
         self.add_chunk(chunk, entries)
 
-    def add_chunk(self, chunk: Chunk, entries: Mapping[int, Int64]) -> None:
+    def add_chunk(self, chunk: mcap.Chunk, entries: Mapping[int, Int64]) -> None:
         """
         Write a chunk as it is, behind what was added before.
 
@@ -393,15 +324,15 @@ class RecordWriter:
         self._write(record)
         if not self.indexed:
             return
-        index = chunk_index(chunk, at, len(record))
+        index = self._summary.add_chunk(chunk, at, len(record))
+        counts = {number: each.size // 2 for number, each in entries.items()}
+        self._summary.count(counts, chunk.message_start_time, chunk.message_end_time)
         for number, each in entries.items():
             index.message_index_offsets[number] = self.size_bytes
             listed = each.tobytes()
             head = HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(listed))
             self._write(head + struct.pack('<HI', number, len(listed)) + listed)
-            self._counts[number] += each.size // 2
         index.message_index_length = self.size_bytes - at - len(record)
-        self._indexes.append(index)
         self._unpacked += chunk.uncompressed_size
         least, most = CHUNK_RANGE
         self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
@@ -448,7 +379,7 @@ class BagWriter(RecordWriter):
         super().__init__(path, compression=compression, chunk_bytes=chunk_bytes)
         self._channels: dict[tuple[str, str], int] = {}
         about = {'version': __version__, 'recording_id': recording_id or uuid4().hex}
-        self.add(Metadata(METADATA, {**about, 'part': str(part)}))
+        self.add(mcap.Metadata(METADATA, {**about, 'part': str(part)}))
         for name, text in attachments.items():
             self.attach(name, text)
 
@@ -519,7 +450,7 @@ class BagWriter(RecordWriter):
         if not types.is_known(type_name):
             raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
         latched = (topic.rpartition('/')[2], type_name) in _LATCHED
-        channel = Channel(
+        channel = mcap.Channel(
             id=0,
             topic=topic,
             message_encoding='cdr',
@@ -530,6 +461,6 @@ class BagWriter(RecordWriter):
             },
         )
         text = types.definition(type_name).encode()
-        schema = Schema(id=0, name=type_name, encoding='ros2msg', data=text)
+        schema = mcap.Schema(id=0, name=type_name, encoding='ros2msg', data=text)
         self._channels[key] = self.declare(channel, schema)
         return self._channels[key]

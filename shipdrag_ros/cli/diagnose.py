@@ -100,9 +100,8 @@ def run(options: argparse.Namespace) -> int:
     _show(output, found, ship)
     if options.report is not None:
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.tables import Score
 
-        write_diagnosis(options.report, found, ship, score=Score.published())
+        write_diagnosis(options.report, found, ship)
         output.log(f'report in {options.report}')
     if options.write is not None and ship is not None and found.verdict is Verdict.NAMED:
         text = with_effects(ship, found.effects).to_yaml()
@@ -134,12 +133,11 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
         return
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))
-    if found.effects:
-        output.heading('How large; sd is one standard deviation')
-        output.table(diagnosis_cells.parameters(found.effects))
-    elif diagnosis_cells.sizes(found).rows:
-        output.heading('How large, were it the one; sd is one standard deviation')
-        output.table(diagnosis_cells.sizes(found))
+    sizes = diagnosis_cells.sizes(found)
+    if sizes.rows:
+        were = '' if found.effects else ', were it the one'
+        output.heading(f'How large{were}; sd is one standard deviation')
+        output.table(sizes)
     if found.limits:
         output.heading('Effects that are not named: how large they can be; sizes in SI')
         output.table(diagnosis_cells.limits(found))

@@ -19,13 +19,16 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
+from typing import Any
 
 from shipdrag_ros import display
-from shipdrag_ros.bags import BagInfo, info
+from shipdrag_ros.bags import Run
 from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import add_bags, open_parts
 from shipdrag_ros.display import Table
+from shipdrag_ros.messages import TOPICS
+from shipdrag_ros.samples import FURTHER
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,40 +44,64 @@ def run(options: argparse.Namespace) -> int:
     Show what is in the bags.
     """
     output = Output(options.json)
-    found = [info(each) for each in open_parts(options.bags, output, remap=options.remap)]
-    for about in found:
-        _show(output, about)
-    output.json({'bags': [asdict(about) for about in found]})
+    runs = open_parts(options.bags, output, remap=options.remap)
+    documents = [_document(each) for each in runs]
+    for each, about in zip(runs, documents, strict=True):
+        _show(output, each, about)
+    output.json({'bags': documents})
     return 0
 
 
-def _show(output: Output, about: BagInfo) -> None:
-    output.heading(about.bag)
-    for warning in about.warnings:
+def _document(run: Run) -> dict[str, Any]:
+    topics = run.topics_inside()  # a part is read for it, and may be found damaged
+    start_ns, end_ns = run.span_ns or (None, None)
+    found = {*FURTHER, *(topic.input for topic in topics)}
+    return {
+        'bag': run.name,
+        'files': tuple(map(str, run.paths)),
+        'size_bytes': sum(path.stat().st_size for path in run.paths),
+        'start_ns': start_ns,
+        'end_ns': end_ns,
+        'duration_s': run.duration_s,
+        'messages': sum(topic.messages for topic in topics),
+        'compression': run.compression,
+        'indexed': run.indexed,
+        'topics': [asdict(topic) for topic in topics],
+        'missing_inputs': tuple(name for name in TOPICS if name not in found),
+        'attachments': {name: len(text.encode()) for name, text in run.attachments.items()},
+        'software': run.software,
+        'node': run.node,
+        'warnings': run.warnings,
+    }
+
+
+def _show(output: Output, run: Run, about: dict[str, Any]) -> None:
+    output.heading(run.name)
+    for warning in run.warnings:
         output.say(f'Warning: {warning}')
-    begin = '-' if about.start_ns is None else display.utc(about.start_ns)
-    attached = ', '.join(f'{name} ({size} bytes)' for name, size in about.attachments.items())
+    span_ns = run.span_ns
+    attached = ', '.join(f'{name} ({size} bytes)' for name, size in about['attachments'].items())
     rows = [
-        ('files', ', '.join(about.files)),
-        ('size', f'{about.size_bytes * 1e-6:.3f} MB, compression {about.compression}'),
-        ('begin', begin),
-        ('length', display.duration(about.duration_s)),
-        ('messages', f'{about.messages}'),
-        ('recorded by', f'shipdrag_ros {about.software}' if about.software else 'another tool'),
-        ('outputs of', about.node or '-'),
+        ('files', ', '.join(about['files'])),
+        ('size', f'{about["size_bytes"] * 1e-6:.3f} MB, compression {run.compression}'),
+        ('begin', '-' if span_ns is None else display.utc(span_ns[0])),
+        ('length', display.duration(run.duration_s)),
+        ('messages', f'{about["messages"]}'),
+        ('recorded by', f'shipdrag_ros {run.software}' if run.software else 'another tool'),
+        ('outputs of', run.node or '-'),
         ('attached', attached or '-'),
-        ('index', 'sound' if about.indexed else 'missing or damaged: reading takes longer'),
+        ('index', 'sound' if run.indexed else 'missing or damaged: reading takes longer'),
     ]
     output.table(Table(('', ''), tuple(rows)))
     topics = tuple(
         (
-            each.topic,
-            each.type,
-            f'{each.messages}',
-            '-' if each.rate_hz is None else f'{each.rate_hz:.3f}',
-            'refused: type not accepted' if each.refused else each.input or '-',
+            each['topic'],
+            each['type'],
+            f'{each["messages"]}',
+            '-' if each['rate_hz'] is None else f'{each["rate_hz"]:.3f}',
+            'refused: type not accepted' if each['refused'] else each['input'] or '-',
         )
-        for each in about.topics
+        for each in about['topics']
     )
     output.table(Table(('topic', 'type', 'messages', 'rate [Hz]', 'read as'), topics))
-    output.say(f'Inputs that are not there: {", ".join(about.missing_inputs) or "none"}')
+    output.say(f'Inputs that are not there: {", ".join(about["missing_inputs"]) or "none"}')

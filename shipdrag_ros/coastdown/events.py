@@ -51,7 +51,6 @@ class EndedBy(Enum):
     RESET = 'reset'
     RECORD_END = 'record_end'
     GIVEN = 'given'
-    UNKNOWN = 'unknown'  # she probably glides no more, and no regime is likely instead
 
 
 ENDED_BY = {
@@ -65,7 +64,6 @@ ENDED_BY = {
     EndedBy.RESET: 'the memory was reset',
     EndedBy.RECORD_END: 'the record ended',
     EndedBy.GIVEN: 'the window was given by hand',
-    EndedBy.UNKNOWN: 'the ship probably glided no more, and why is not known',
 }
 
 _BY_REGIME = {
@@ -128,23 +126,20 @@ class Regimes:
         Return the probability, soon after a glide, of each regime that may have ended it.
         """
         soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
-        return {
-            ended_by: float(np.max(self._of(names)[soon], initial=0.0))
-            for ended_by, names in _BY_REGIME.items()
-        }
-
-    def _of(self, names: tuple[str, ...]) -> Float64:
-        return np.asarray(np.sum([self.probability[name] for name in names], axis=0))
+        found = {}
+        for ended_by, names in _BY_REGIME.items():
+            chance = np.sum([self.probability[name] for name in names], axis=0)
+            found[ended_by] = float(np.max(chance[soon], initial=0.0))
+        return found
 
     def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
         """
-        Return what is said to have ended a glide if that is likely, else what is; or UNKNOWN.
+        Return what is said to have ended a glide, or the regime that did so more probably.
         """
         chances = self.ends(end_ns)
-        if said not in (*chances, EndedBy.UNKNOWN) or chances.get(said, 0.0) > 0.5:
+        if said not in chances:
             return said
-        likeliest = max(chances, key=lambda each: chances[each])
-        return likeliest if chances[likeliest] > 0.5 else EndedBy.UNKNOWN
+        return max(chances, key=lambda each: (chances[each], each is said))
 
 
 @dataclass(frozen=True)

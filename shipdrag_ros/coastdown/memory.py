@@ -34,7 +34,7 @@ WATCH = np.dtype(
         ('level', 'f8'),  # speed there [m/s]
         ('steady_since', 'i8'),  # bin; NEVER if she is not
         ('steady_most', 'i8'),  # the longest that she was [bins]
-        ('silent_ns', 'i8'),  # until when a silence has been thought about
+        ('silent_ns', 'i8'),  # when the source watched was found silent last; NEVER if it was not
         ('look', 'i8'),  # bin at whose first sample log and track are compared next
         ('doubted', 'i8', (CHANNELS,)),  # up to which each source is not used: another contradicts
     ],

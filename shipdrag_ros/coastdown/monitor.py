@@ -115,6 +115,7 @@ class Monitor:
         self._vouching = Vouching(self._craft)
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None  # while awake
+        self._silent = False  # it goes on unread, as the glide of which the readings ceased may
         # until when glides, whole ones, and what was none were told
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._ended_by: EndedBy | None = None  # what was told of a glide may not be all of it
@@ -143,7 +144,8 @@ class Monitor:
             )
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        probability = {} if self._regimes is None else self._regimes.probability
+        awake = self._regimes is not None and not self._silent
+        probability = self._regimes.probability if awake else {}
         return MonitorProgress(steady_s, used_s, since_ns, probability)
 
     @property
@@ -151,7 +153,7 @@ class Monitor:
         """Where the monitor stands."""
         if self._running is not None:
             return State.COASTDOWN
-        if self._regimes is not None and not self._regimes.even:
+        if self._regimes is not None and not self._silent and not self._regimes.even:
             return State.CANDIDATE
         source = int(self._watch.seen_source)
         if source == NEVER or np.isnan(self._memory.steadiness.limit[source, 0]):
@@ -233,7 +235,7 @@ class Monitor:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
-                    events += self._bear_silence(int(stamp_ns[at]), EndedBy.DATA_STOP)
+                    events += self._bear_silence(int(stamp_ns[at]))
             elif stop == WalkEvent.SLOPE:
                 source = int(channel[at])
                 self._wake(source, int(self._memory.bins.closed[source]))
@@ -279,31 +281,24 @@ class Monitor:
         str
             Why it is of no use; '' where it is weighed.
         """
-        source = int(self._watch.seen_source)
+        source, tally = int(self._watch.seen_source), self._memory.tally
         if source == NEVER:
             return 'no speed was read yet, so there is nothing to weigh the stop with'
-        if self._regimes is None:
+        if self._regimes is None or self._silent:
             self._wake(source, int(self._watch.seen))
         assert self._regimes is not None
-        self._regimes.tell(self._stamp_ns(source, receive_ns) / SECOND_NS)
+        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
+        clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
+        self._regimes.tell((receive_ns + clock_ns) / SECOND_NS)
         return ''
 
-    def fall_silent(self, receive_ns: int) -> list[Event]:
+    def fall_silent(self) -> list[Event]:
         """
-        Take it that nothing was heard up to now, for longer than `data_stop_s`.
+        End a coastdown, or what may be one, at the last sample of its speed source.
 
-        What runs, or may be a coastdown, goes on unread, and ends at the last sample of its
-        speed source once it has probably ended by itself. The memory stays.
-
-        Parameters
-        ----------
-        receive_ns
-            Now [ns], by the clock of the times of arrival.
+        For whoever has a clock and knows that all sources are silent; the memory stays.
         """
-        if self._regimes is None:
-            return []
-        now_ns = self._stamp_ns(int(self._watch.source), receive_ns)
-        return self._bear_silence(now_ns, EndedBy.SILENCE)
+        return self._stop_at_last_sample(EndedBy.SILENCE)
 
     def finish(self) -> list[Event]:
         """
@@ -362,7 +357,7 @@ class Monitor:
         self._watch.source = source
         width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
         bins = self._vouching.sound(self._memory.bins)
-        self._regimes = RegimeFilter(self._ship, bins, width, number)
+        self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
 
@@ -387,8 +382,7 @@ class Monitor:
         slow = slow_s is not None
         if self._running is not None:
             # a glide that is born since is not the one that was announced
-            detected_s = self._running.onset.detected_ns / SECOND_NS
-            same = regimes.gliding_since(detected_s, self._tuning.speed_min)
+            same = regimes.gliding_since(self._running.onset.detected_ns / SECOND_NS)
             glides = regimes.gliding > again or same > over
             if glides and not slow and not regimes.full:
                 return []
@@ -397,7 +391,8 @@ class Monitor:
             return events + (self._rest(regimes, number) if slow else [])
         if slow and not regimes.caught_up:  # long ago: she has sailed since
             return []
-        if slow or regimes.asleep:
+        ended = self._silent and regimes.gliding_since(self._reported_s) <= again
+        if slow or regimes.asleep or ended:
             return self._rest(regimes, number)
         if regimes.full:
             return self._anew(regimes, number)
@@ -433,21 +428,19 @@ class Monitor:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
-        for k, glide in enumerate(regimes.glides()):
-            each = self._as_read(glide, regimes, again=k > 0)
-            if each.begin_s >= since_s:
+        silent = self._ended_by in _SILENT
+        heard_s = regimes.read_after(since_s) if silent else since_s
+        for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
+            if each.begin_s >= heard_s:
                 found.append(each)
-            elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
-                rest = self._as_read(each.since(since_s), regimes, again=True)
+            elif silent or (self._ended_by is not EndedBy.SPEED and each.ended_by is None):
+                rest = each.since(heard_s, since_s) if silent else each.since(since_s)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
         return [each for each in found if each.begin_s < min(last_s, each.end_s)]
 
-    def _as_read(self, glide: Dated, regimes: RegimeFilter, *, again: bool) -> Dated:
-        """Let a glide that ended, or began again, while nothing was read do so with a reading."""
-        first_s, last_s = regimes.unread_about(glide.stop_s)
-        if again and last_s - first_s > self._parameters.data_stop_s:
-            glide = glide.since(last_s, first_s)
+    def _as_read(self, glide: Dated, regimes: RegimeFilter) -> Dated:
+        """Let a glide that ended while nothing was read end with the last reading."""
         first_s, last_s = regimes.unread_about(glide.end_s)
         if glide.ended_by is None or last_s - first_s <= self._parameters.data_stop_s:
             return glide
@@ -460,6 +453,7 @@ class Monitor:
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
+        self._silent = False
         if self._estimator is not None:
             self._watch.update_ns = self._running.due_ns(onset.detected_ns)
         return onset
@@ -500,8 +494,6 @@ class Monitor:
         last_ns: int | None = None,
     ) -> list[Event]:
         """End the coastdown that runs; one that goes on at the last sample ends there."""
-        if ended_by in _SILENT and dated.ended_by is EndedBy.DATA_STOP:  # it is this silence
-            dated = dated._replace(ended_by=None)
         if dated.ended_by is None and last_ns is not None:
             dated = dated._replace(end_s=last_ns / SECOND_NS)
         assert self._running is not None
@@ -527,7 +519,10 @@ class Monitor:
         if ended_by is None and slow_s is not None:
             otherwise, last_ns = EndedBy.SPEED, _ns(slow_s)
         dated = self._unreported(regimes, last_ns)
-        events = self._tell(dated, regimes, number, otherwise, last_ns)
+        before, events = self._silent, self._tell(dated, regimes, number, otherwise, last_ns)
+        if before:  # what was none was said when the readings ceased
+            self._stand_down()
+            return events
         if not dated:
             was = regimes.dismissal(since_s)
             if was is not None:
@@ -607,34 +602,22 @@ class Monitor:
         told_ns = None if self._regimes is None else self._regimes.told_ns
         return replace(window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns)
 
-    def _stamp_ns(self, source: int, receive_ns: int) -> int:
-        """Return a time of arrival by the clock that stamps a source."""
-        tally = self._memory.tally
-        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
-        return receive_ns + int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
-
     # how a coastdown ends
 
-    def _bear_silence(self, now_ns: int, ended_by: EndedBy) -> list[Event]:
-        """Go on without readings, as long as a glide that was not over may still go on."""
-        last_s = int(self._memory.guard.last_ns[self._watch.source]) / SECOND_NS
-        events: list[Event] = []
+    def _bear_silence(self, now_ns: int) -> list[Event]:
+        """End what runs once the source watched is silent; what may glide on goes on unread."""
+        watch, events = self._watch, list[Event]()
+        if self._memory.guard.last_ns[watch.source] > watch.silent_ns:
+            events = self._stop_at_last_sample(EndedBy.DATA_STOP)
+        watch.silent_ns = now_ns
         number = now_ns // SECOND_NS
-        bins = self._vouching.sound(self._memory.bins)
-        self._watch.silent_ns = now_ns
-        while (regimes := self._regimes) is not None and regimes.advance(bins, number):
-            if regimes.gliding_since(last_s, self._tuning.speed_min) <= numbers.ANNOUNCE[1]:
-                return events + self._stop_at_last_sample(ended_by)
-            events += self._vouching.explained(self._decide(regimes, number))
-        return events
+        return events + self._vouching.explained(self._judged(number, number))
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
         if self._regimes is None:
             return []
         end_ns = int(self._memory.guard.last_ns[self._watch.source])
-        if ended_by is EndedBy.RECORD_END and int(self._watch.silent_ns) > end_ns:
-            ended_by = EndedBy.DATA_STOP
         number = end_ns // SECOND_NS
         events = self._judged(number + 1, number)  # what came since the last bin that was judged
         regimes = self._regimes
@@ -642,7 +625,12 @@ class Monitor:
             return self._vouching.explained(events)
         if self._running is not None:
             events += self._end_glide(regimes, number, ended_by, end_ns)
+        source, end_s = int(self._watch.source), end_ns / SECOND_NS
         events += self._rest(regimes, number, ended_by, end_ns)
+        if ended_by in _SILENT and regimes.gliding_since(end_s) > numbers.ANNOUNCE[1]:
+            self._regimes, self._silent = regimes, True
+            self._watch.source, self._watch.silent_ns = source, end_ns
+            self._reported_s, self._ended_by = end_s, ended_by
         return self._vouching.explained(events)
 
     def _stand_down(self) -> None:
@@ -651,7 +639,7 @@ class Monitor:
         watch.source = NEVER
         watch.update_ns = ALWAYS
         watch.armed = 0
-        self._running = self._regimes = None
+        self._running, self._regimes, self._silent = None, None, False
 
 
 def _ns(second: float | None) -> int | None:

@@ -129,14 +129,12 @@ class RunningCoastdown:
             estimate = estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             failure = str(error)
-        ended_by = dated.ended_by or otherwise or EndedBy.UNKNOWN
-        if regimes is not None:
-            ended_by = regimes.ended_by(ended_by, end_ns)
+        ended_by = dated.ended_by or otherwise or EndedBy.ENGINE
         ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            ended_by,
+            ended_by if regimes is None else regimes.ended_by(ended_by, end_ns),
             estimate,
             failure,
             self._heading_rad,
@@ -165,7 +163,7 @@ class RunningCoastdown:
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            ended_by or EndedBy.UNKNOWN,
+            ended_by or EndedBy.ENGINE,
             None,
             was.text,
             self._heading_rad,

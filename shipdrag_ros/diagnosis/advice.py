@@ -23,7 +23,8 @@ from itertools import combinations
 import numpy as np
 from scipy.special import softmax
 
-from shipdrag_ros.diagnosis.context import Context, Measured
+from shipdrag_ros.diagnosis.context import Context
+from shipdrag_ros.diagnosis.earlier import Carried
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
@@ -48,7 +49,6 @@ from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import advice as fact_advice
 from shipdrag_ros.simulation.effect import COSTS, Cost, Measure, Scope
 from shipdrag_ros.simulation.effects import discriminating_measurements, inseparable
@@ -216,23 +216,19 @@ def with_known(
     list of PredictedOutcome
         With one row more for each unknown that is shown.
     """
-    k, found = comparing.runs.coefficients, []
+    k, places, found = comparing.runs.coefficients, comparing.runs.places, []
+    shown = [
+        (place[k + unknown], each)
+        for unknown, known in sd.items()
+        for place, each in zip(places, known, strict=True)
+        if each > 0.0
+    ]
+    at, known_sd = (np.array(column) for column in zip(*shown)) if shown else (np.arange(0),) * 2
     for fit, outcome in zip(fits, outcomes, strict=True):
-        mean, slope = [], []
-        for unknown, known in sd.items():
-            for place, each in zip(comparing.runs.places, known, strict=True):
-                if each > 0.0:
-                    mean.append(float(fit.at[place[k + unknown]]) / each)
-                    slope.append(np.zeros(len(fit.at)))
-                    slope[-1][place[k + unknown]] = 1.0 / each
-        rows = np.array(slope).reshape(len(mean), len(fit.at)).T
-        found.append(
-            replace(
-                outcome,
-                mean=np.concatenate([outcome.mean, mean]),
-                slope=np.hstack([outcome.slope, rows]),
-            )
-        )
+        rows = np.zeros((len(fit.at), len(at)))
+        rows[at, np.arange(len(at))] = 1.0 / known_sd
+        mean = np.concatenate([outcome.mean, fit.at[at] / known_sd])
+        found.append(replace(outcome, mean=mean, slope=np.hstack([outcome.slope, rows])))
     return found
 
 
@@ -307,22 +303,20 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
 @dataclass(frozen=True)
-class Undecided(ComparedRuns):
+class DiagnosedRuns(ComparedRuns):
     """
-    Runs that cannot be decided.
+    Runs, with what else is known of them.
 
     Attributes
     ----------
-    ship
     facts
         That are stated.
-    candidates
-        That the runs cannot separate.
+    earlier
+        What earlier diagnoses say.
     """
 
-    ship: Ship
     facts: Facts
-    candidates: Sequence[Candidate]
+    earlier: Carried | None
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
@@ -340,13 +334,17 @@ class Undecided(ComparedRuns):
         }
 
 
-def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
+def advice(
+    case: DiagnosedRuns, candidates: Sequence[Candidate], progress: Progress = silent
+) -> tuple[Advice, ...]:
     """
     Return what would decide; first what is likely to cost the crew least.
 
     Parameters
     ----------
     case
+    candidates
+        That the runs cannot separate.
     progress
         Called with how many measurements are tried.
 
@@ -378,16 +376,16 @@ def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
-    for each in declared(case.candidates):
+    for each in declared(candidates):
         measure = Measure(each.measure)
         if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
-            ranked[each] = _reach(measure, case.candidates, case.inseparable)
+            ranked[each] = _reach(measure, candidates, case.inseparable)
     for name, named in _facts(case).items():
         ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
     return _by_cost(ranked)
 
 
-def _facts(case: Undecided) -> dict[str, float]:
+def _facts(case: DiagnosedRuns) -> dict[str, float]:
     """Return the facts that would name something, and how probably."""
 
     def decided(after: Mapping[Names, float]) -> bool:
@@ -485,14 +483,16 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
         case Measure.SHAFT:
             return all(len(run.context.at_shaft) for run in seen)
         case Measure.LOG:
-            return any((run.along.rows.kind == LOG).any() for run in seen)
+            return any((run.rows.kind == LOG).any() for run in seen)
         case Measure.RADAR:
-            return any((run.along.rows.kind != LOG).any() for run in seen)
+            return any((run.rows.kind != LOG).any() for run in seen)
         case _:
             return False
 
 
-def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOutcome]], list[int]]:
+def _settings(
+    measure: Measure, case: DiagnosedRuns
+) -> tuple[list[list[PredictedOutcome]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
     first, fits, same = case.seen[0], list(case.rivals.values()), [0] * len(case.rivals)
     if measure in _RUNS:
@@ -524,14 +524,14 @@ def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOut
 
 
 def _read(
-    windows: Sequence[Window], case: Undecided, fits: Sequence[Fitted]
+    windows: Sequence[Window], case: DiagnosedRuns, fits: Sequence[Fitted]
 ) -> tuple[list[PredictedOutcome], list[Float64]]:
     """Return what rivals predict of an instrument in each run."""
     seen = []
     for run, window in zip(case.seen, windows, strict=True):
         context = Context.of(window, case.ship, run.time_s, run.context.stop)
         alone = replace(context, value=np.zeros(len(context)))
-        seen.append(replace(run, across=None, context=alone))
+        seen.append(replace(run, context=alone))
     return of_instrument(case.comparing, fits, ship_runs(seen, case.ship).runs)
 
 
@@ -543,18 +543,12 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
         first,
         heading_rad=heading_rad,
         speed_m_s=speed_m_s,
-        along=_empty(first.along),
-        across=None if first.across is None else _empty(first.across),
+        rows=first.rows._replace(value=np.zeros(len(first.rows.value))),
         context=replace(context, stop=stop, value=np.zeros(len(context))),
     )
 
 
-def _empty(measured: Measured) -> Measured:
-    rows = measured.rows
-    return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))
-
-
-def _windows(measure: Measure, case: Undecided, *, after: float = 0.0) -> list[Window]:
+def _windows(measure: Measure, case: DiagnosedRuns, *, after: float = 0.0) -> list[Window]:
     """Return what an instrument may read in each run; `after` is the shaft after its fall."""
     windows = []
     channel, draught_m = _INSTRUMENTS[measure], case.ship.draught_m or math.nan

@@ -29,7 +29,7 @@ from shipdrag_ros.inference.noise import WHITE, Noise, noise_of, whiten
 from shipdrag_ros.inference.rows import Rows, bin_means
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.law import stated_r
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
 from shipdrag_ros.simulation.columns import RUN_DOWNS
@@ -39,59 +39,14 @@ _SLOWEST = 0.02  # of the speed at the stop, that a glide is followed to
 _SPEEDS = 200
 
 
-@dataclass(frozen=True)
-class Measured:
-    """
-    Rows along one direction, in ascending time.
-
-    Attributes
-    ----------
-    at : (n,)
-        Places of the rows in the times of the observation.
-    rows
-        `POSITION` rows are distances along the direction [m].
-    variance : (n,)
-        Of the white noise of each.
-    """
-
-    at: Int64
-    rows: Rows
-    variance: Float64
-
-    @classmethod
-    def of(cls, rows: Rows, variance: Float64, times: Float64) -> Measured:
-        """
-        Find rows among the times of all rows of the observation, (m,), ascending [s].
-        """
-        return cls(np.searchsorted(times, rows.time_s), rows, variance)
-
-    def __len__(self) -> int:
-        return len(self.at)
-
-
-def whitener_of(
-    found: Measured, ship: Ship, speed_m_s: float, lead_in_s: float, margin_s: float
-) -> Float64:
-    """
-    Return the inverse Cholesky factor (n, n) of the noise of rows, by that of their steady part.
-
-    Parameters
-    ----------
-    found
-    ship
-    speed_m_s
-        In the lead-in, roughly.
-    lead_in_s
-        Length of the steady part, the stop at its end.
-    margin_s
-        Before the stop, that is not learnt from.
-    """
-    rows, time = found.rows, found.rows.time_s
-    steady = time < lead_in_s - margin_s
+def _port_covariance(rows: Rows, variance: Float64, ship: Ship, stop: Stop) -> Float64:
+    """Return the covariance (n, n) of the noise of places to port, by that before the stop."""
+    time, speed_m_s, lead_in_s = rows.time_s, stop.speed_m_s, stop.lead_in_s
+    steady = time < lead_in_s - stop.sd_s
     damping, inertia = damping_of(ship, np.array([speed_m_s]))
     seen = of_steady(
         Rows(time[steady], rows.kind[steady], rows.value[steady]),
-        found.variance[steady],
+        variance[steady],
         float(damping[0]),
         float(inertia[0]),
     )
@@ -99,12 +54,12 @@ def whitener_of(
     learnt = learn(seen, speed_m_s).typical
     speed = _slowed_m_s(ship, speed_m_s, time - lead_in_s)
     whitener = np.eye(len(time))
-    white = Noise(found.variance, WHITE, *damping_of(ship, speed))
+    white = Noise(variance, WHITE, *damping_of(ship, speed))
     whiten(rows, whitener, noise_of(learnt, 0, rows, white, int(np.searchsorted(time, lead_in_s))))
     shaken = np.linalg.inv(whitener.T)
     sailed = np.tril(np.broadcast_to(speed * np.diff(time, prepend=time[0]), shaken.shape))
-    wandered = sailed @ yaw_wander(time) @ sailed.T
-    return np.linalg.inv(np.linalg.cholesky(shaken @ shaken.T + wandered))
+    wandered = sailed @ _yaw_wander(time) @ sailed.T
+    return np.asarray(shaken @ shaken.T + wandered, np.float64)
 
 
 def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
@@ -115,15 +70,11 @@ def _slowed_m_s(ship: Ship, speed_m_s: float, after_s: Float64) -> Float64:
     return np.interp(after_s, glided_s, speed)
 
 
-def yaw_wander(time_s: Float64) -> Float64:
+def _yaw_wander(time_s: Float64) -> Float64:
     """
     Return the covariance (n, n) of what a heading, and the course with it, wanders by.
 
     A steady record shows it while she is steered with way on, not as she glides.
-
-    Parameters
-    ----------
-    time_s : (n,)
     """
     apart = np.abs(time_s[:, None] - time_s) / priors.YAW_WANDERS_S.mean
     return priors.YAW_WANDERS.sd**2 * np.exp(-apart)
@@ -177,6 +128,8 @@ class Stop:
         In the lead-in.
     shaft_s
         Time constant of the shaft as it was seen to run down; 0: not seen.
+    sd_s
+        How well the time of the stop is known.
     """
 
     since_ns: int
@@ -184,6 +137,10 @@ class Stop:
     heading_rad: float
     speed_m_s: float
     shaft_s: float = 0.0
+    sd_s: float = 0.0
+
+
+_NO_ROWS = Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -195,12 +152,14 @@ class Context:
     ----------
     stop
     value : (c,)
-        Air ahead and to port [m/s], logarithm of the depth in draughts, shaft
+        Places to port [m], air ahead and to port [m/s], logarithm of the depth in draughts, shaft
         speed over the steady one, whether it stands, yaw from the first heading
         [rad], and the logarithm of the time constant of the shaft's fall [s].
     whitener : (c, c)
         Lower triangular.
-    at_wind, at_shaft, at_yaw
+    port_s : (a,)
+        Times of the places to port, from the start of the steady record.
+    at_port, at_wind, at_shaft, at_yaw
         Times of the observation that rows are nearest to.
     draught_m
         None where there is no row of depth.
@@ -217,6 +176,8 @@ class Context:
     stop: Stop
     value: Float64
     whitener: Float64
+    port_s: Float64
+    at_port: NDArray[np.intp]
     at_wind: NDArray[np.intp]
     at_shaft: NDArray[np.intp]
     at_yaw: NDArray[np.intp]
@@ -227,7 +188,14 @@ class Context:
     depth_m: float | None = None
 
     @classmethod
-    def of(cls, window: Window, ship: Ship, times: Float64, stop: Stop) -> Context:
+    def of(
+        cls,
+        window: Window,
+        ship: Ship,
+        times: Float64,
+        stop: Stop,
+        port: tuple[Rows, Float64] = _NO_ROWS,
+    ) -> Context:
         """
         Condense what a window holds.
 
@@ -241,6 +209,8 @@ class Context:
             Of the observation [s].
         stop
             What the context is counted from.
+        port
+            Places to port, and the variance of their white noise.
 
         Returns
         -------
@@ -252,8 +222,10 @@ class Context:
         yaw_s, yaw = _binned(window, 'heading', stop, edges)
         depth = _binned(window, 'depth', stop, edges)[1]
         shaft_s, shaft, turns = _shaft(window, ship, stop, times[-1])
-        values = [wind[:, 0], wind[:, 1]]
-        blocks = [_wind_covariance(wind[:, i], wind[:, 1 - i]) for i in range(2)]
+        places = port[0]
+        values = [places.value, wind[:, 0], wind[:, 1]]
+        blocks = [_port_covariance(*port, ship, stop)] if len(places.value) else []
+        blocks += [_wind_covariance(wind[:, i], wind[:, 1 - i]) for i in range(2)]
         draught_m = ship.draught_m if len(depth) else None
         if draught_m is not None:
             draughts = float(np.median(depth)) / draught_m
@@ -264,7 +236,8 @@ class Context:
             blocks.append(np.eye(len(shaft)) * priors.SHAFT.sd**2 + priors.SHAFT_OFF.sd**2)
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
-        blocks.append(_yaw_covariance(yaw_s))
+        # what she yaws by from bin to bin, and what she and her compass wander by
+        blocks.append(_yaw_wander(yaw_s) + np.eye(len(yaw_s)) * priors.YAW.sd**2)
         run_down_s = ship.propulsion.run_down_s if ship.propulsion and stop.shaft_s else None
         if run_down_s is not None:
             values.append(np.log([stop.shaft_s]))
@@ -274,6 +247,8 @@ class Context:
             stop,
             np.concatenate(values),
             _whitener(blocks),
+            places.time_s,
+            np.searchsorted(times, places.time_s),
             np.searchsorted(times, wind_s).clip(max=last),
             np.searchsorted(times, shaft_s).clip(max=last),
             np.searchsorted(times, yaw_s).clip(max=last),
@@ -306,10 +281,12 @@ class Context:
             A line a column, in the order of `value`.
         """
         cos, sin = math.cos(self.stop.heading_rad), math.sin(self.stop.heading_rad)
+        place = columns.radar_position_m[:, self.at_port]
         velocity = columns.velocity_over_ground_m_s[:, self.at_wind]
         air = np.array([action.wind_m_s for action in actions])
         east, north = (air[:, None, :] - velocity).transpose(2, 0, 1)
-        parts = [cos * east + sin * north, cos * north - sin * east]
+        parts = [cos * place[..., 1] - sin * place[..., 0]]
+        parts += [cos * east + sin * north, cos * north - sin * east]
         if self.draught_m is not None:
             depth = np.array([action.depth_m for action in actions]) / self.draught_m
             parts.append(np.log(np.clip(depth, 1.0, _DEEP_DRAUGHTS))[:, None])
@@ -400,11 +377,6 @@ def _wind_covariance(values: Float64, other: Float64) -> Float64:
     turned = priors.WIND_TURNED.sd**2 * np.outer(other, other)
     gain = priors.WIND_GAIN.sd**2 * np.outer(values, values)
     return np.eye(n) * scatter**2 + priors.WIND_OFFSET.sd**2 + gain + turned
-
-
-def _yaw_covariance(time_s: Float64) -> Float64:
-    """Return what a ship yaws by from bin to bin, and what she and her compass wander by."""
-    return yaw_wander(time_s) + np.eye(len(time_s)) * priors.YAW.sd**2
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:

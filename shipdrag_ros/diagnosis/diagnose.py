@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
-from shipdrag_ros.diagnosis.advice import Undecided, advice
+from shipdrag_ros.diagnosis.advice import DiagnosedRuns, advice
 from shipdrag_ros.diagnosis.earlier import Carried, EarlierDiagnosis, carried
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import gap_of, held_out, traces, where
@@ -31,7 +31,7 @@ from shipdrag_ros.diagnosis.verdict import (
     runs_differ,
     waiting,
 )
-from shipdrag_ros.diagnosis.words import names_text
+from shipdrag_ros.diagnosis.words import names_text, of_the_earth
 from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict, smallest_set
 from shipdrag_ros.inference.rows import LOG
@@ -43,7 +43,7 @@ from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.ship.facts import UNITS_CHECKED
 from shipdrag_ros.simulation.effect import Effect, Scope
-from shipdrag_ros.simulation.effects import carrying, effects_of, inseparable, terms
+from shipdrag_ros.simulation.effects import carrying, effects_of, terms
 
 _APART_M_S = 0.15  # slowly: six times what is usual of water
 
@@ -131,8 +131,8 @@ def diagnose(
     questions = [
         f'{run.name}: {ask}'
         for j, run in enumerate(seen)
-        if (ask := '' if checked & {None, j} else asked(ratio_before_the_stop(run)))
-        or (ask := asked_of_speed(run.speed_m_s, run.ship))
+        if not checked & {None, j}
+        and (ask := asked(ratio_before_the_stop(run)) or asked_of_speed(run.speed_m_s, run.ship))
     ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
@@ -140,9 +140,9 @@ def diagnose(
     progress('comparing hypotheses', 0, 0)
     try:
         comparing = compare(seen, ship, stated, before)
-        case = _Case(seen, comparing, comparing.compare(), stated, before)
+        case = DiagnosedRuns(seen, comparing, comparing.compare(), ship, stated, before)
         notes = (*notes, *of_one_day(case))
-        found = _answer(case, ship, notes, baseline, progress, advise=advise and not questions)
+        found = _answer(case, notes, baseline, progress, advise=advise and not questions)
     except (DiagnosisError, SimulationError) as error:
         if not questions:
             raise
@@ -151,8 +151,7 @@ def diagnose(
 
 
 def _answer(
-    case: _Case,
-    ship: Ship,
+    case: DiagnosedRuns,
     notes: tuple[str, ...],
     baseline: str,
     progress: Progress,
@@ -160,31 +159,23 @@ def _answer(
     advise: bool,
 ) -> DiagnosisResult:
     """Judge what was compared."""
-    stated = ship.baseline is not None
+    stated = case.ship.baseline is not None
     seen, comparing, found = case.seen, case.comparing, case.found
-    never = inseparable(found.effects)
-    judged = judge(found, never)
+    judged = judge(found, case.inseparable)
     verdict = judged.decision.verdict
-    undecided = Undecided(seen, comparing, found, ship, case.facts, judged.candidates)
+    advise = advise and verdict is Verdict.ONE_OF
     names = [run.name for run in seen]
     before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
     differ = runs_differ(best, names) if judged.missing else ()
     answer = [held for held, _ in smallest_set(found.probability, CERTAIN)]
     agree = NONE in answer and verdict in (Verdict.NONE, Verdict.ONE_OF)
     unknown = verdict is Verdict.UNKNOWN or UNKNOWN in answer
-    return DiagnosisResult(
-        verdict=verdict,
-        effects=judged.effects,
-        candidates=judged.candidates,
-        nothing=found.probability.get(NONE, 0.0),
-        unnamed=found.probability.get(UNKNOWN, 0.0),
-        would_decide=advice(undecided, progress) if advise and verdict is Verdict.ONE_OF else (),
+    return judged.result(
+        would_decide=advice(case, judged.candidates, progress) if advise else (),
         where=None
         if agree
         else where(
-            seen,
-            comparing,
-            found,
+            case,
             before,
             judged.explained,
             judged.decision.effects or ({} if unknown else set(chain(*answer))),
@@ -195,16 +186,15 @@ def _answer(
         held_out_before=held_out(seen, comparing, before),
         held_out_after=held_out(seen, comparing, best) if judged.missing else None,
         baseline=baseline,
-        best=judged.best,
         notes=(*notes, *_besides(case, judged.decision.effects, stated=stated)),
-        traces=traces(seen, comparing, before, judged.explained),
+        traces=traces(case, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
         facts=case.facts.weighed(found, names),
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if case.earlier is None else case.earlier.judged(found),
-        limits=limits_of(judged, comparing, never),
+        limits=limits_of(judged, comparing, case.inseparable),
     )
 
 
@@ -214,10 +204,6 @@ def _nothing_compared(
     """Return the diagnosis of runs that no hypothesis can be compared with."""
     return DiagnosisResult(
         verdict=Verdict.ONE_OF,
-        effects=(),
-        candidates=(),
-        nothing=0.0,
-        unnamed=0.0,
         before=Gap(None, None, math.nan),
         baseline=baseline,
         notes=notes,
@@ -226,7 +212,7 @@ def _nothing_compared(
     )
 
 
-def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[str]:
+def _besides(case: DiagnosedRuns, named: Collection[str], *, stated: bool) -> Iterator[str]:
     """Say what is not sound, and what cannot be seen."""
     for j, run in enumerate(case.seen):
         water_m_s = case.comparing.water_m_s(j)
@@ -236,17 +222,14 @@ def _besides(case: _Case, named: Collection[str], *, stated: bool) -> Iterator[s
                 'standard deviation), as water seldom makes them; one of them is wrong, and as '
                 'much of the coastdown as is like it passes for noise'
             )
+    ruled_out = [each for each in effects_of(case.seen[0].ship).values() if not each.in_geodetic]
+    if ruled_out and _geodetic(case.seen):
+        yield of_the_earth(ruled_out)
     if not stated:
         yield (
             'the ship file has no baseline: the runs are compared with all hulls of her length '
             'and volume; what looks like fouling, a propeller or a cable may be the hull'
         )
-
-
-@dataclass(frozen=True)
-class _Case(ComparedRuns):
-    facts: Facts
-    earlier: Carried | None
 
 
 def of_one_day(case: ComparedRuns) -> Iterator[str]:
@@ -297,8 +280,14 @@ def effects_about(seen: Sequence[Observation]) -> list[Effect]:
     return [
         effect
         for effect in effects_of(ship).values()
-        if not effect.missing(ship) and (not effect.errs_in or read.intersection(effect.errs_in))
+        if not effect.missing(ship)
+        and (not effect.errs_in or read.intersection(effect.errs_in))
+        and (effect.in_geodetic or not _geodetic(seen))
     ]
+
+
+def _geodetic(seen: Sequence[Observation]) -> bool:
+    return all(run.geodetic for run in seen)
 
 
 def stated_in(
@@ -316,7 +305,7 @@ def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
 
 def _has_both(run: Observation) -> bool:
     """Say whether a run has a log and the way over ground, to be held against each other."""
-    by_log = run.along.rows.kind == LOG
+    by_log = run.rows.kind == LOG
     return bool(by_log.any() and not by_log.all())
 
 

@@ -22,9 +22,10 @@ from functools import cached_property, partial
 from os import PathLike
 from typing import Any, NoReturn
 
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.result import CarriedEffect, DiagnosisResult, SeenRun, WeighedEarlier
-from shipdrag_ros.display import utc
+from shipdrag_ros.display import json_text, utc
 from shipdrag_ros.errors import DiagnosisError, EarlierError, SimulationError
 from shipdrag_ros.fields import (
     INVALID,
@@ -120,25 +121,9 @@ class EarlierDiagnosis:
         Raises
         ------
         DiagnosisError
-            If its verdict waits for an answer.
+            If its verdict waits for an answer, or no run is known.
         """
-        if found.question:
-            raise DiagnosisError(f'{name}: its verdict waits for an answer: {found.question}')
-        return cls(
-            name,
-            '' if ship is None else ship.name,
-            None if ship is None else ship.length_m,
-            found.runs,
-            tuple(run for each in found.earlier for run in (*each.runs, *each.before)),
-            tuple(
-                EarlierCandidate(
-                    each.probability, {effect.name: effect.parameters for effect in each.effects}
-                )
-                for each in found.candidates
-            ),
-            found.baseline == 'stated',
-            () if ship is None else tuple(effect.name for effect in ship.effects),
-        )
+        return _diagnosis(json.loads(json_text(document(found, ship))), name)
 
     @property
     def last_ns(self) -> int:
@@ -219,10 +204,6 @@ _NOTHING, _UNKNOWN = 'none', 'unknown'
 _EXPECTED = 'give what `shipdrag diagnose` wrote as JSON with --earlier FILE'
 
 
-class _Wrong(Exception):
-    """What is wrong with a document, and where."""
-
-
 def read_earlier(path: str | PathLike[str]) -> EarlierDiagnosis:
     """
     Read what a diagnosis found.
@@ -243,17 +224,18 @@ def read_earlier(path: str | PathLike[str]) -> EarlierDiagnosis:
     """
     try:
         text = read_small_text(path, most_bytes=_LARGEST)
-        document = json.loads(text, parse_constant=_refuse)
+        given = json.loads(text, parse_constant=_refuse)
     except OSError as error:
-        raise DiagnosisError(f'{path}: {error.strerror}; {_EXPECTED}') from error
+        raise _wrong(path, error.strerror) from error
     except RecursionError as error:
-        raise DiagnosisError(f'{path}: nested too deeply; {_EXPECTED}') from error
+        raise _wrong(path, 'nested too deeply') from error
     except ValueError as error:
-        raise DiagnosisError(f'{path}: not JSON: {error}; {_EXPECTED}') from error
-    try:
-        return _diagnosis(document, str(path))
-    except _Wrong as error:
-        raise DiagnosisError(f'{path}: {error}; {_EXPECTED}') from error
+        raise _wrong(path, f'not JSON: {error}') from error
+    return _diagnosis(given, str(path))
+
+
+def _wrong(name: str | PathLike[str], why: str | None) -> DiagnosisError:
+    return DiagnosisError(f'{name}: {why}; {_EXPECTED}')
 
 
 def _refuse(word: str) -> NoReturn:
@@ -327,16 +309,17 @@ _DOCUMENT = _object(
 )
 
 
-def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
+def _diagnosis(read: Any, name: str) -> EarlierDiagnosis:
     problems: Problems = []
-    given = {'ship': None, **document} if isinstance(document, dict) else document
+    given = {'ship': None, **read} if isinstance(read, dict) else read
     found = _DOCUMENT.read(given, '', problems)
     if problems:
-        raise _Wrong(problems[0])
+        raise _wrong(name, problems[0])
     if not found['runs']:
-        raise _Wrong('runs: empty, and when it was made is not known')
+        raise _wrong(name, 'runs: empty, and when it was made is not known')
     if given.get('question'):
-        raise _Wrong('question: its verdict waits for the answer; diagnose its runs again')
+        asked = f'{show(given["question"])}; diagnose its runs again'
+        raise _wrong(name, f'question: its verdict waits for the answer: {asked}')
     of_force, ship = given.get('baseline') == 'stated', found['ship']
     before = [run for each in found['earlier'] if each['used'] for run in each['runs']]
     return EarlierDiagnosis(
@@ -345,7 +328,7 @@ def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
         ship['length_m'] if ship else None,
         _seen(found['runs']),
         _seen(before),
-        _candidates(found['candidates'], all_sized=of_force),
+        _candidates(found['candidates'], name, all_sized=of_force),
         of_force,
         ship['effects'] if ship else (),
     )
@@ -356,31 +339,30 @@ def _seen(runs: Iterable[Mapping[str, Any]]) -> tuple[SeenRun, ...]:
 
 
 def _candidates(
-    listed: Sequence[Mapping[str, Any]], *, all_sized: bool
+    listed: Sequence[Mapping[str, Any]], name: str, *, all_sized: bool
 ) -> tuple[EarlierCandidate, ...]:
     found = []
     for i, each in enumerate(listed):
         names = each['names']
         sizes = {
-            name: {
+            effect: {
                 # null: it could not be found
                 key: Parameter(size['value'], math.nan if size['sd'] is None else size['sd'])
                 for key, size in parameters.items()
             }
-            for name, parameters in each['effects']
+            for effect, parameters in each['effects']
         }
         if names == (_UNKNOWN,):
             continue
         named = set() if names == (_NOTHING,) else set(names)
         # without a baseline, an effect that could not be seen has no size
         if not names or ((sizes or all_sized) and named != set(sizes)):
-            raise _Wrong(
-                f'candidates[{i}]: the names are {show(list(names))}, and the effects others'
-            )
+            why = f'candidates[{i}]: the names are {show(list(names))}, and the effects others'
+            raise _wrong(name, why)
         found.append(EarlierCandidate(each['probability'], sizes))
     total = math.fsum(each.probability for each in found)
     if not listed or total > 1.0 + 1e-6:
-        raise _Wrong(f'candidates: {len(listed)} of probability {total:g} in all')
+        raise _wrong(name, f'candidates: {len(listed)} of probability {total:g} in all')
     return tuple(found)
 
 

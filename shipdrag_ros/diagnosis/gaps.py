@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import FORCE, Compared, Gap, RunTrace, Where
+from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.inference.linear import solve_scaled
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
@@ -41,13 +42,14 @@ def gap_of(seen: Sequence[Observation], residuals: Sequence[RunResidual]) -> Gap
     """
     speeds, places = [], []
     for run, residual in zip(seen, residuals, strict=True):
-        kind, after = run.along.rows.kind, run.along.rows.time_s >= run.lead_in_s
+        kind, after = run.rows.kind, run.rows.time_s >= run.lead_in_s
         speeds.append(residual.along[after & (kind == LOG)])
         ahead = residual.along[after & (kind == POSITION)]
-        if run.across is not None and len(ahead):
-            when = run.along.rows.time_s[after & (kind == POSITION)]
-            to_port = residual.rest[: len(run.across)]
-            places.append(np.hypot(ahead, np.interp(when, run.across.rows.time_s, to_port)))
+        port_s = run.context.port_s
+        if len(port_s) and len(ahead):
+            when = run.rows.time_s[after & (kind == POSITION)]
+            to_port = np.interp(when, port_s, residual.rest[: len(port_s)])
+            places.append(np.hypot(ahead, to_port))
     whole = np.concatenate([each.whitened for each in residuals])
     return Gap(_rms(speeds), _rms(places), float(np.mean(whole**2)))
 
@@ -124,9 +126,7 @@ def _given_shared(
 
 
 def where(
-    seen: Sequence[Observation],
-    comparing: Comparing,
-    found: ComparedHypotheses[Fitted],
+    case: ComparedRuns,
     before: Fitted,
     after: Fitted,
     named: Collection[str],
@@ -138,9 +138,7 @@ def where(
 
     Parameters
     ----------
-    seen
-    comparing, found
-        Of these runs.
+    case
     before
         The ship as stated.
     after
@@ -155,11 +153,11 @@ def where(
     Where
         The ends hold 90 % of the excess over noise.
     """
-    channel = FORCE if of_force else _falsified(named) or _channel(found)
+    channel = FORCE if of_force else _falsified(named) or _channel(case.found)
     times, speeds = [], []
-    residuals = comparing.residuals(before)
-    for run, residual, table in zip(seen, residuals, after.linear, strict=True):
-        since = (run.along.rows.time_s - run.lead_in_s) / run.duration_s
+    residuals = case.comparing.residuals(before)
+    for run, residual, table in zip(case.seen, residuals, after.linear, strict=True):
+        since = (run.rows.time_s - run.lead_in_s) / run.duration_s
         part = np.clip((since * _PARTS).astype(int), 0, _PARTS - 1)
         rows = np.flatnonzero(since >= 0.0)
         excess = np.zeros(_PARTS)
@@ -174,8 +172,8 @@ def where(
         times.append(ends * run.duration_s)
         speeds.append(np.interp(ends, since, table.speed_m_s))
     if not times:
-        whole = max(run.duration_s for run in seen)
-        return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in seen)))
+        whole = max(run.duration_s for run in case.seen)
+        return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in case.seen)))
     return Where(
         channel,
         (float(np.min(times)), float(np.max(times))),
@@ -206,23 +204,19 @@ def _channel(found: ComparedHypotheses[Fitted]) -> str:
     return _CHANNELS.get(place_of(best.hypothesis.smooth), FORCE)
 
 
-def traces(
-    seen: Sequence[Observation], comparing: Comparing, before: Fitted, after: Fitted
-) -> tuple[RunTrace, ...]:
+def traces(case: ComparedRuns, before: Fitted, after: Fitted) -> tuple[RunTrace, ...]:
     """
     Return each run as it was measured and as two hypotheses have it.
 
     Parameters
     ----------
-    seen
-    comparing
-        Of these runs.
+    case
     before, after
     """
-    left = zip(comparing.residuals(before), comparing.residuals(after), strict=True)
+    left = zip(case.comparing.residuals(before), case.comparing.residuals(after), strict=True)
     return tuple(
-        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, comparing, j, *both, after)))
-        for j, (run, both) in enumerate(zip(seen, left, strict=True))
+        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, case.comparing, j, *both, after)))
+        for j, (run, both) in enumerate(zip(case.seen, left, strict=True))
     )
 
 
@@ -235,7 +229,7 @@ def _compared(
     fit: Fitted,
 ) -> list[Compared]:
     """Return each quantity that was measured in a run."""
-    table, rows = fit.linear[j], run.along.rows
+    table, rows = fit.linear[j], run.rows
     sd = comparing.noise_sd(j, table)
     n = len(rows.time_s)
     found = [
@@ -253,17 +247,17 @@ def _compared(
         for quantity, code in CODES.items()
         if (own := rows.kind == code).any()
     ]
-    if run.across is not None:
-        a, across = len(run.across), run.across.rows
-        noise = np.linalg.inv(run.across_whitener)
+    port_s, a = run.context.port_s, len(run.context.port_s)
+    if a:
+        noise, places = np.linalg.inv(run.context.whitener[:a, :a]), run.context.value[:a]
         found.append(
             Compared(
                 'position_across',
-                across.time_s - run.lead_in_s,
-                np.interp(across.time_s, rows.time_s, table.speed_m_s),
-                across.value,
-                across.value - before.rest[:a],
-                across.value - after.rest[:a],
+                port_s - run.lead_in_s,
+                np.interp(port_s, rows.time_s, table.speed_m_s),
+                places,
+                places - before.rest[:a],
+                places - after.rest[:a],
                 np.sqrt(np.sum(noise**2, axis=1)),
                 before.whitened[n : n + a],
                 after.whitened[n : n + a],

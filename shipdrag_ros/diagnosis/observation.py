@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
-from scipy.linalg import block_diag
 
-from shipdrag_ros.diagnosis.context import Context, Measured, Stop, damping_of, whitener_of
+from shipdrag_ros.diagnosis.context import Context, Stop, damping_of
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.record import BIN_S, RunRows
 from shipdrag_ros.estimation.run_down import RunDown
@@ -83,15 +82,18 @@ class Observation:
         Direction through water in the lead-in, from east, anticlockwise.
     speed_m_s
         Speed in the lead-in, roughly.
-    along, across
-        Measured along the heading and to port of it; across there are only
-        positions, None without.
-    across_whitener : (n, n)
-        Inverse Cholesky factor of the noise of `across`.
+    rows
+        Measured along the heading; of `POSITION` the distances along it [m].
+    variance : (n,)
+        Of the white noise of each row.
+    at : (n,)
+        Places of the rows among the times.
     context
         What is measured besides.
     ship
         As she was in this run, without effects.
+    geodetic
+        Whether positions came as latitude and longitude.
     notes
         A sentence for each input that is left out.
     """
@@ -105,11 +107,12 @@ class Observation:
     heading_rad: float
     heading_sd_rad: float
     speed_m_s: float
-    along: Measured
-    across: Measured | None
-    across_whitener: Float64
+    rows: Rows
+    variance: Float64
+    at: Int64
     context: Context
     ship: Ship
+    geodetic: bool = False
     notes: tuple[str, ...] = ()
 
     @property
@@ -125,7 +128,7 @@ class Observation:
     @property
     def inputs(self) -> set[str]:
         """Kinds of input of motion that were read."""
-        return {Input(code % KIND_COUNT).key for code in np.unique(self.along.rows.kind).tolist()}
+        return {Input(code % KIND_COUNT).key for code in np.unique(self.rows.kind).tolist()}
 
     @classmethod
     def of(cls, window: Window, ship: Ship, parameters: Parameters, *, name: str) -> Observation:
@@ -174,32 +177,34 @@ class Observation:
             since_s = np.maximum(rows.time_s + lead_in_s, 0.0)  # rounding
             return rows._replace(time_s=since_s), variance
 
-        along = rows_of(heading_rad, speed_m_s)
-        across, variance = rows_of(heading_rad + 0.5 * math.pi, 0.0)
+        rows, variance = rows_of(heading_rad, speed_m_s)
+        across, noise = rows_of(heading_rad + 0.5 * math.pi, 0.0)
         placed = across.kind == POSITION
-        to_port = Rows(*(each[placed] for each in across)), variance[placed]
-        times = np.unique(np.concatenate([along[0].time_s, to_port[0].time_s]))
+        times = np.unique(np.concatenate([rows.time_s, across.time_s[placed]]))
         shaft_s = run_down.shaft_s if run_down.by_shaft else 0.0
-        stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s)
+        stop = Stop(since_ns, lead_in_s, heading_rad, speed_m_s, shaft_s, run_down.stop_sd_s)
         # their noise is learnt from the steady record
-        learnt = to_port[0].time_s < lead_in_s - run_down.stop_sd_s
-        aside = Measured.of(*to_port, times) if learnt.any() else None
+        placed &= (across.time_s[placed] < lead_in_s - stop.sd_s).any()
+        port = Rows(*(each[placed] for each in across)), noise[placed]
         return cls(
             name,
             lead_in_s,
             times,
             run_down.stop_sd_s,
-            *(_stated_run_down(ship) or (run_down.shaft_s, run_down.shaft_sd_s)),
+            *(
+                (run_down.shaft_s, run_down.shaft_sd_s)
+                if ship.propulsion is None
+                else (ship.propulsion.run_down_s, ship.propulsion.sd)
+            ),
             heading_rad,
             heading_sd,
             speed_m_s,
-            Measured.of(*along, times),
-            aside,
-            np.zeros((0, 0))
-            if aside is None
-            else whitener_of(aside, ship, speed_m_s, lead_in_s, run_down.stop_sd_s),
-            Context.of(window, ship, times, stop),
+            rows,
+            variance,
+            np.searchsorted(times, rows.time_s),
+            Context.of(window, ship, times, stop, port),
             replace(ship, effects=()),
+            'position' in window.geodetic,
             record.notes,
         )
 
@@ -216,11 +221,6 @@ def _usable(window: Window, record: RunRows) -> Window:
         if name not in record.white_sd:  # a note of the record says why
             window = window.without(name, 'not used')
     return window
-
-
-def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
-    """Return the run-down of the thrust and its sd, where the ship file states it."""
-    return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
 
 
 def _heading(window: Window, since_ns: int, position_sd_m: float) -> tuple[float, float]:
@@ -291,9 +291,9 @@ def day_of(run: Observation) -> float:
 def lowest_m_s(run: Observation) -> float:
     """Return about the speed at the end."""
     speeds = [
-        run.along.rows.value[run.along.rows.kind == kind][-5:]
+        run.rows.value[run.rows.kind == kind][-5:]
         for kind in (0, 1)
-        if (run.along.rows.kind == kind).any()
+        if (run.rows.kind == kind).any()
     ]
     if speeds:
         return max(float(np.median(speeds[0])), 0.05 * run.speed_m_s)
@@ -324,35 +324,27 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     if run.context.depth_m is not None:
         scenario = replace(scenario, depth_m=run.context.depth_m)
     frame = Frame(run.ship, scenario, seen[0].heading_rad)
-    along = run.along
-    rows = Rows(along.rows.time_s - run.lead_in_s, along.rows.kind, along.rows.value)
-    steady = int(np.searchsorted(along.rows.time_s, run.lead_in_s))
+    steady = int(np.searchsorted(run.rows.time_s, run.lead_in_s))
     stop = StopPrior(max(run.stop_sd_s, 1e-3), run.run_down_s, run.run_down_sd_s)
     own = replace(run.ship, baseline=ship.baseline)  # as heavy as she was in this run
     model = RunModel.of(
-        rows,
-        along.variance,
+        run.rows._replace(time_s=run.rows.time_s - run.lead_in_s),
+        run.variance,
         steady,
         own,
         stop,
-        speed_m_s=run.speed_m_s,
-        range_m_s=(low, top),
+        speeds_m_s=(low, run.speed_m_s, top),
     )
     # whether a free propeller stands is the ship's, not the run's: it is odd once
     odd = next((each for each in seen if each.context.odd), None) is run
     run = replace(run, context=replace(run.context, odd=odd))
-    across = run.across
-    value, blocks = [run.context.value], [run.context.whitener]
-    if across is not None:
-        value.insert(0, across.rows.value)
-        blocks.insert(0, run.across_whitener)
     stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
     return RunSight(
         model,
         frame,
-        np.concatenate(value),
-        np.asarray(block_diag(*blocks, np.zeros((0, 0))), np.float64),
-        0 if across is None else len(across),
+        run.context.value,
+        run.context.whitener,
+        len(run.context.at_port),
         run.heading_sd_rad,
         stated,
         ship.baseline.run_scatter if ship.baseline else 0.0,
@@ -370,23 +362,20 @@ def _simulating(
         lead_in_s = min(max(first + later_s, 1.0), length - 1.0)  # within the record
         scenario = replace(frame.scenario, lead_in_s=lead_in_s, duration_s=length - lead_in_s)
         columns = simulate_columns(frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s)
-        along, across, distance = rows_of(run, columns)
-        context = run.context.predict(columns, actions, lead_in_s)
-        at = distance[:, :0] if run.across is None else distance[:, run.across.at]
-        return SimulatedRows(along, np.hstack([across, context]), at)
+        along, ahead = rows_of(run, columns)
+        rest = run.context.predict(columns, actions, lead_in_s)
+        return SimulatedRows(along, rest, ahead[:, run.context.at_port])
 
     return simulate
 
 
-def rows_of(seen: Observation, columns: Columns) -> tuple[Float64, Float64, Float64]:
-    """Return rows along and across (k, n), and the distance ahead (k, m), of each column."""
+def rows_of(seen: Observation, columns: Columns) -> tuple[Float64, Float64]:
+    """Return rows (k, n), and the distance ahead (k, m), of each column."""
     cos, sin = math.cos(seen.heading_rad), math.sin(seen.heading_rad)
     place = columns.radar_position_m
     ahead = cos * place[..., 0] + sin * place[..., 1]
-    to_port = cos * place[..., 1] - sin * place[..., 0]
-    kind, at = seen.along.rows.kind, seen.along.at
+    kind, at = seen.rows.kind, seen.at
     along = ahead[:, at]
     along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
-    across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    return along, across, ahead
+    return along, ahead

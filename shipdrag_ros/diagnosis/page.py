@@ -8,7 +8,6 @@ from pathlib import Path
 
 from shipdrag_ros.diagnosis import pictures, tables, words
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.diagnosis.tables import Score
 from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, dated
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.pictures import curves_picture, power_picture
@@ -19,13 +18,18 @@ from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import find
 
+_TRUST = (
+    'The method of this version was not scored as a whole on hidden effects.',
+    'A gap that shrinks does not prove a name: confounders shrink it as well. The probabilities, '
+    'not the gap, say which it is, and they hold only if the effect is one of the library or '
+    'clearly none of it.',
+)
+
 
 def write_diagnosis(
     path: Path,
     found: DiagnosisResult,
     ship: Ship | None,
-    *,
-    score: Score | None,
 ) -> None:
     """
     Write a diagnosis as one HTML file.
@@ -38,8 +42,6 @@ def write_diagnosis(
         What the runs gave.
     ship
         That they were held against; None: a record of sailing, without a ship file.
-    score
-        Of coastdowns held against a stated baseline, on hidden data; None: not scored.
     """
     name = f' of {ship.name}' if ship is not None and ship.name else ''
     runs = ', '.join(trace.name for trace in found.traces)
@@ -50,7 +52,7 @@ def write_diagnosis(
         _motions(found, ship),
         *_left(found, ship),
         _known(found, ship),
-        _trust(score if found.baseline == 'stated' else None),
+        Section('How far to trust this', text=_TRUST),
     ]
     sections = [*_verdict(found, ship), *(() if found.question else judged)]
     write_page(
@@ -126,12 +128,11 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
     if not shown:
         return
     declared = [find(name) for name in dict.fromkeys(each.name for each in shown)]
-    sizes = tables.parameters(shown) if found.effects else tables.sizes(found)
     yield Section(
         'How large it is',
         text=() if found.effects else ('Of each candidate, were it the one:',),
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
-        tables=[('In SI; sd is one standard deviation', sizes)],
+        tables=[('In SI; sd is one standard deviation', tables.sizes(found))],
     )
 
 
@@ -140,9 +141,9 @@ def _limits(found: DiagnosisResult) -> Iterator[Section]:
     if not found.limits:
         return
     caption = (
-        'Each size is that of 19 in 20, given that the effect is there; from the next size on '
-        'nine of ten such runs would have named it. - : no size is named, as another effect '
-        'leaves about the same trace'
+        'Each size is that of 19 in 20, given that the effect is there; from the next size on, '
+        'with its other parameters as usual, nine of ten such runs would have named it. - : no '
+        'size is named, as another effect leaves about the same trace'
     )
     yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
 
@@ -207,24 +208,6 @@ def _known(found: DiagnosisResult, ship: Ship | None) -> Section:
         stated = ', '.join(effect.name for effect in ship.effects)
         text.append(f'Effects that the ship file states already: {stated}.')
     return Section('What was known', text=text, tables=shown)
-
-
-def _trust(score: Score | None) -> Section:
-    if score is None:
-        text = ['The method of this version was not scored as a whole on hidden effects.']
-    else:
-        text = [
-            f'The method was tried on {score.cases} simulated cases (seed {score.seed}) made by '
-            'other formulas than its own, the hidden effect unknown to it, some outside its '
-            'library, with gusts, slow current and a baseline that is not exact.'
-        ]
-    text.append(
-        'A gap that shrinks does not prove a name: confounders shrink it as well. The '
-        'probabilities, not the gap, say which it is, and they hold only if the effect is one of '
-        'the library or clearly none of it.'
-    )
-    tried = () if score is None else (('Score on hidden effects', score.table()),)
-    return Section('How far to trust this', text=text, tables=tried)
 
 
 def _mass(ship: Ship | None) -> float:

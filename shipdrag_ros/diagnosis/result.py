@@ -380,12 +380,12 @@ class DiagnosisResult:
     __repr__ = short_repr
 
     verdict: Verdict
-    effects: tuple[EffectEstimate, ...]
-    candidates: tuple[Candidate, ...]
-    nothing: float
-    unnamed: float
     before: Gap
     baseline: str
+    effects: tuple[EffectEstimate, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    nothing: float = 0.0
+    unnamed: float = 0.0
     would_decide: tuple[Advice, ...] = ()
     where: Where | None = None
     after: Gap | None = None

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from shipdrag_ros.diagnosis.result import (
 )
 from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, StandingLog, shown
 from shipdrag_ros.diagnosis.verdict import asked, judge, waiting
+from shipdrag_ros.diagnosis.words import of_the_earth
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict
+from shipdrag_ros.inference.decision import CERTAIN, NONE, Verdict
 from shipdrag_ros.inference.rows import OUTLIER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses
@@ -91,18 +93,12 @@ def _diagnosed(legs: Legs, standing: StandingLog | None, no_coastdown: str) -> D
     if standing and not effects and standing.named.probability >= CERTAIN:
         # a name that something without one, beside it, does not touch
         verdict, effects = Verdict.NAMED, (standing.named,)
-    return DiagnosisResult(
-        verdict=verdict,
-        effects=effects,
-        candidates=judged.candidates,
-        nothing=found.probability.get(NONE, 0.0),
-        unnamed=found.probability.get(UNKNOWN, 0.0),
+    answer = judged.result(
         would_decide=declared(judged.candidates) if verdict is Verdict.ONE_OF else (),
         where=None if verdict is Verdict.NONE else _where(model, standing, best),
         before=_gap(found.best[NONE]),
         after=_gap(best) if judged.missing else None,
         baseline='none',
-        best=judged.best,
         notes=(
             *([standing.note] if standing else []),
             *legs.notes,
@@ -112,6 +108,7 @@ def _diagnosed(legs: Legs, standing: StandingLog | None, no_coastdown: str) -> D
         examined=(LOG_TRACK,),
         no_coastdown=no_coastdown,
     )
+    return replace(answer, verdict=verdict, effects=effects)
 
 
 def _gap(fit: SailingFit) -> Gap:
@@ -125,16 +122,10 @@ def _zeros_alone(standing: StandingLog, why: str, no_coastdown: str) -> Diagnosi
     fits = nothing, standing.joined(nothing)
     found = ComparedHypotheses((standing.way.effect,), fits)
     judged = judge(found, ())
-    return DiagnosisResult(
-        verdict=judged.decision.verdict,
-        effects=judged.effects,
-        candidates=judged.candidates,
-        nothing=found.probability[NONE],
-        unnamed=0.0,
+    return judged.result(
         where=standing.where if judged.missing else None,
         before=Gap(standing.rms_m_s, None, math.nan),
         baseline='none',
-        best=judged.best,
         notes=(standing.note, f'nothing else between log and track was examined: {why}'),
         examined=(LOG_TRACK,),
         no_coastdown=no_coastdown,
@@ -168,12 +159,8 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
             'without position and heading the courses are not known: a current and an offset '
             'of the log look alike'
         )
-    ruled_out = [effect.name for effect in shown() if effect not in model.effects]
-    if ruled_out:
-        found.append(
-            'the positions are latitude and longitude, whose scale is that of the Earth: '
-            f'{", ".join(ruled_out)} is ruled out'
-        )
+    if ruled_out := [effect for effect in shown() if effect not in model.effects]:
+        found.append(of_the_earth(ruled_out))
     return found
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic
+from typing import Any, Generic
 
 import numpy as np
 from scipy.special import logsumexp
@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.result import (
     Limit,
     RunSize,
 )
-from shipdrag_ros.diagnosis.words import names_text, probability, sentence
+from shipdrag_ros.diagnosis.words import listed, probability, sentence
 from shipdrag_ros.display import mistaken_units, ship_speed
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
 from shipdrag_ros.inference.decision import (
@@ -66,6 +66,7 @@ class ComparedRuns:
     seen: tuple[Observation, ...]
     comparing: Comparing
     found: ComparedHypotheses[Fitted]
+    ship: Ship
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,18 @@ class Judgement(Generic[Fit]):
             return self.found.best[UNKNOWN]
         return self.found.best[self.top if self.missing else NONE]
 
-    @property
-    def best(self) -> tuple[EffectEstimate, ...]:
-        """Effects of the most probable names, with their sizes."""
-        return sized(self.found.best[self.top], self.found.probability[self.top])
+    def result(self, **rest: Any) -> DiagnosisResult:
+        """Return what is answered, with what else there is to be said."""
+        probability = self.found.probability
+        return DiagnosisResult(
+            verdict=self.decision.verdict,
+            effects=self.effects,
+            candidates=self.candidates,
+            nothing=probability.get(NONE, 0.0),
+            unnamed=probability.get(UNKNOWN, 0.0),
+            best=sized(self.found.best[self.top], probability[self.top]),
+            **rest,
+        )
 
 
 def judge(
@@ -291,7 +300,7 @@ def ratio_before_the_stop(seen: Observation) -> float:
     seen
         A run.
     """
-    rows = seen.along.rows
+    rows = seen.rows
     steady = rows.time_s < seen.lead_in_s
     of_log = rows.value[steady & (rows.kind == LOG)]
     ground = rows.value[steady & (rows.kind == OVER_GROUND)]
@@ -349,39 +358,35 @@ def with_whole_glides(
         If there is no such part, and no run has enough samples.
     """
     if whole is None:
-        found = alone()
-        return replace(found, notes=(*found.notes, *notes))
+        return _noting(alone(), *notes)
+    held, why = None, ''
     try:
-        held = whole()
+        held = replace(whole(), coastdowns_used=coastdowns)
     except EarlierError:  # it counts for no part of a glide either
         raise
     except ShipdragError as error:  # a glide that is like none may not be followed
-        return _not_followed(alone, notes, error)
-    used = replace(held, coastdowns_used=coastdowns)
-    if held.verdict is Verdict.UNKNOWN and coastdowns:
-        try:
-            found = alone()
-        except (DiagnosisError, EstimationError) as error:
-            why = f'the coastdowns alone could not be diagnosed: {error}'
-            return replace(used, notes=(*held.notes, *notes, _HELD, why))
-        if found.verdict is Verdict.NAMED:
-            return replace(found, notes=(*found.notes, *notes, _APART))
-    return replace(used, notes=(*held.notes, *notes, _HELD))
-
-
-def _not_followed(alone: Diagnose, notes: Sequence[str], error: ShipdragError) -> DiagnosisResult:
-    """Diagnose the coastdowns alone; what is cut from them is no sign of nothing."""
-    why = f'all of each glide could not be held against the model: {error}'
+        why = f'all of each glide could not be held against the model: {error}'
+    if held and not (held.verdict is Verdict.UNKNOWN and coastdowns):
+        return _noting(held, *notes, _HELD)
     try:
         found = alone()
     except EarlierError:
         raise
-    except (DiagnosisError, EstimationError) as failed:
-        said = f'the coastdowns alone could not be diagnosed: {failed}'
+    except (DiagnosisError, EstimationError) as error:
+        said = f'the coastdowns alone could not be diagnosed: {error}'
+        if held:
+            return _noting(held, *notes, _HELD, said)
         raise DiagnosisError(f'{"; ".join((*notes, said, why))}. {_SOUND_PART}') from error
-    if found.candidates[0].names == NONE:
-        raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}') from error
-    return replace(found, notes=(*found.notes, *notes, why))
+    if held:
+        named = found.verdict is Verdict.NAMED
+        return _noting(found, *notes, _APART) if named else _noting(held, *notes, _HELD)
+    if found.candidates[0].names == NONE:  # what is cut from them is no sign of nothing
+        raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}')
+    return _noting(found, *notes, why)
+
+
+def _noting(found: DiagnosisResult, *notes: str) -> DiagnosisResult:
+    return replace(found, notes=(*found.notes, *notes))
 
 
 def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:
@@ -408,7 +413,7 @@ def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> Diagno
             'log and track agree: nothing is wrong between them that these records could show '
             f'(probability {probability(log_track.nothing)})'
         )
-        return replace(force, notes=(*force.notes, agree, *log_track.notes), examined=examined)
+        return replace(_noting(force, agree, *log_track.notes), examined=examined)
     besides = () if force.verdict is Verdict.NONE else (_besides(force),)
     return replace(
         log_track,
@@ -427,11 +432,7 @@ def _besides(force: DiagnosisResult) -> str:
     """Say what the force shows besides."""
     if force.verdict is Verdict.UNKNOWN:
         return f'in the force besides: {sentence(force)}'
-    likely = ', '.join(
-        f'{names_text(each.names)} ({probability(each.probability)})'
-        for each in force.candidates
-        if each.names
-    )
+    likely = listed([each for each in force.candidates if each.names])
     return f'in the force besides, compared with all hulls of her length and volume: {likely}'
 
 

@@ -21,7 +21,7 @@ from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
-from shipdrag_ros.simulation.effect import Scope
+from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import find
 
 _CHANNELS = {
@@ -43,7 +43,7 @@ def sentence(found: DiagnosisResult) -> str:
     Return the verdict in a sentence; first a question, or that there is no clean hull.
     """
     if found.question:
-        right = f'; if the unit is right: {_listed(found.held)}' if found.held else ''
+        right = f'; if the unit is right: {listed(found.held)}' if found.held else ''
         return f'{found.question}. The verdict waits for the answer{right}.'
     if found.baseline == 'fitted_here':
         names = {name for each in found.held if each.names != UNKNOWN for name in each.names}
@@ -87,9 +87,7 @@ def _verdict(found: DiagnosisResult) -> str:
             ]
             rest = [each for each in seen if each.names != NONE]
             if len(rest) == len(seen):
-                return (
-                    f'Missing is one of these: {_listed(rest)}. These runs cannot separate them.'
-                )
+                return f'Missing is one of these: {listed(rest)}. These runs cannot separate them.'
             said = f'{"Nothing else" if fitted else "Nothing"} is missing'
             if found.baseline == 'none':  # the force was not examined
                 said = 'Log and track agree'
@@ -97,9 +95,9 @@ def _verdict(found: DiagnosisResult) -> str:
             if not rest:
                 return f'{said}.'
             if seen[0].names == NONE:  # the most probable comes first
-                return f'{said}, or {_listed(rest)}. These runs cannot separate them.'
+                return f'{said}, or {listed(rest)}. These runs cannot separate them.'
             return (
-                f'Missing is one of these: {_listed(rest)}; or {said[0].lower()}{said[1:]}. '
+                f'Missing is one of these: {listed(rest)}; or {said[0].lower()}{said[1:]}. '
                 'These runs cannot separate them.'
             )
         case Verdict.UNKNOWN:
@@ -141,7 +139,9 @@ def would_be_named(found: DiagnosisResult) -> str:
     if not shown:
         return ' No single effect of any size would have been named by these runs.'
     sizes = ', '.join(f'{names_text([name])} {edge}' for _, name, edge in shown[:_MOST_LIMITS])
-    return f' These runs would have named, nine times in ten: {sizes}.'
+    several = any(len(find(name).parameters) > 1 for _, name, _ in shown[:_MOST_LIMITS])
+    usual = ', other parameters as usual' if several else ''
+    return f' These runs would have named, nine times in ten{usual}: {sizes}.'
 
 
 def _from(least: float, quantity: Parameter, limit: Limit) -> str:
@@ -353,6 +353,16 @@ def names_text(names: Sequence[str]) -> str:
     return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
 
 
+def of_the_earth(ruled_out: Sequence[Effect]) -> str:
+    """
+    Say what latitude and longitude rule out.
+    """
+    return (
+        'the positions are latitude and longitude, whose scale is that of the Earth: '
+        f'{", ".join(effect.name for effect in ruled_out)} is ruled out'
+    )
+
+
 def probability(value: float) -> str:
     """
     Return a probability; what is all but certain is not said to be certain.
@@ -423,7 +433,10 @@ def _on_board(quantity: Parameter, found: Parameter) -> str:
     return text
 
 
-def _listed(candidates: Sequence[Candidate]) -> str:
+def listed(candidates: Sequence[Candidate]) -> str:
+    """
+    Name candidates, each with its probability.
+    """
     return ', '.join(
         f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
     )

@@ -87,6 +87,8 @@ class Window:
         What was left out, a sentence each.
     further
         Series of further instruments, by the name of the input; of those heard.
+    geodetic
+        Inputs of position that came as latitude and longitude.
     doubted_log, log_doubt
         The log most probably in a wrong scale, and that probability.
     told_ns
@@ -114,6 +116,7 @@ class Window:
     depth: Series
     notes: tuple[str, ...] = ()
     further: Mapping[str, Series] = field(default_factory=dict)
+    geodetic: frozenset[str] = frozenset()
     doubted_log: str = 'speed_through_water'
     log_doubt: float = 0.0
     told_ns: int | None = None
@@ -316,24 +319,24 @@ class Window:
                     channel.input: positions(channel) if channel in GEODETIC else series(channel)
                     for channel in further
                 },
+                geodetic=frozenset(origins),
             )
 
         since_ns = start_ns if before_ns is None else min(before_ns, start_ns)
-        heard = (block.stamp_ns >= since_ns) & (block.stamp_ns <= end_ns)
-        there = [Channel(code) for code in np.unique(block.channel[heard]).tolist()]
-        further = [Channel[each.name.replace('_GEODETIC', '')] for each in there]
-        further = sorted(
-            {each for each in further if each.input in FURTHER}, key=lambda c: (c.kind, c.input)
-        )
+        further = _further(block, since_ns, end_ns)
         each_position = {
             metres: (series(metres), series(degrees)) for metres, degrees in GEODETIC.items()
         }
+        origins = {
+            channel.input: degrees.value[0]
+            for channel, (metres, degrees) in each_position.items()
+            if len(degrees) > len(metres)
+        }
 
         def positions(channel: Channel) -> Series:
-            metres, degrees = each_position[channel]
-            if len(degrees) <= len(metres):
+            if channel.input not in origins:
                 return series(channel)
-            return _local_plane(series(GEODETIC[channel]), degrees.value[0])
+            return _local_plane(series(GEODETIC[channel]), origins[channel.input])
 
         notes = tuple(
             f'{channel.input} came as metres ({len(metres)}) and as latitude and longitude '
@@ -346,6 +349,16 @@ class Window:
             return window
         inside = (block.stamp_ns >= before_ns) & (block.stamp_ns < start_ns)
         return replace(window, before=part(before_ns, start_ns))
+
+
+def _further(block: Block, since_ns: int, end_ns: int) -> list[Channel]:
+    """Return the channels of further instruments that speak."""
+    heard = (block.stamp_ns >= since_ns) & (block.stamp_ns <= end_ns)
+    there = [Channel(code) for code in np.unique(block.channel[heard]).tolist()]
+    found = {Channel[each.name.replace('_GEODETIC', '')] for each in there}
+    return sorted(
+        (each for each in found if each.input in FURTHER), key=lambda c: (c.kind, c.input)
+    )
 
 
 def _local_plane(geodetic: Series, origin: Float64) -> Series:

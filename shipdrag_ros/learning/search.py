@@ -154,7 +154,6 @@ class _LearningCase(ComparedRuns):
     """Runs with forms and the library's effects compared."""
 
     runs: tuple[CoastRun, ...]
-    ship: Ship
     forms: dict[str, LearnableForm]
     ways: dict[str, list[EffectWay]]
 
@@ -193,7 +192,7 @@ class _LearningCase(ComparedRuns):
     ) -> _LearningCase:
         progress('comparing forms', 0, 0)
         comparing = _comparing(runs, seen, ship, ways, library=library)
-        return cls(tuple(seen), comparing, comparing.compare(), tuple(runs), ship, kept, ways)
+        return cls(tuple(seen), comparing, comparing.compare(), ship, tuple(runs), kept, ways)
 
     def fitted_ways(self) -> dict[str, list[EffectWay]]:
         """Return the ways of each form, begun where they were fitted."""
@@ -254,7 +253,7 @@ def kind_text(kind: tuple[str, str, str]) -> str:
 
 def _span(seen: Sequence[Observation]) -> Span:
     """Return what runs hold, by which forms may be told apart."""
-    rows = [run.along.rows.kind for run in seen]
+    rows = [run.rows.kind for run in seen]
     days = [day_of(run) for run in seen]
     depths = [run.context.depth_m or 0.0 for run in seen]
     several = len(seen) >= _MANY
@@ -407,7 +406,7 @@ class _Judged:
         case, stated = self.case, self.case.comparing.as_stated
         if next(iter(kinds)) == case.of_kind(NONE):
             return None
-        return where(case.seen, case.comparing, case.found, stated, stated, (), of_force=of_force)
+        return where(case, stated, stated, (), of_force=of_force)
 
     def _percent(self, best: Names) -> float:
         """Return how large a form is, of the resistance, where it is largest."""

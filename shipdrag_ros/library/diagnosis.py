@@ -174,10 +174,9 @@ class Diagnosis(Shown):
             HTML file; an existing one is replaced.
         """
         from shipdrag_ros.diagnosis.page import write_diagnosis
-        from shipdrag_ros.diagnosis.tables import Score
 
         with writing(path) as page:
-            write_diagnosis(page, self.found, self.ship, score=Score.published())
+            write_diagnosis(page, self.found, self.ship)
 
     def _compared(self, run: int, quantity: str | None) -> Compared:
         from shipdrag_ros.diagnosis.pictures import ALONG

@@ -226,7 +226,6 @@ _ENDED = {
     EndedBy.SILENCE: 'ALL INPUTS SILENT: this run ends here',
     EndedBy.RESET: 'RESET: this run is lost',
     EndedBy.RECORD_END: 'RECORD ENDS: this run ends here',
-    EndedBy.UNKNOWN: 'NO LONGER GLIDING: this run ends here',
 }
 
 

@@ -187,13 +187,13 @@ class Session:
 
     def fall_silent(self, reason: str, now_ns: int) -> None:
         """
-        Take it that no source of the motion has been heard for too long.
+        End a coastdown that runs, as no source of the motion has been heard for too long.
         """
         arrival_ns = self.watch_clock(now_ns)
         if self.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
             return
         self._obey_in_replay(self._event(EventKind.SILENCE, reason), arrival_ns)
-        self._in_turn(lambda: self._report(self.monitor.fall_silent(arrival_ns)))
+        self._in_turn(lambda: self._report(self.monitor.fall_silent()))
 
     def engine_stopped(self, now_ns: int) -> tuple[bool, str]:
         """

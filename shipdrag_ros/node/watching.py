@@ -140,7 +140,6 @@ class Watching:
         self._heard = (0.0, 0)  # steady time [s] and time of the node [ns]
         self._accepted = (0.0, 0)
         self._tick_s: float | None = None
-        self._told_s = 0.0  # length of a silence when it was told last
         self._stepped: dict[str, tuple[float, str]] = {}
 
     def tick(self, session: Session, health: Mapping[str, InputHealth], now_ns: int) -> None:
@@ -216,7 +215,7 @@ class Watching:
         if away or any(age is not None and age <= last_s for age in ages):
             self._heard = now
         if away or used != self._used:
-            self._accepted, self._used, self._told_s = now, used, 0.0
+            self._accepted, self._used = now, used
         if session.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
             return
         stop_s = self._parameters.data_stop_s
@@ -229,8 +228,7 @@ class Watching:
             silent_s = steady_s - since[0]
             if self._simulated:
                 silent_s = min(silent_s, (now_ns - since[1]) * 1e-9)
-            if silent_s > max(limit_s, 2.0 * self._told_s):
-                self._told_s = silent_s
+            if silent_s > limit_s:
                 names = ', '.join(MOTION_INPUTS)
                 session.fall_silent(f'{what} of {names} for {silent_s:.0f} s', now_ns)
                 return

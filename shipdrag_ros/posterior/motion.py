@@ -6,7 +6,8 @@ The motion with its derivatives by all unknowns, and what instruments read of it
     r(u) = known(u) + sum_j theta_j R_j(u)
     T = (1 - l) ((1 + q) nu^2 - q nu u / u_0) + l exp(-(t - t_0) / LEFT_S)  from t_0 on, 1 before
     nu = exp(-(t - t_0) / tau)
-    log = (1 + b_1) u(t - lag) + b_0;  over ground = u(t - lag) + c;  place = x_0 + x + c t
+    log = (1 + b_1) u(t - lag) + b_0
+    over ground = (1 + g) (u(t - lag) + c);  place = x_0 + (1 + g) (x + c t)
 
 Every force that depends on the speed alone is a column of a table over the speed: parts of the
 law, its error, and what an effect adds. So the law and its effects are one thing here.
@@ -24,7 +25,8 @@ from shipdrag_ros.posterior.priors import LEFT_S
 from shipdrag_ros.samples import Float64
 
 # unknowns behind the coefficients theta; the first five change the motion
-SPEED, THRUST, TAU, INERTIA, LEFT, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG, GROUND_LAG = range(12)
+SPEED, THRUST, TAU, INERTIA, LEFT, STOP, PLACE, CURRENT, SCALE, OFFSET, LAG = range(11)
+GROUND_SCALE, GROUND_LAG = range(LAG + 1, LAG + 3)
 EXTRAS = GROUND_LAG + 1
 OWN = EXTRAS - PLACE  # of each further instrument behind them, from its `PLACE` on
 _MOVING = 5
@@ -235,7 +237,7 @@ def predict(
     Parameters
     ----------
     forces
-    unknowns : (k + 12,)
+    unknowns : (k + 13,)
         Behind them `OWN` for each further number of instruments: place, scale and so on.
     grid_s : (g,)
         Of the integration, from 0 on.
@@ -295,16 +297,17 @@ def predict(
             )
             acceleration = (1.0 - s) * rate[cell, 0] + s * rate[cell + 1, 0]
         speed[i] = now
-        factor = 1.0 + unknowns[own + SCALE] if kind == LOG else 1.0
+        factor = 1.0 + unknowns[own + (SCALE if kind == LOG else GROUND_SCALE)]
         for j in range(p):
             table[1 + j, i] = factor * here[1 + j]
         at = 1 + k
         if place:
-            predicted = unknowns[own + PLACE] + u_0 * stop + here[0] + current * rows.time_s[i]
-            table[at + SPEED, i] += stop
-            table[at + STOP, i] = u_0 - now
-            table[1 + own + PLACE, i] = 1.0
-            table[at + CURRENT, i] = rows.time_s[i]
+            way = u_0 * stop + here[0] + current * rows.time_s[i]
+            predicted = unknowns[own + PLACE] + factor * way
+            table[at + SPEED, i] += factor * stop
+            table[at + STOP, i] = factor * (u_0 - now)
+            table[1 + own + PLACE, i], table[1 + own + GROUND_SCALE, i] = 1.0, way
+            table[at + CURRENT, i] = factor * rows.time_s[i]
         else:
             table[at + STOP, i] = -factor * acceleration * by_time
             predicted = factor * now
@@ -313,9 +316,9 @@ def predict(
                 table[1 + own + SCALE, i], table[1 + own + OFFSET, i] = now, 1.0
                 table[1 + own + LAG, i] = -factor * acceleration * by_lag
             else:
-                predicted += current
-                table[at + CURRENT, i] = 1.0
-                table[1 + own + GROUND_LAG, i] = -acceleration * by_lag
+                predicted += factor * current
+                table[at + CURRENT, i], table[1 + own + GROUND_SCALE, i] = factor, now + current
+                table[1 + own + GROUND_LAG, i] = -factor * acceleration * by_lag
         table[0, i] = rows.value[i] - predicted
     return table, speed
 

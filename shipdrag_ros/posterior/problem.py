@@ -9,7 +9,7 @@ probability. All families share the rows and the unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -61,7 +61,7 @@ class Family:
     A prior of all unknowns: mean and precision (p,), and the probability of the family.
 
     `level` is that of the hull over the generic one, about which the prior is; `usual` says
-    whether wind and depth are in their first state.
+    whether wind and depth are in their first state, and no scale is wrong.
     """
 
     name: str
@@ -133,7 +133,7 @@ class RunModel:
 
     @property
     def usual(self) -> RunModel:
-        """The same in the first state of wind and depth: a fit climbs there."""
+        """The same with wind, depth and scales as they usually are: a fit climbs there."""
         return replace(self, families=tuple(each for each in self.families if each.usual))
 
     @classmethod
@@ -145,9 +145,9 @@ class RunModel:
         ship: Ship,
         stop: StopPrior,
         *,
-        speed_m_s: float,
-        range_m_s: tuple[float, float],
+        speeds_m_s: tuple[float, float, float],
         weather: Weather | None = None,
+        geodetic: Iterable[int] = (),
     ) -> RunModel:
         """
         Set up the model of a run.
@@ -162,14 +162,16 @@ class RunModel:
             How many of them are before the stop.
         ship
         stop
-        speed_m_s
-            At the stop, roughly.
-        range_m_s
-            Over which the law reaches: from the lowest to the highest speed, of other runs too.
+        speeds_m_s
+            Roughly: the lowest, that at the stop, and the highest that the law reaches, of other
+            runs too.
         weather
-            None: wind and depth are part of r, and no unseen force acts.
+            None: wind and depth are part of r, no unseen force acts and no scale is wrong.
+        geodetic
+            Codes of the positions that are latitude and longitude.
         """
-        law = HullLaw.of(ship, *range_m_s)
+        low_m_s, speed_m_s, high_m_s = speeds_m_s
+        law = HullLaw.of(ship, low_m_s, high_m_s)
         tau_s = _tau_s(stop)
         adds: tuple[Influence, ...] = ()
         if weather is not None:
@@ -187,7 +189,8 @@ class RunModel:
                 place = rows.value[rows.kind == code]
                 at = np.searchsorted(rows.time_s[rows.kind == code], 0.0)
                 start[k + motion.own(code) + motion.PLACE] = place[min(int(at), len(place) - 1)]
-        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds))
+        scales = _scales(kinds, geodetic) if weather is not None else {}
+        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds, scales))
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -196,7 +199,7 @@ class RunModel:
             _grid(end, tau_s),
             start,
             families,
-            range_m_s[0],
+            low_m_s,
             speed_m_s,
             law,
             adds,
@@ -272,6 +275,7 @@ def _all_families(
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
+    errors: Mapping[int, Declared],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
@@ -289,12 +293,15 @@ def _all_families(
         precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
         chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
-        for lag, force in product(_lags(kinds), _after_stop(stop, added, hull.level)):
+        for lag, force, wrong in product(
+            _lags(kinds), _after_stop(stop, added, hull.level), _wrong_scales(errors)
+        ):
             own, known = mean.copy(), precision.copy()
-            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown):
+            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *wrong.unknown):
                 own[extra + place], known[extra + place] = prior_mean, prior_sd**-2.0
-            part = chance * lag.chance * force.chance
-            yield Family(force.name or hull.name, part, own, known, hull.level, usual)
+            part = chance * lag.chance * force.chance * wrong.chance
+            plain = usual and not wrong.unknown
+            yield Family(force.name or hull.name, part, own, known, hull.level, plain)
 
 
 class _Option(NamedTuple):
@@ -343,6 +350,27 @@ def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
         (1.0 - unfiltered, priors.LOG_LAG),
     ):
         yield _Option(chance, ((motion.LAG, lag.mean, lag.sd),))
+
+
+def _scales(kinds: Iterable[int], geodetic: Iterable[int]) -> dict[int, Declared]:
+    """Return, by the place of the unknown, the scales that may be wrong."""
+    of_earth = set(map(motion.own, geodetic))
+    found = {}
+    for code in sorted(kinds):
+        own = motion.own(code)
+        if code % KIND_COUNT == LOG:
+            found[own + motion.SCALE] = priors.WRONG_LOG_SCALE
+        elif own not in of_earth:
+            found[own + motion.GROUND_SCALE] = priors.WRONG_GROUND_SCALE
+    return found
+
+
+def _wrong_scales(scales: Mapping[int, Declared]) -> Iterator[_Option]:
+    """Yield which instrument is in a wrong scale: none, or one."""
+    chance = priors.WRONG_SCALE.mean
+    yield _Option(1.0 - chance * len(scales))
+    for place, size in scales.items():
+        yield _Option(chance, ((place, size.mean, size.sd),))
 
 
 class _Hull(NamedTuple):

@@ -346,7 +346,7 @@ def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
     if isinstance(item, StopMark):
         monitor.engine_stopped(item.receive_ns)
         return []
-    return monitor.fall_silent(item.receive_ns)
+    return monitor.fall_silent()
 
 
 def _in_window(

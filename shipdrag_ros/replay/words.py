@@ -10,9 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from shipdrag_ros import __version__
 from shipdrag_ros.coastdown.events import (
     ENDED_BY,
+    EndedBy,
     EndedCoastdown,
     Event,
     NotCoastdown,
@@ -23,7 +26,7 @@ from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
-from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SECOND_NS, Channel
 from shipdrag_ros.ship import Ship
 
 StretchSpan = tuple[int, int]
@@ -32,6 +35,8 @@ _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
+_FOLLOWED_NS = 3600 * SECOND_NS  # after a gap
+_OF_MOTION = [channel for channel in Channel if channel.input in ALL_MOTION]
 _UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
 _SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
@@ -68,8 +73,8 @@ def ended(coastdown: EndedCoastdown) -> str:
     """
     text, regimes = ENDED_BY[coastdown.ended_by], coastdown.regimes
     chances = {} if regimes is None else regimes.ends(coastdown.end_ns)
-    chance = chances.get(coastdown.ended_by, 0.0)
-    return f'{text} (P {chance:.2f})' if chance else text
+    chance = f'{chances.get(coastdown.ended_by, 0.0):.2f}'
+    return text if chance == '0.00' else f'{text} (P {chance})'
 
 
 def recorded_sentence(recorded: Recorded) -> str:
@@ -229,7 +234,33 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
         *_inputs(result.inputs),
         *_resets(result.events),
         *_unexplained(result.events),
+        *_not_found_again(result),
     )
+
+
+def _not_found_again(result: ReplayResult) -> Iterator[str]:
+    """Say of which glides the readings ceased, and no rest was found once they were back."""
+    told = [each for each in result.events if isinstance(each, EndedCoastdown) and each.stands]
+    followed = {cut.start_ns for each in told for cut in each.cuts}
+    for one in told:
+        if one.ended_by not in (EndedBy.DATA_STOP, EndedBy.SILENCE) or one.end_ns in followed:
+            continue
+        span_ns = result.run.span_ns
+        assert span_ns is not None  # it was read
+        later = result.samples(one.end_ns + 1, one.end_ns + _FOLLOWED_NS, 0)
+        speeds = np.isin(later.channel, _OF_MOTION) & (later.stamp_ns > one.end_ns)
+        if not speeds.any():
+            continue
+        first = int(np.flatnonzero(speeds)[0])
+        silent_s = (int(later.stamp_ns[first]) - one.end_ns) / SECOND_NS
+        again_s = (int(later.receive_ns[first]) - span_ns[0]) / SECOND_NS
+        last_s = (span_ns[1] - span_ns[0]) / SECOND_NS
+        at = _moment(one.end_ns, span_ns)
+        yield (
+            f'the readings of speed ceased for {silent_s:.0f} s at {at}: the coastdown ends '
+            'there, and no rest of it was found; if she went on '
+            f'without thrust, say so with --window {again_s:.0f} {last_s:.0f}'
+        )
 
 
 def _unexplained(events: Sequence[Event]) -> Iterator[str]:

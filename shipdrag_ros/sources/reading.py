@@ -22,7 +22,7 @@ import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
-from shipdrag_ros.bags.contents import Contents, FileChannel
+from shipdrag_ros.bags.contents import Contents
 from shipdrag_ros.bags.mcap_file import BagFiles, is_bag
 from shipdrag_ros.bags.message_index import Messages
 from shipdrag_ros.bags.records import MAGIC
@@ -227,7 +227,7 @@ class LogPart:
         self.contents = Contents()
         self._number = {key: number for number, key in enumerate(log.counts)}
         for (topic, kind), number in self._number.items():
-            self.contents.channels[number] = FileChannel(topic, kind, 'cdr')
+            self.contents.channels[number] = topic, kind
             self.contents.counts[number] = log.counts[topic, kind]
         for name, text in log.attachments.items():
             self.contents.attachments[name] = text.encode()

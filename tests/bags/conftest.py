@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,18 @@ def record(seed: int = 1, seconds: int = 60) -> Block:
             Block.of(channel, stamps, value, receive_ns=stamps + delays, variance=variance)
         )
     return in_arrival_order(blocks)
+
+
+def as_record(opcode: int, content: bytes, length: int | None = None) -> bytes:
+    """A record of a file, perhaps with another length than its own."""
+    return struct.pack('<BQ', opcode, len(content) if length is None else length) + content
+
+
+def as_chunk(compression: str, packed: bytes, size: int, checksum: int = 0) -> bytes:
+    """A chunk of records that unpack to so many bytes."""
+    name = compression.encode()
+    head = struct.pack('<QQQII', 1, 1, size, checksum, len(name)) + name
+    return as_record(6, head + struct.pack('<Q', len(packed)) + packed)
 
 
 @pytest.fixture(scope='session')

@@ -204,7 +204,7 @@ def test_a_part_that_cannot_be_compacted_is_whole_and_counted_and_it_is_said_why
     it = recording(tmp_path, earlier=map(message, range(10)))
     progress = end(it)
     assert (progress.lost, progress.uncompacted, progress.error) == (0, 1, '')
-    assert 'cannot be compacted: [Errno 21] Is a directory' in progress.why_uncompacted
+    assert 'cannot be compacted: Is a directory' in progress.why_uncompacted
     (tmp_path / 'a_000.mcap.compacting').rmdir()
     assert all_numbers(tmp_path) == list(range(10))
 

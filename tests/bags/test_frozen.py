@@ -15,7 +15,7 @@ import pytest
 from mcap.reader import make_reader
 
 from shipdrag_ros import __version__
-from shipdrag_ros.bags import info, open_runs
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.writer import RecordWriter, attachment, content_of
 from shipdrag_ros.cli import main
@@ -31,9 +31,8 @@ def test_a_bag_of_an_earlier_version_is_read_and_replayed(version: str, capsys) 
     path = FOLDER / f'recorded_by_{version}.mcap'
     assert check([path])[0].sound
     (run,) = open_runs([path])
-    about = info(run)
-    assert (about.software, about.warnings, about.indexed) == (version, (), True)
-    inputs = {topic.input: topic.messages for topic in about.topics if topic.input}
+    assert (run.software, run.warnings, run.indexed) == (version, (), True)
+    inputs = {topic.input: topic.messages for topic in run.topics if topic.input}
     assert inputs == dict.fromkeys(('heading', 'position', 'shaft', 'speed_through_water'), 316)
     assert main(['replay', str(path)]) == 0
     said = ' '.join(capsys.readouterr().out.split())

@@ -101,7 +101,6 @@ def test_a_batch_is_bounded_and_its_size_changes_nothing(write_bag, block, monke
 
 def test_memory_does_not_grow_with_the_bag(write_bag: WriteBag, monkeypatch) -> None:
     monkeypatch.setattr(run_module, 'BATCH', 256)
-    monkeypatch.setattr(mcap_file, '_AHEAD_BYTES', 60_000)  # less than either bag holds
     monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 20_000)
     peaks = []
     for n in (8000, 40_000):
@@ -325,3 +324,30 @@ def test_a_bag_without_messages_is_a_run_without_samples(tmp_path: Path) -> None
     assert list(run.inputs()) == []
     assert run.span_ns is None
     shutil.rmtree(tmp_path)
+
+
+def test_attachments_outputs_and_damage(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.attach('ship.yaml', 'é')
+        mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'))
+        bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+    content = (tmp_path / 'a.mcap').read_bytes()
+    (tmp_path / 'a.mcap').write_bytes(content[:-20])
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert run.attachments == {'ship.yaml': 'é'}
+    assert run.node == '/coastdown_node'
+    assert not run.indexed
+    assert run.topics[0].rate_hz is None
+    assert len(run.warnings) == 1
+
+
+def test_an_empty_bag_of_another_tool(tmp_path: Path) -> None:
+    with (tmp_path / 'a.mcap').open('wb') as file:
+        writer = Writer(file, index_types=IndexType.NONE)
+        writer.start()
+        writer.finish()
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert run.span_ns is None
+    assert run.duration_s == 0.0
+    assert run.software is None
+    assert run.compression == 'none'

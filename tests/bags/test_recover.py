@@ -9,6 +9,7 @@ import resource
 import stat
 import struct
 import time
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,13 @@ from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionMode
 
-from shipdrag_ros.bags import BagWriter, Compression, info, open_runs
+from shipdrag_ros.bags import BagWriter, Compression, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.records import HEAD, MAGIC, walk
+from shipdrag_ros.bags.records import MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import assert_same, read_samples, rosbag2
+from tests.bags.conftest import as_chunk, as_record, assert_same, read_samples, rosbag2
 
 WriteBag = Callable[..., Path]
 MIB = 1 << 20
@@ -170,16 +171,6 @@ def test_what_the_summary_leaves_out_is_named_and_recovered(tmp_path, options, e
     assert check([result.output])[0].sound
 
 
-def record(opcode: int, content: bytes, length: int | None = None) -> bytes:
-    return HEAD.pack(opcode, len(content) if length is None else length) + content
-
-
-def chunk(compression: str, packed: bytes, size: int) -> bytes:
-    name = compression.encode()
-    head = struct.pack('<QQQII', 0, 0, size, 0, len(name)) + name
-    return record(Opcode.CHUNK, head + struct.pack('<Q', len(packed)) + packed)
-
-
 @pytest.fixture(scope='module', params=['zstd', 'lz4'])
 def bomb(request: pytest.FixtureRequest) -> tuple[str, bytes]:
     """Pack 512 MiB of zeros, by a compression, into some MiB at most."""
@@ -194,8 +185,8 @@ def bomb(request: pytest.FixtureRequest) -> tuple[str, bytes]:
     return request.param, b''.join((*packed, packer.flush()))
 
 
-HEADER = record(Opcode.HEADER, struct.pack('<I4sI', 4, b'ros2', 0))
-END = record(Opcode.DATA_END, bytes(4)) + record(Opcode.FOOTER, bytes(20)) + MAGIC
+HEADER = as_record(Opcode.HEADER, struct.pack('<I4sI', 4, b'ros2', 0))
+END = as_record(Opcode.DATA_END, bytes(4)) + as_record(Opcode.FOOTER, bytes(20)) + MAGIC
 
 
 def use_everything(folder: Path, contents: Sequence[bytes]) -> list[set[tuple[str, str]]]:
@@ -207,7 +198,6 @@ def use_everything(folder: Path, contents: Sequence[bytes]) -> list[set[tuple[st
         named.append({(d.record, d.kind.value) for d in check([path])[0].damage})
         recover(path, folder / f'{number}.saved.mcap')
         for run in open_runs([path]):
-            info(run)
             list(run.inputs())
     return named
 
@@ -238,7 +228,7 @@ def in_a_process(use: Callable[[], Any]) -> tuple[Any, int]:
 
 @pytest.mark.parametrize('stated', [1000, 1 << 29])
 def test_a_bomb_is_named_and_takes_neither_memory_nor_time(tmp_path, bomb, stated):
-    (named,), grown = used(tmp_path, chunk(*bomb, stated))
+    (named,), grown = used(tmp_path, as_chunk(*bomb, stated))
     kinds = {'too_large'} if stated > 1000 else {'compression', 'size'}
     assert named & {('chunk', kind) for kind in kinds}
     assert grown < 700 * MIB, 'a chunk is unpacked up to 256 MiB, in pieces that are then joined'
@@ -248,8 +238,8 @@ def test_lengths_of_2_to_the_60_are_named_and_take_no_memory(tmp_path: Path) -> 
     opcodes = range(1, 16)
     (unpacked, *named), grown = used(
         tmp_path,
-        chunk('zstd', b'', 1 << 60),
-        *(record(opcode, bytes(100), 1 << 60) for opcode in opcodes),
+        as_chunk('zstd', b'', 1 << 60),
+        *(as_record(opcode, bytes(100), 1 << 60) for opcode in opcodes),
     )
     assert ('chunk', 'too_large') in unpacked
     for opcode, found in zip(opcodes, named, strict=True):
@@ -263,7 +253,7 @@ def test_overlapping_records_are_not_read_again_and_again(tmp_path: Path) -> Non
     for count in (2000, 20_000):
         head = bytes(24) + struct.pack('<Q', 50_000 - 36) + b'abc'
         path = tmp_path / f'{count}.mcap'
-        path.write_bytes(MAGIC + record(Opcode.ATTACHMENT, head, 50_000) * count)
+        path.write_bytes(MAGIC + as_record(Opcode.ATTACHMENT, head, 50_000) * count)
         begun = time.process_time()
         assert not check([path])[0].sound
         times.append(time.process_time() - begun)
@@ -347,6 +337,21 @@ def test_sound_chunks_are_copied_as_they_are(tmp_path: Path) -> None:
     assert found.messages_recovered + found.messages_crc_suspect <= 4000
     (run,) = open_runs([tmp_path / 'c.mcap'])
     assert sum(len(part) for part in run.inputs() if isinstance(part, Block)) > 3000
+
+
+def test_a_chunk_with_a_topic_that_cannot_be_read_is_not_copied(tmp_path: Path) -> None:
+    """Its checksum is right; the channel has a key of metadata without its value."""
+    names = b''.join(struct.pack('<I', len(text)) + text for text in (b'/a', b'cdr'))
+    sound = as_record(Opcode.CHANNEL, struct.pack('<HH', 1, 0) + names + bytes(4))
+    broken = as_record(Opcode.CHANNEL, struct.pack('<HH', 2, 0) + names + struct.pack('<II', 4, 0))
+    message = as_record(Opcode.MESSAGE, struct.pack('<HIQQ', 1, 0, 1, 1) + bytes(20_000))
+    records = broken + message
+    chunk = as_chunk('', records, len(records), zlib.crc32(records))
+    (tmp_path / 'a.mcap').write_bytes(MAGIC + HEADER + sound + chunk + END)
+    found = recover(tmp_path / 'a.mcap', tmp_path / 'b.mcap')
+    assert (found.messages_recovered, found.messages_crc_suspect) == (1, 0)
+    assert [(each.record, each.kind.value) for each in found.damage] == [('channel', 'content')]
+    assert check([tmp_path / 'b.mcap'])[0].sound
 
 
 def test_chunks_of_two_files_whose_numbers_meet_keep_their_topics(tmp_path: Path) -> None:

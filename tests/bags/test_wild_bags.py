@@ -9,8 +9,10 @@ import struct
 import tracemalloc
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -21,15 +23,17 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType
 
-from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs
+from shipdrag_ros.bags import BagWriter, Compression, mcap_file, open_runs
+from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.durable import LiveFile
-from shipdrag_ros.bags.records import HEAD, MAGIC, walk
+from shipdrag_ros.bags.records import MAGIC, walk
+from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
-from tests.bags.conftest import foreign
+from tests.bags.conftest import as_chunk, as_record, foreign
 
 EXAMPLES = settings(
     max_examples=120,
@@ -61,6 +65,7 @@ MAKERS: dict[str, Callable[[Path, Block], None]] = {
     'lz4': lambda path, block: by_us(path, block, Compression.LZ4),
     'none': lambda path, block: by_us(path, block, Compression.NONE),
     'live': unfinished,
+    'one chunk': lambda path, block: foreign(path, block, chunk_size=1 << 20),
     'unchunked': lambda path, block: foreign(path, block, use_chunking=False),
     'no checksums': lambda path, block: foreign(
         path, block, enable_crcs=False, chunk_size=3000, compression=CompressionType.NONE
@@ -87,8 +92,7 @@ def read(path: Path, content: bytes) -> tuple[Block, tuple[str, ...]]:
     span = run.span_ns
     if span is not None:
         list(run.inputs(start_ns=sum(span) // 2, end_ns=span[1]))
-    told = info(run).warnings
-    return found, told + tuple(str(reasons) for reasons in inputs.unreadable.items())
+    return found, run.warnings + tuple(str(reasons) for reasons in inputs.unreadable.items())
 
 
 def read_or_refuse(path: Path, content: bytes) -> tuple[Block, tuple[str, ...]] | None:
@@ -105,15 +109,15 @@ def offsets(content: bytes) -> list[int]:
     return [place.offset for place in walk(content, len(MAGIC), end)]
 
 
-def mangled(draw: Callable[[st.SearchStrategy[int]], int], content: bytes) -> bytes:
-    """Flip, overwrite, cut out, double or cut off."""
+def mangled(draw: Callable[[st.SearchStrategy[Any]], Any], content: bytes) -> bytes:
+    """Flip, overwrite, cut out, double, cut off or put in."""
     data = bytearray(content)
     records = offsets(content)
     for _ in range(draw(st.integers(1, 4))):
         at = draw(st.integers(0, len(data) - 1) | st.sampled_from(records))
         at = min(at, len(data) - 1)
         size = draw(st.integers(1, 300))
-        match draw(st.integers(0, 6)):
+        match draw(st.integers(0, 7)):
             case 0 | 1:
                 data[at] ^= 1 << draw(st.integers(0, 7))
             case 2:  # the length of a record, or of something in it
@@ -127,6 +131,8 @@ def mangled(draw: Callable[[st.SearchStrategy[int]], int], content: bytes) -> by
                 data[at:at] = data[at : at + size]
             case 6:
                 del data[at + 1 :]
+            case 7:
+                data[at:at] = draw(st.binary(max_size=64))
         if not data:
             break
     return bytes(data)
@@ -136,7 +142,15 @@ def mangled(draw: Callable[[st.SearchStrategy[int]], int], content: bytes) -> by
 @EXAMPLES
 @given(data=st.data())
 def test_no_damage_makes_a_crash(tmp_path, bags, name, data):
-    read_or_refuse(tmp_path / 'a.mcap', mangled(data.draw, bags[name]))
+    path = tmp_path / 'a.mcap'
+    read_or_refuse(path, mangled(data.draw, bags[name]))
+    with suppress(BagError):
+        check([path])
+    saved = tmp_path / 'saved.mcap'
+    for each in (saved, saved.with_suffix('.quarantine.mcap')):
+        each.unlink(missing_ok=True)
+    with suppress(BagError):
+        recover(path, saved)
 
 
 @pytest.mark.parametrize('name', CHECKED)
@@ -208,13 +222,6 @@ def test_an_index_that_cannot_be_true_is_not_used(tmp_path, bags, field, value):
     assert 'read from its beginning, without an index' in told[0]
 
 
-def chunk(compression: str, packed: bytes, size: int) -> bytes:
-    name = compression.encode()
-    content = struct.pack('<QQQII', 1, 1, size, 0, len(name)) + name
-    content += struct.pack('<Q', len(packed)) + packed
-    return HEAD.pack(Opcode.CHUNK, len(content)) + content
-
-
 def zstd_without_size(content: bytes) -> bytes:
     compressor = zstandard.ZstdCompressor(level=1).compressobj()
     return compressor.compress(content) + compressor.flush()
@@ -235,7 +242,7 @@ def bombs() -> dict[str, bytes]:
 @pytest.mark.parametrize('kind', ['zstd', 'zstd without a size', 'lz4'])
 def test_a_chunk_that_unpacks_without_end(tmp_path, bombs, kind, stated):
     bomb = bombs[kind]
-    content = MAGIC + chunk(kind.split()[0], bomb, stated)
+    content = MAGIC + as_chunk(kind.split()[0], bomb, stated)
     assert len(content) < BOMB_BYTES / 100
     tracemalloc.start()
     found, told = read(tmp_path / 'a.mcap', content)
@@ -290,17 +297,29 @@ def test_a_live_file_is_replayed_and_its_damage_told(tmp_path, bags, fraction):
     result = replay(run)
     assert result.ship == SHIP
     messages = sum(counts.messages for counts in result.inputs.values())
-    assert messages == info(run).messages
+    assert messages == sum(topic.messages for topic in run.topics)
     assert (messages == 200) is (fraction == 1.0)
     assert 'was not closed, or it is cut off' in result.run.warnings[0]
-    assert len(info(run).warnings) == (1 if fraction == 1.0 else 2)
+    assert len(run.warnings) == (1 if fraction == 1.0 else 2)
 
 
 def test_a_checksum_is_tested(tmp_path: Path, bags: dict[str, bytes]) -> None:
     """The same record in a chunk with the right checksum, a wrong one, and none."""
-    records = HEAD.pack(Opcode.METADATA, 0)
+    records = as_record(Opcode.METADATA, b'')
     for checksum, told in ((zlib.crc32(records), False), (1, True), (0, False)):
-        content = bytearray(chunk('', records, len(records)))
-        struct.pack_into('<I', content, 9 + 24, checksum)
-        _, warnings = read(tmp_path / 'a.mcap', MAGIC + bytes(content))
+        _, warnings = read(
+            tmp_path / 'a.mcap', MAGIC + as_chunk('', records, len(records), checksum)
+        )
         assert any('(checksum)' in text for text in warnings) is told
+
+
+@pytest.mark.parametrize('packing', ['zstd', 'lz4'])
+def test_a_chunk_where_the_index_should_be_is_not_unpacked(tmp_path: Path, packing: str) -> None:
+    """No writer puts one there; whoever does may say that it is of any size, or packed wrong."""
+    head = MAGIC + as_record(Opcode.HEADER, struct.pack('<I4sI', 4, b'ros2', 0))
+    head += as_record(Opcode.DATA_END, bytes(4))
+    footer = as_record(Opcode.FOOTER, struct.pack('<QQI', len(head), 0, 0)) + MAGIC
+    content = head + as_chunk(packing, b'nonsense', 1 << 40) + footer
+    found, told = read(tmp_path / 'a.mcap', content)
+    assert (len(found), told) == (0, ())
+    assert not open_runs([tmp_path / 'a.mcap'])[0].indexed

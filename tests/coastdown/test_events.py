@@ -40,4 +40,4 @@ def test_what_ended_a_glide_is_what_probably_did() -> None:
     }
     assert regimes.ended_by(EndedBy.TURN, 7) is EndedBy.ENGINE
     assert regimes.ended_by(EndedBy.SPEED, 7) is EndedBy.SPEED
-    assert regimes.ended_by(EndedBy.ENGINE, 20) is EndedBy.UNKNOWN
+    assert regimes.ended_by(EndedBy.BRAKE, 20) is EndedBy.BRAKE  # nothing came after it

@@ -141,51 +141,60 @@ def test_a_clock_that_was_set_resets_and_says_so(ship, record, jumps: str) -> No
     assert rejected == ({'late': late} if late else {})
 
 
-def test_silence_of_the_log_ends_a_coastdown_once_it_has_probably_ended(
-    ship, record, sensors
-) -> None:
-    block = record(sensors=(sensors['log'], sensors['compass']), duration_s=5000.0)
+def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['compass']))
     silent = (block.channel == LOG) & (block.stamp_ns > START_NS + 1300 * S)
-    watched, kept = monitor(ship), block[~silent]
-    second = (kept.stamp_ns - START_NS) // S
-    assert of(EndedCoastdown, watched.update(kept[second < 1900])) == []
-    (coastdown,) = of(EndedCoastdown, watched.update(kept[second >= 1900]))
+    watched = monitor(ship, data_stop_s=30.0)
+    events = watched.update(block[~silent])
+    (coastdown,) = of(EndedCoastdown, events)
     assert coastdown.ended_by is EndedBy.DATA_STOP
     assert coastdown.end_ns == START_NS + 1300 * S
+    # noticed as soon as 30 s are over, not when the record is
+    late = watched.update(block[:0])
+    assert late == []
+    assert watched.state is not State.CANDIDATE
     assert watched.finish() == []
+    kept = block[~silent]
+    before = kept[kept.stamp_ns <= START_NS + 1330 * S]
+    assert of(EndedCoastdown, monitor(ship, data_stop_s=30.0).update(before)) == []
 
 
-def test_silence_by_the_clock_ends_a_coastdown_once_it_has_probably_ended(ship, record) -> None:
-    block = record()
-    watched = monitor(ship)
-    watched.update(block[block.stamp_ns <= START_NS + 1300 * S])
-    assert watched.fall_silent(START_NS + 1361 * S) == []
-    assert watched.state is State.COASTDOWN
-    (coastdown,) = of(EndedCoastdown, watched.fall_silent(START_NS + 6000 * S))
-    assert (coastdown.ended_by, coastdown.end_ns) == (EndedBy.SILENCE, START_NS + 1300 * S)
-    assert watched.fall_silent(START_NS + 7000 * S) == []
-
-
-@pytest.mark.parametrize('inputs', [('log',), ('log', 'shaft')])
-@pytest.mark.parametrize('gap_s', [(935, 1235), (1060, 1130), (1300, 1420)])
-def test_a_glide_goes_on_over_a_gap(ship, record, sensors, inputs, gap_s) -> None:
-    block = record(sensors=tuple(sensors[each] for each in inputs))
+@pytest.mark.parametrize('inputs', ['log', 'log shaft', 'log compass'])
+@pytest.mark.parametrize('gap_s', [(960, 1030), (1060, 1360), (1300, 1420)])
+def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
+    ship, record, sensors, inputs, gap_s
+) -> None:
+    block = record(sensors=tuple(sensors[each] for each in inputs.split()))
     second = (block.stamp_ns - START_NS) // S
-    heard = block[(second < gap_s[0]) | (second >= gap_s[1])]
+    lost = (second >= gap_s[0]) & (second < gap_s[1]) & (block.channel != Channel.HEADING)
+    heard, before = block[~lost], second[~lost] < gap_s[0]
     told = []
-    for silent_s in (None, gap_s[0] + 61):
+    for by_clock in (False, True):
         watched = monitor(ship, estimate=refuse)
-        before = second[(second < gap_s[0]) | (second >= gap_s[1])] < gap_s[0]
         events = watched.update(heard[before])
-        if silent_s is not None:
-            events += watched.fall_silent(START_NS + silent_s * S)
-        events += watched.update(heard[~before]) + watched.finish()
-        (coastdown,) = of(EndedCoastdown, events)
-        assert START_NS + 890 * S < coastdown.start_ns < START_NS + 920 * S
-        assert coastdown.end_ns == heard.stamp_ns[-1]
-        assert coastdown.ended_by is EndedBy.RECORD_END
-        told.append(replace(coastdown, onset_detected_ns=0))
+        assert of(EndedCoastdown, events) == []
+        if by_clock:
+            events += watched.fall_silent()
+            assert watched.state is not State.CANDIDATE
+        for i in range(int(before.sum()), len(heard)):
+            events += watched.update(heard[i : i + 1])
+        first, rest = of(EndedCoastdown, events + watched.finish())
+        assert first.ended_by is (EndedBy.SILENCE if by_clock else EndedBy.DATA_STOP)
+        assert first.end_ns == block.stamp_ns[(second < gap_s[0]) & (block.channel == LOG)][-1]
+        assert 0 <= rest.start_ns - (START_NS + gap_s[1] * S) <= 5 * S
+        assert (rest.end_ns, rest.ended_by) == (heard.stamp_ns[-1], EndedBy.RECORD_END)
+        assert [cut.reason for cut in rest.cuts] == [Dismissal.GAP]
+        told.append(rest)
     assert bits(told[0]) == bits(told[1])  # whoever notices the silence
+
+
+def test_a_glide_that_ends_in_a_silence_has_no_rest(ship, record) -> None:
+    block = record(orders=(EngineOrder(0.0, 0.0), EngineOrder(220.0, 1.0)), duration_s=1500.0)
+    second = (block.stamp_ns - START_NS) // S
+    watched = monitor(ship, estimate=refuse)
+    events = watched.update(block[(second < 1100) | (second >= 1300)]) + watched.finish()
+    assert [each.ended_by for each in of(EndedCoastdown, events)] == [EndedBy.DATA_STOP]
+    assert of(NotCoastdown, events) == []
 
 
 def test_a_gap_shorter_than_data_stop_s_does_not_end_a_coastdown(ship, record) -> None:
@@ -199,6 +208,8 @@ def test_a_gap_shorter_than_data_stop_s_does_not_end_a_coastdown(ship, record) -
     assert len(stamps) == len(set(stamps))
     ends = [int(update.estimate.speed_through_water.time_ns[-1]) for update in of(Update, events)]
     assert len(ends) == len(set(ends))
+    ended = monitor(ship, data_stop_s=40.0).update(gap)
+    assert of(EndedCoastdown, ended)[0].ended_by is EndedBy.DATA_STOP
 
 
 def test_the_heading_before_the_onset_is_given(ship, record, sensors) -> None:
@@ -282,12 +293,12 @@ def test_nothing_is_compiled_once_it_runs(ship, record, sensors) -> None:
     assert [len(kernel.signatures) for kernel in kernels] == compiled
 
 
-def test_a_record_whose_speeds_have_ceased_ends_a_coastdown_there(ship, record, sensors):
+def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(ship, record, sensors):
     everything = record(sensors=(sensors['log'], sensors['radar'], sensors['compass']))
     silent_ns = START_NS + 1500 * S
     heard = everything[(everything.stamp_ns < silent_ns) | (everything.channel == Channel.HEADING)]
     watched = monitor(ship)
-    (ended,) = of(EndedCoastdown, watched.update(heard) + watched.finish())
+    (ended,) = of(EndedCoastdown, watched.update(heard))
     assert ended.ended_by is EndedBy.DATA_STOP
     assert silent_ns - S <= ended.end_ns < silent_ns
 

@@ -10,7 +10,7 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
-from shipdrag_ros.coastdown.regimes.births import bear, brakes, glides, told_odds
+from shipdrag_ros.coastdown.regimes.births import bear, brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS, WIND_SD
@@ -388,10 +388,3 @@ def test_a_glide_that_may_have_been_held_at_first_is_followed_whole(ship, one_gl
     weight = np.array([one_glide, *[other] * 5])
     spans = Spans(what, begin_s, begin_s, begin_s, end_s, weight, what, what == LEVEL)
     assert unpowered(spans, 120, BankSetting.of(HullPrior.of(ship), BIN_S)) == found
-
-
-def test_a_stop_may_be_told_seconds_or_minutes_late_or_of_another() -> None:
-    at_once, late, other = (told_odds(off_s) for off_s in (0.0, -120.0, -3600.0))
-    assert at_once > 100.0 * late > 500.0
-    assert other == pytest.approx(1.0)
-    assert told_odds(120.0) == late

@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis.diagnose import compare, observed
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, SimulationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import NONE, Verdict
@@ -25,7 +25,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.effects import LIBRARY, parse
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -57,14 +57,15 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
 
 def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
     log_alone = run('log_scale=0.9438').window.without('position', 'not on board')
-    for facts in ((), (Fact('units_checked'),)):
-        found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=facts)
-        said = words.sentence(found)
-        assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
-        assert '(0.0 to 19.4 knots): is the unit wrong?' in said
-        assert '--map speed_through_water=COLUMN:kn' in said
-        assert '15.50' not in said
+    found = diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS)
+    said = words.sentence(found)
+    assert said.startswith('log: the speed before the stop was read as 15.5 m/s (30.2 knots)')
+    assert '(0.0 to 19.4 knots): is the unit wrong?' in said
+    assert '--map speed_through_water=COLUMN:kn' in said
+    assert '15.50' not in said
     assert not found.candidates
+    with pytest.raises(SimulationError, match='the baseline is stated for'):
+        diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=[Fact('units_checked')])
 
 
 def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
@@ -182,6 +183,21 @@ def test_an_error_of_the_log_that_swings_is_in_the_log(cargo: Ship) -> None:
     assert found.where.channel == 'log'
 
 
+def test_latitude_and_longitude_are_in_the_scale_of_the_earth(cargo: Ship) -> None:
+    scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
+    truth = simulate(cargo, scenario, effects=[parse('radar_scale=0.08')])
+    block = sense(truth, standard_sensors(), seed=2)
+    window = Window.from_block(
+        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
+    )
+    of_earth = replace(window, geodetic=frozenset({'position'}))
+    for given, may in ((window, True), (of_earth, False)):
+        found = diagnose([CoastRun('run', given)], cargo, Parameters(), advise=False)
+        assert any('radar_scale' in each.names for each in found.candidates) == may
+        said = [note for note in found.notes if 'radar_scale is ruled out' in note]
+        assert len(said) == (not may)
+
+
 FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2
 
 
@@ -200,7 +216,7 @@ def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo
     )
     run = CoastRun('run', window)
     (seen,), notes = observed([run], cargo, Parameters(), lambda *_: None)
-    assert set(seen.along.rows.kind.tolist()) == {LOG, POSITION}
+    assert set(seen.rows.kind.tolist()) == {LOG, POSITION}
     if first_heard:
         (note,) = notes
         beside = 'run: speed_through_water_2 is not used beside speed_through_water, against '

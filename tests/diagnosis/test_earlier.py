@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose, words
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.earlier import (
     Carried,
     EarlierCandidate,
@@ -22,8 +23,10 @@ from shipdrag_ros.diagnosis.earlier import (
     read_earlier,
 )
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
-from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun
+from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, SeenRun
+from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.parameter import Parameter, Prior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
@@ -306,6 +309,15 @@ def test_what_is_needed_is_read(tmp_path: Path) -> None:
     assert found.probability('fouling') == 0.8
     assert [each.probability for each in found.candidates] == [0.8, 0.09]
     assert found.candidates[0].effects['fouling']['friction_factor'].sd == 0.04
+
+
+def test_a_result_says_what_its_file_says(tmp_path: Path, alone: DiagnosisResult) -> None:
+    # something without a name says nothing of what has one, and is no sign of nothing
+    unsure = replace(alone, candidates=(Candidate(UNKNOWN, 0.3), *alone.candidates[:1]))
+    path = write(tmp_path, json_text(document(unsure, SHIP)))
+    assert EarlierDiagnosis.of(unsure, SHIP, name=str(path)) == read_earlier(path)
+    with pytest.raises(DiagnosisError, match="waits for the answer: 'is it"):
+        EarlierDiagnosis.of(replace(alone, question='is it?'), SHIP, name='then')
 
 
 def test_a_size_without_sd_and_a_record_without_a_ship_are_read(tmp_path: Path) -> None:

@@ -96,9 +96,9 @@ def test_nothing_is_missing_whatever_is_measured_and_whoever_dates_the_stop(carg
 
 def test_no_position_is_lost_at_either_end_of_the_lead(cargo: Ship) -> None:
     seen = Observation.of(window_of(cargo, 'position'), cargo, Parameters(), name='run')
-    steady = seen.along.rows.time_s < seen.lead_in_s
-    assert seen.along.rows.time_s[0] < 31.0
-    assert seen.along.rows.time_s[steady][-1] > seen.lead_in_s - 6.0
+    steady = seen.rows.time_s < seen.lead_in_s
+    assert seen.rows.time_s[0] < 31.0
+    assert seen.rows.time_s[steady][-1] > seen.lead_in_s - 6.0
 
 
 def test_a_compass_says_what_yaw_from_east_says(cargo: Ship) -> None:
@@ -153,13 +153,13 @@ def test_a_log_that_one_run_lacks_is_as_well_known_in_either_order(cargo: Ship) 
 
 def test_a_course_that_wanders_on_the_glide_is_no_turn(cargo: Ship) -> None:
     seen = Observation.of(window_of(cargo, 'position'), cargo, Parameters(), name='run')
-    assert seen.across is not None
-    time_s = seen.across.rows.time_s
+    time_s = seen.context.port_s
+    assert len(time_s) > 10
     after_s = np.maximum(time_s - seen.lead_in_s, 0.0)
     # to one side and back within ten minutes, by half a standard deviation of a heading
     course_rad = 0.02 * np.sin(after_s / 95.0) * (after_s < 600.0)
     way_m = np.cumsum(course_rad * 3.0 * np.diff(time_s, prepend=time_s[0]))
-    away = seen.across_whitener @ way_m
+    away = seen.context.whitener[: len(way_m), : len(way_m)] @ way_m
     assert float(away @ away) < 4.0
 
 
@@ -191,8 +191,8 @@ def test_an_observation_is_condensed_and_knows_the_stop(seen: Observation) -> No
     assert seen.duration_s == pytest.approx(1200.0, abs=15.0)
     assert 1100.0 < seen.lead_in_s < 1200.5
     assert seen.speed_m_s == pytest.approx(8.0, abs=0.05)
-    assert len(seen.along) < 500
-    assert set(seen.along.rows.kind.tolist()) == {0, 1, 2}
+    assert len(seen.rows.time_s) < 500
+    assert set(seen.rows.kind.tolist()) == {0, 1, 2}
 
 
 def with_effect(runs: ShipRuns, name: str) -> tuple[Explanation, Float64]:
@@ -275,8 +275,8 @@ def test_what_an_effect_does_begins_with_the_stop_of_each_hypothesis(runs: ShipR
 
 
 def test_wind_and_depth_are_felt_by_their_sensors(seen: Observation, runs: ShipRuns) -> None:
-    assert seen.across is not None
-    winds, first = 2 * len(seen.context.at_wind), len(seen.across)
+    winds, first = 2 * len(seen.context.at_wind), len(seen.context.port_s)
+    assert first > 0
     for name, at in (('wind', slice(0, winds)), ('shallow_water', slice(winds, winds + 1))):
         hypothesis, where = with_effect(runs, name)
         where[runs.size] = 0.5 if name == 'wind' else -0.5

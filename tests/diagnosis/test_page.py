@@ -21,7 +21,6 @@ from shipdrag_ros.diagnosis.result import (
     EffectEstimate,
     WeighedFact,
 )
-from shipdrag_ros.diagnosis.tables import Score
 from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.inference.decision import Verdict
@@ -29,8 +28,6 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Fact, Ship
 from tests.page import Page
 from tests.runs import CARGO as SHIP
-
-SCORE = Score(900, 7, {'precision of a name': (98, 100)}, 0.031)
 
 
 @pytest.fixture
@@ -46,8 +43,8 @@ def words(found: DiagnosisResult) -> DiagnosisResult:
 
 @pytest.fixture
 def written(tmp_path: Path) -> Callable[..., Any]:
-    def write(found: DiagnosisResult, ship: Ship | None = SHIP, score: Score | None = None) -> Any:
-        write_diagnosis(tmp_path / 'page.html', found, ship, score=score)
+    def write(found: DiagnosisResult, ship: Ship | None = SHIP) -> Any:
+        write_diagnosis(tmp_path / 'page.html', found, ship)
         return Page(tmp_path / 'page.html')
 
     return write
@@ -75,14 +72,6 @@ def test_the_page_says_all_and_needs_no_network(found, written):
     )
     for each in said:
         assert each in page.text, each
-
-
-def test_the_score_of_the_method_stands_on_the_page(words, written):
-    page = written(words, score=SCORE)
-    assert 'not scored' not in page.text
-    assert '900 simulated cases (seed 7)' in page.text
-    assert '98.0 % 100' in page.text
-    assert '0.031' in page.text
 
 
 def test_a_set_says_what_would_decide(words: DiagnosisResult, written: Callable[..., Any]) -> None:
@@ -129,9 +118,8 @@ def test_a_record_without_coastdown_has_a_page_without_traces(words, written):
     assert 'compared on 40 legs' in page.text
     assert 'no baseline was needed' in page.text
     assert 's of the record' in page.text
-    # the score is of another method
-    fitted = written(replace(sailing, baseline='fitted_here'), score=SCORE)
-    assert 'not scored' in fitted.text
+    assert 'not scored' in page.text
+    fitted = written(replace(sailing, baseline='fitted_here'))
     assert 'the runs are compared with all hulls of her length and volume' in fitted.text
 
 

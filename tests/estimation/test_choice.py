@@ -125,6 +125,28 @@ def _of_file(scale: float) -> Window:
     return Window.from_block(block, START_NS, START_NS + 900 * 10**9)
 
 
+def test_a_log_beside_a_radar_in_a_wrong_scale_is_not_blamed_alone() -> None:
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=900.0, duration_s=900.0)
+    effects = [StatedEffect('radar_scale', {'factor': Parameter(0.06)})]
+    block = sense(simulate(SHIP, scenario, effects=effects), standard_sensors(), seed=3)
+    stop_ns = START_NS + 900 * 10**9
+    window = Window.from_block(block, stop_ns, stop_ns + 900 * 10**9, before_ns=START_NS)
+    of_radar = estimate_final(window, SHIP, Parameters())
+    of_earth = replace(window, geodetic=frozenset({'position'}))
+    of_gnss = estimate_final(of_earth, SHIP, Parameters())
+    away, held = [], []
+    for found in (of_radar, of_gnss):
+        curve = found.valid_curve
+        true = np.asarray(SHIP.resistance_n(curve.speed_m_s)) / SHIP.mass_kg
+        off = np.abs(curve.resistance_m_s2 - true)
+        away.append(np.max(off / true))
+        held.append(np.mean(off < 2.0 * curve.sigma_m_s2))
+        said = [note for note in found.notes if note.startswith('position: in a wrong scale')]
+        assert len(said) == (found is of_radar)
+    assert away[0] < 0.6 * away[1]
+    assert held[1] < held[0] == 1.0
+
+
 def test_positions_show_the_scale_and_it_is_said() -> None:
     found = estimate_final(_window(0.02, position=True), BARE, Parameters())
     curve = found.valid_curve

@@ -99,6 +99,7 @@ def test_of_two_encodings_the_larger_is_used_and_said(metres: int, degrees: int)
     window = Window.from_block(block, 0, 9)
     assert len(window.position) == max(metres, degrees)
     assert window.position.value[0, 0] == (0.0 if degrees > metres else 7.0)
+    assert window.geodetic == ({'position'} if degrees > metres else set())
     assert len(window.notes) == 1
     assert f'metres ({metres})' in window.notes[0]
 

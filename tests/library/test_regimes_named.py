@@ -54,7 +54,10 @@ def test_nothing_missing_is_followed_by_what_would_have_been_seen() -> None:
     found = sd.diagnose(sd.simulate(SHIP, seed=3)).found
     assert found.verdict == 'none'
     assert any('the shaft ran down in 8' in note for note in found.notes)  # as she states it
-    assert 'These runs would have named, nine times in ten: ' in words.sentence(found)
+    assert (
+        'These runs would have named, nine times in ten, other parameters as usual: '
+        in words.sentence(found)
+    )
     fouling, depth = found.limits['fouling'], found.limits['shallow_water']
     # 2 % friction and half a per cent of shape are known of the clean hull
     assert 0.02 < fouling.value < 0.3

@@ -136,7 +136,6 @@ def test_both_sides_of_a_clock_that_was_set_back(desk: ReplayedDesk) -> None:
 def test_a_coastdown_whose_sources_all_fall_silent(desk: ReplayedDesk, recorded_from: str) -> None:
     silent_s = LEAD_IN_S + 250.0
     ended_ns = int(record().receive_ns[0]) + round((silent_s + 61.0) * SECOND_NS)
-    late_ns = int(record().receive_ns[0]) + 3540 * SECOND_NS
     if recorded_from == 'the beginning':
         desk.recorder.start()
     desk.feed(0.0, LEAD_IN_S + 200.0)
@@ -144,12 +143,9 @@ def test_a_coastdown_whose_sources_all_fall_silent(desk: ReplayedDesk, recorded_
         desk.recorder.start()
     desk.feed(LEAD_IN_S + 200.0, silent_s)
     desk.session.fall_silent('nothing was heard', ended_ns)
-    # she may glide on
-    assert desk.kinds()[-1] is EventKind.SILENCE
-    desk.session.fall_silent('nothing was heard', late_ns)
     # ended now, by the clock, and not when the sensors are back; and only once
     assert desk.kinds()[-2:] == [EventKind.SILENCE, EventKind.COASTDOWN]
-    desk.session.fall_silent('nothing was heard', late_ns + SECOND_NS)
+    desk.session.fall_silent('nothing was heard', ended_ns + SECOND_NS)
     assert desk.kinds()[-1] is EventKind.COASTDOWN
     if recorded_from == 'after the silence':
         desk.recorder.start()

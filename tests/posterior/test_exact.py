@@ -16,7 +16,14 @@ from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POS
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
-from shipdrag_ros.posterior.priors import HELD, HELD_CHANCE, HELD_FORCE
+from shipdrag_ros.posterior.priors import (
+    HELD,
+    HELD_CHANCE,
+    HELD_FORCE,
+    WRONG_GROUND_SCALE,
+    WRONG_LOG_SCALE,
+    WRONG_SCALE,
+)
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64
@@ -29,6 +36,7 @@ def problem_of(
     seed: int = 0,
     codes: Sequence[int] = (LOG, OVER_GROUND, POSITION),
     weather: Weather | None = None,
+    geodetic: Sequence[int] = (),
 ) -> RunModel:
     """Set up 120 rows of the model's own motion, of instruments with white noise."""
     rng = np.random.default_rng(seed)
@@ -42,9 +50,9 @@ def problem_of(
         steady=40,
         ship=ship,
         stop=StopPrior(5.0, 8.0, 2.0),
-        speed_m_s=8.0,
-        range_m_s=(4.0, 8.0),
+        speeds_m_s=(4.0, 8.0, 8.0),
         weather=weather,
+        geodetic=geodetic,
     )
     empty = of_run(rows)
     exact = -predict(empty.forces, empty.start, empty.grid_s, rows)[0][0]
@@ -61,6 +69,7 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
     now[:k] += 0.01
     now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
     now[k + motion.SCALE], now[k + motion.CURRENT], now[k + motion.LEFT] = 0.01, 0.2, 0.3
+    now[k + motion.GROUND_SCALE] = 0.05
 
     def predicted(unknowns: Float64) -> Float64:
         return -predict(problem.forces, unknowns, problem.grid_s, problem.rows)[0][0]
@@ -107,6 +116,24 @@ def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_curren
         assert not np.any(line[~mine]), name
     current = table[1 + k + motion.CURRENT] != 0.0
     assert np.array_equal(current, ~rows.of(LOG))
+
+
+def test_each_scale_may_be_wrong_but_that_of_latitude_and_longitude(ship: Ship) -> None:
+    codes = LOG, OVER_GROUND, POSITION, CODES['position_2']
+    second = motion.GROUND_SCALE + motion.own(codes[3])
+    sizes = {motion.SCALE: WRONG_LOG_SCALE, motion.GROUND_SCALE: WRONG_GROUND_SCALE}
+    sizes[second] = WRONG_GROUND_SCALE
+    of_earth = {motion.GROUND_SCALE: {POSITION}, second: {codes[3]}}
+    for geodetic in ((), (POSITION,), codes[2:]):
+        problem = problem_of(ship, codes=codes, weather=Weather(None, None), geodetic=geodetic)
+        assert sum(each.chance for each in problem.families) == pytest.approx(1.0)
+        for place, size in sizes.items():
+            at = problem.coefficients + place
+            wide = [each for each in problem.families if each.precision[at] ** -0.5 > 0.025]
+            may = not of_earth.get(place, set()) & set(geodetic)
+            assert sum(each.chance for each in wide) == pytest.approx(WRONG_SCALE.mean * may)
+            for each in wide:
+                assert each.precision[at] ** -0.5 == pytest.approx(size.sd)
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:

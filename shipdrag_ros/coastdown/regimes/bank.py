@@ -171,18 +171,6 @@ def _shafts(bank: Bank, step_s: float, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
-def _may_switch(bank: Histories, said: Float64) -> bool:
-    """Say whether histories are born in this bin: no date is sharper than a silence is long."""
-    clock, heard = bank.clock, False
-    for each in (s.LOG, s.GROUND, s.ADVANCE, s.HIGH):
-        heard = heard or not np.isnan(said[each])
-    clock[1] = 0 if heard else clock[1] + 1
-    may = heard or clock[1] & (clock[1] - 1) == 0
-    clock[2] += not may
-    return may
-
-
-@compiled(uncounted=True)
 def _pushes_or_not(bank: Histories, i: int, setting: BankSetting, now_s: float) -> None:
     """
     Write down when the screw of a lower level ceases to push, and when it pushes again.
@@ -273,7 +261,7 @@ def step(bank: Bank, setting: BankSetting) -> float:
     all_.clock[0] += 1
     _shafts(bank, setting.step_s, bank.out[P_STEADY], bank.out[SPEED])
     used = bank.noise.used
-    if all_.clock[0] > 1 and _may_switch(all_, said):
+    if all_.clock[0] > 1:
         bear(all_, setting, both, not (np.isnan(said[s.RATE]) and np.isnan(said[s.RUDDER])))
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0

@@ -237,8 +237,7 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         base = balance(bank.mean[i], f, now_s)[0]
         if not claimed and regime != s.AMID and not is_fade(bank.row[i]):
             if bank.clock[0] % _THIN_EVERY == 0:  # its begin is no sharper
-                bins = max(_THIN_EVERY / (1 + bank.clock[2]), 1.0)
-                _fades(bank, i, setting, now_s, bins * chance * n.FADES_SHARE, base)
+                _fades(bank, i, setting, now_s, _THIN_EVERY * chance * n.FADES_SHARE, base)
             chance *= 1.0 - n.FADES_SHARE
     ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     kinds = 1 if claimed else 2  # torque that is held is any power there
@@ -394,28 +393,6 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             if least <= bank.row[i].behind < likelier:
                 _children(bank, setting, i, now_s, both, steered)
         likelier = least
-    bank.clock[2] = 0
-
-
-@compiled(inline=True, uncounted=True)
-def _part(left: float, hours: float) -> float:
-    """Return the hours that a history is there to switch, with the hazard of all switches."""
-    return (1.0 - math.exp(-left * hours)) / left
-
-
-@compiled(inline=True, uncounted=True)
-def _told(off_s: float, sd_s: float) -> float:
-    return math.exp(-0.5 * (off_s / sd_s) ** 2) / (ROOT_TWO_PI * sd_s)
-
-
-@compiled(uncounted=True)
-def told_odds(off_s: float) -> float:
-    """
-    Return how much likelier it is that a stop was told, so long before a stop, than without one.
-    """
-    late, late_s = n.TOLD_MINUTES
-    density = (1.0 - late) * _told(off_s, n.TOLD[1]) + late * _told(off_s, late_s)
-    return float(1.0 + n.TOLD[0] / (1.0 - n.TOLD[0]) * 3600.0 * density)
 
 
 @compiled(uncounted=True)
@@ -426,7 +403,7 @@ def _children(
     f = bank.row[i]
     claimed = setting.engine > 0.0
     # a window is as long as a person finds it worth, and manoeuvres with it
-    hours = (1 + bank.clock[2]) * (n.BIN_S if claimed else setting.step_s) / 3600.0
+    hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
     regime = f.regime
     age_s = now_s - f.since if f.count > 0 else np.inf
     if both and f.liar == s.NOBODY:
@@ -440,6 +417,7 @@ def _children(
         f.kind = s.GOVERNED
         f.a0, f.a_var = bank.mean[i, s.LN_A], bank.spread[i, s.LN_A, s.LN_A]
         f.p0, f.p_var = bank.mean[i, s.POWER], bank.spread[i, s.POWER, s.POWER]
+    left = 0.0  # hazard of all that it may switch to
     if regime in (s.DRIVEN, s.LEVEL) or (regime == s.AMID and (claimed or f.count > 0)):
         if regime == s.LEVEL and not fades and age_s < f.ramp_s:  # on its way there
             return
@@ -453,47 +431,42 @@ def _children(
             turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
         if regime == s.AMID and not claimed:  # it ends at some level, and any turn is part of it
             level, turn = float(n.AMID[2]), 0.0
-        if claimed:
-            told = 3600.0 * _told(now_s - setting.told_s, n.TOLD[1] * setting.pace) / setting.pace
+        if not np.isnan(setting.told_s):
+            off = (now_s - setting.told_s) / (n.TOLD[1] * (setting.pace if claimed else 1.0))
+            told = 3600.0 * math.exp(-0.5 * off * off) / (ROOT_TWO_PI * n.TOLD[1])
             stop, level = stop + n.TOLD[0] * told, level + (1.0 - n.TOLD[0]) * told
-        elif not np.isnan(setting.told_s):
-            off_s = now_s - setting.told_s
-            stop *= told_odds(off_s)
-            level += 3600.0 * (1.0 - n.TOLD[0]) * _told(off_s, n.TOLD[1])
-        left = stop + level + turn + (n.FADE_OUT if fades else 0.0)
-        part = _part(left, hours)
-        glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * part)
-        brakes(bank, i, setting, now_s, n.BRAKED * stop * part)
-        levels(bank, i, setting, now_s, level * part)
+        glides(bank, i, setting, now_s, (1.0 - n.BRAKED) * stop * hours)
+        brakes(bank, i, setting, now_s, n.BRAKED * stop * hours)
+        levels(bank, i, setting, now_s, level * hours)
         if not claimed:
-            _turns(bank, i, now_s, turn * part, s.TURN)
+            _turns(bank, i, now_s, turn * hours, s.TURN)
+        left = stop + level + turn
         if fades:
-            _fade_ends(bank, i, now_s, n.FADE_OUT * part)
+            _fade_ends(bank, i, now_s, n.FADE_OUT * hours)
+            left += n.FADE_OUT
     elif regime == s.GLIDE:
-        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE + (n.GLIDE_TURN if steered else 0.0)
-        part = _part(left, hours)
-        levels(bank, i, setting, now_s, n.GLIDE_LEVEL * part)
+        levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+        left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
         if steered:
-            _turns(bank, i, now_s, n.GLIDE_TURN * part, s.GLIDE_TURN)
-        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * part)
+            _turns(bank, i, now_s, n.GLIDE_TURN * hours, s.GLIDE_TURN)
+            left += n.GLIDE_TURN
+        brakes(bank, i, setting, now_s, n.GLIDE_BRAKE * hours)
     elif regime == s.BRAKE:
+        glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
+        levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
-        part = _part(left, hours)
-        glides(bank, i, setting, now_s, n.BRAKE_GLIDE * part)
-        levels(bank, i, setting, now_s, n.BRAKE_LEVEL * part)
     elif regime == s.AMID:
+        _settles(bank, i, setting, now_s, n.AMID[2] * hours)
         left = float(n.AMID[2])
-        _settles(bank, i, setting, now_s, left * _part(left, hours))
     else:
-        left = float(n.TURN_OUT)
-        part = _part(left, hours)
         if regime == s.TURN:
-            _back(bank, i, now_s, left * part)
+            _back(bank, i, now_s, n.TURN_OUT * hours)
         else:
-            glides(bank, i, setting, now_s, left * part)
+            glides(bank, i, setting, now_s, n.TURN_OUT * hours)
             if claimed:
-                levels(bank, i, setting, now_s, n.GLIDE_LEVEL * part)
-    f.weight -= left * hours
+                levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+        left = float(n.TURN_OUT)
+    f.weight += math.log1p(-min(left * hours, 0.99))
 
 
 @compiled(uncounted=True)

@@ -125,7 +125,6 @@ TOLD = _grid(
     '1, s',
     'a stop that a person tells is one: chance, and error',
 )
-TOLD_MINUTES = _grid('TOLD_MINUTES', (0.2, 180.0), '1, s', 'of these: told late, and error then')
 LEVEL = _number('LEVEL', 0.5, '1/h', 'driven to another level')
 TURN = _number('TURN', 1.0, '1/h', 'driven to turning')
 MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` of a switch')

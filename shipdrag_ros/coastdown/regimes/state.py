@@ -89,10 +89,8 @@ class Histories(NamedTuple):
 
     Attributes
     ----------
-    used : (1,)
-        Histories.
-    clock : (3,)
-        Bins since the start, those in a row without motion or revs, those without births.
+    used, clock : (1,)
+        Histories; bins since the start.
     mean, spread
         (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
     row : (ROOM,)
@@ -119,7 +117,7 @@ class Histories(NamedTuple):
         past = np.zeros(ROOM, _PAST)
         return cls(
             np.zeros(1, np.int64),
-            np.zeros(3, np.int64),
+            np.zeros(1, np.int64),
             np.zeros((ROOM, STATES)),
             np.zeros((ROOM, STATES, STATES)),
             past['row'],

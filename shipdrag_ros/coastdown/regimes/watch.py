@@ -22,7 +22,6 @@ from shipdrag_ros.coastdown.regimes.bank import (
     Bank,
     step,
 )
-from shipdrag_ros.coastdown.regimes.births import told_odds
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.observe import observe
 from shipdrag_ros.coastdown.regimes.read_out import (
@@ -89,7 +88,7 @@ class Dated(NamedTuple):
     ended_by
         What followed; None where she glides on.
     unread_s
-        From when on nothing was read until it begins; NaN where it does not begin in a gap.
+        From when on nothing was read until it begins; NaN where it does not follow a gap.
     """
 
     stop_s: float
@@ -197,17 +196,7 @@ class RegimeFilter:
         """
         Take it from a person that the engine was stopped [s since the epoch].
         """
-        told_s = stop_s - self._zero_s
-        if math.isnan(self._setting.told_s):  # else those since were born by it
-            all_ = self._bank.histories
-            used = int(all_.used[0])
-            switched = all_.switched[:used]
-            stops = np.isin(switched['what'], (s.GLIDE, s.BRAKE))
-            stops[:, 1:] &= ~np.isin(switched['what'][:, :-1], (s.GLIDE, s.BRAKE, s.GLIDE_TURN))
-            stops &= np.arange(s.SWITCHES) < all_.row['count'][:used, np.newaxis]
-            for i, k in np.argwhere(stops).tolist():
-                all_.row['weight'][i] += math.log(told_odds(switched['at'][i, k] - told_s))
-        self._setting = self._setting._replace(told_s=told_s)
+        self._setting = self._setting._replace(told_s=stop_s - self._zero_s)
 
     @property
     def told_s(self) -> float:
@@ -251,9 +240,9 @@ class RegimeFilter:
         row = all_.row[: int(all_.used[0])]
         return float(np.exp(row['weight'][row['liar'] == s.THE_SHAFTS]).sum())
 
-    def gliding_since(self, second: float, speed_m_s: float) -> float:
+    def gliding_since(self, second: float) -> float:
         """
-        Return the probability of a glide, above a speed, that began before a second [s].
+        Return the probability of a glide that began before a second [s since the epoch].
         """
         all_ = self._bank.histories
         used = int(all_.used[0])
@@ -261,31 +250,35 @@ class RegimeFilter:
         switched = all_.switched[each, last]
         glides = (last >= 0) & (switched['what'] == s.GLIDE)
         before = self._zero_s + switched['at'] <= second
-        return float(self._faster(speed_m_s)[glides & before].sum())
+        return float(np.exp(all_.row['weight'][:used])[glides & before].sum())
 
-    def _faster(self, speed_m_s: float) -> Float64:
-        """Return the probability of each history and a greater speed."""
+    def slow_since(self, speed_m_s: float) -> float | None:
+        """
+        Return since when she is below a speed [s since the epoch]; None where she may not be.
+
+        It has to be as sure as the end of a glide, of which nothing is taken back either.
+        """
+        if not self._out or float(self._bank.out[SPEED]) >= speed_m_s:
+            return None
         from scipy.special import ndtr  # slow to import
 
         all_ = self._bank.histories
         used = int(all_.used[0])
         over = all_.mean[:used, s.LN_U] - math.log(speed_m_s)
         over /= np.sqrt(all_.spread[:used, s.LN_U, s.LN_U])
-        return np.asarray(np.exp(all_.row['weight'][:used]) * ndtr(over))
-
-    def slow_since(self, speed_m_s: float) -> float | None:
-        """
-        Return since when she is below a speed [s since the epoch]; None where she may not be.
-
-        It has to be as sure as the end of a glide, of which nothing is taken back either, and
-        is not said where nothing is read.
-        """
-        if not self._out or not self._read[-1] or float(self._bank.out[SPEED]) >= speed_m_s:
-            return None
-        if float(self._faster(speed_m_s).sum()) > n.ANNOUNCE[1]:
+        faster = float(np.exp(all_.row['weight'][:used]) @ ndtr(over))
+        if faster > n.ANNOUNCE[1]:
             return None
         slow = np.cumsum(self._speed[::-1] >= speed_m_s) == 0
         return float(self._zero_s + (len(slow) - int(slow.sum()) + 1) * self._width)
+
+    def read_after(self, second: float) -> float:
+        """
+        Return the begin of the first bin after a second in which motion was read [s].
+        """
+        since = max(math.ceil((second - self._zero_s) / self._width), 0)
+        gap = np.cumsum(self._read[since:]) == 0
+        return float(self._zero_s + (since + int(gap.sum())) * self._width)
 
     def unread_about(self, second: float) -> tuple[float, float]:
         """
@@ -297,11 +290,6 @@ class RegimeFilter:
         first = int(before[-1]) + 1 if len(before) else 0
         last = int(after[0]) if len(after) else len(self._read)
         return self._zero_s + first * self._width, self._zero_s + last * self._width
-
-    @property
-    def _heard(self) -> int:
-        """Bins up to the last one in which motion was read."""
-        return int(np.max(np.flatnonzero(self._read), initial=-1)) + 1
 
     @property
     def even(self) -> bool:
@@ -376,7 +364,7 @@ class RegimeFilter:
         if not self._out:
             return None
         since = math.ceil(max((since_s - self._zero_s) / self._width, 0.0))
-        table = np.array(self._out)[: self._heard]
+        table = np.array(self._out)
         doubted = since + np.flatnonzero(table[since:, P_EVEN] < _DOUBTED)
         if not len(doubted) or table[doubted, SPEED].argmin() == 0:
             return None
@@ -402,7 +390,7 @@ class RegimeFilter:
         Return the stretches without thrust in which more than one glide is likely [s].
         """
         zero = self._zero_s
-        found = unpowered(self._spans, self._heard, self._setting)
+        found = unpowered(self._spans, len(self._out), self._setting)
         return [(zero + first_s, zero + last_s) for first_s, last_s in found]
 
     def regimes(self) -> Regimes | None:

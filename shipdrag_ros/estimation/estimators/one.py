@@ -27,7 +27,7 @@ from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
 from shipdrag_ros.posterior.priors import HELD_FORCE, LEFT_S, THRUST_LEFT
-from shipdrag_ros.posterior.problem import RunModel, StopPrior
+from shipdrag_ros.posterior.problem import EXACT, RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
 from shipdrag_ros.samples import Float64
@@ -38,6 +38,7 @@ _CONDITIONS = (HELD,)  # what is taken out of r(v)
 _CALM = (HELD, WIND, DEPTH)
 _CURVE_POINTS = 129
 _WIND_POINTS = 25
+_WORTH_A_NOTE = 0.1  # probability
 
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
@@ -163,13 +164,14 @@ def estimate(
         len(record.steady.time_s),
         ship,
         StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.shaft_sd_s, run_down.stands),
-        speed_m_s=guess.speed_m_s,
         # the stop may be before the window: the law reaches up to the speed there
-        range_m_s=(
+        speeds_m_s=(
             guess.lowest * guess.speed_m_s,
+            guess.speed_m_s,
             max(guess.speed_m_s, _speed_before(record.steady)),
         ),
         weather=weather,
+        geodetic=[CODES[name] for name in window.geodetic],
     )
     found = infer(problem, guess.seen, quick=quick)
     reference = weather.reference(ship)
@@ -212,6 +214,7 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         at = k + motion.own(code) + motion.SCALE
         which = 'log' if len(logs) == 1 else f'log {name}'
         yield _log_scale_note(float(found.mean[at]), float(sd[at]), which)
+    yield from _ground_scale_notes(found, record)
     if not logs:
         yield (
             f'a current is part of the speed: one of ± {2.0 * sd[k + motion.CURRENT]:.2g} m/s '
@@ -271,6 +274,24 @@ def _log_scale_note(scale: float, sd: float, which: str) -> str:
         f'the {which} reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
         'deviations): taken out, and in the band'
     )
+
+
+def _ground_scale_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
+    """Say which source over ground is in a wrong scale, where that is not unlikely."""
+    k, inputs = found.problem.coefficients, dict[int, list[str]]()
+    for name in record.stamps:
+        if CODES[name] % KIND_COUNT != LOG:
+            inputs.setdefault(motion.own(CODES[name]), []).append(name)
+    for own, names in inputs.items():
+        at = k + own + motion.GROUND_SCALE
+        wrong = [each.precision[at] < EXACT**-2.0 / 4.0 for each in found.problem.families]
+        chance = float(found.family[wrong].sum())
+        if chance > _WORTH_A_NOTE:
+            scale, sd = float(found.mean[at]), float(np.sqrt(found.covariance[at, at]))
+            yield (
+                f'{" and ".join(names)}: in a wrong scale with probability {chance:.2g}, which is '
+                f'in the band ({100.0 * scale:+.2g} ± {200.0 * sd:.1g} %, two standard deviations)'
+            )
 
 
 def _result(
