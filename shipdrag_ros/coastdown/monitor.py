@@ -144,8 +144,8 @@ class Monitor:
             )
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        awake = self._regimes is not None and not self._silent
-        probability = self._regimes.probability if awake else {}
+        asleep = self._regimes is None or self._silent
+        probability = {} if asleep else self._regimes.probability
         return MonitorProgress(steady_s, used_s, since_ns, probability)
 
     @property
@@ -262,6 +262,7 @@ class Monitor:
         events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
+        self._ended_by = None
         self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
@@ -391,8 +392,7 @@ class Monitor:
             return events + (self._rest(regimes, number) if slow else [])
         if slow and not regimes.caught_up:  # long ago: she has sailed since
             return []
-        ended = self._silent and regimes.gliding_since(self._reported_s) <= again
-        if slow or regimes.asleep or ended:
+        if slow or regimes.asleep or (self._silent and self._lost(regimes)):
             return self._rest(regimes, number)
         if regimes.full:
             return self._anew(regimes, number)
@@ -607,11 +607,18 @@ class Monitor:
     def _bear_silence(self, now_ns: int) -> list[Event]:
         """End what runs once the source watched is silent; what may glide on goes on unread."""
         watch, events = self._watch, list[Event]()
-        if self._memory.guard.last_ns[watch.source] > watch.silent_ns:
+        if not self._silent or self._memory.guard.last_ns[watch.source] > watch.silent_ns:
             events = self._stop_at_last_sample(EndedBy.DATA_STOP)
         watch.silent_ns = now_ns
         number = now_ns // SECOND_NS
         return events + self._vouching.explained(self._judged(number, number))
+
+    def _lost(self, regimes: RegimeFilter) -> bool:
+        """Say whether a glide of which the readings ceased has probably ended by now."""
+        since_s = self._reported_s
+        unread = regimes.read_after(since_s) >= regimes.taken_s
+        chance = regimes.gliding_since(since_s) if unread else regimes.gliding
+        return chance <= float(numbers.ANNOUNCE[1])
 
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
@@ -627,10 +634,11 @@ class Monitor:
             events += self._end_glide(regimes, number, ended_by, end_ns)
         source, end_s = int(self._watch.source), end_ns / SECOND_NS
         events += self._rest(regimes, number, ended_by, end_ns)
-        if ended_by in _SILENT and regimes.gliding_since(end_s) > numbers.ANNOUNCE[1]:
-            self._regimes, self._silent = regimes, True
-            self._watch.source, self._watch.silent_ns = source, end_ns
+        if ended_by in _SILENT:
             self._reported_s, self._ended_by = end_s, ended_by
+            self._watch.silent_ns = end_ns
+            if not self._lost(regimes):
+                self._regimes, self._watch.source, self._silent = regimes, source, True
         return self._vouching.explained(events)
 
     def _stand_down(self) -> None:

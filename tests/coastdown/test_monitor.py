@@ -160,7 +160,7 @@ def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, s
 
 
 @pytest.mark.parametrize('inputs', ['log', 'log shaft', 'log compass'])
-@pytest.mark.parametrize('gap_s', [(960, 1030), (1060, 1360), (1300, 1420)])
+@pytest.mark.parametrize('gap_s', [(960, 1030), (1061, 1360), (1300, 1420)])
 def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
     ship, record, sensors, inputs, gap_s
 ) -> None:
