@@ -189,7 +189,8 @@ def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
 
 
 def test_a_glide_that_ends_in_a_silence_has_no_rest(ship, record) -> None:
-    block = record(orders=(EngineOrder(0.0, 0.0), EngineOrder(220.0, 1.0)), duration_s=1500.0)
+    orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(220.0, 1.0, 1.0)
+    block = record(orders=orders, duration_s=1500.0)
     second = (block.stamp_ns - START_NS) // S
     watched = monitor(ship, estimate=refuse)
     events = watched.update(block[(second < 1100) | (second >= 1300)]) + watched.finish()
