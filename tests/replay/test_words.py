@@ -193,7 +193,7 @@ def test_nothing_is_made_of_a_gap(tmp_path: Path, voyage, ship: Ship) -> None:
 
 
 @pytest.mark.parametrize('gap_s', [(1300, 1420), (1210, 1900)])
-def test_the_rest_of_a_glide_after_a_gap_is_found_or_asked_for(tmp_path: Path, ship: Ship, gap_s) -> None:
+def test_the_rest_after_a_gap_is_found_or_asked_for(tmp_path: Path, ship: Ship, gap_s) -> None:
     second, rng = np.arange(2800), np.random.default_rng(0)
     speed, gust = np.full(len(second), 7.0), 0.0
     for k in range(1, len(speed)):
