@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,8 +144,8 @@ class Legs:
         DiagnosisError
             If they have no log, nothing over ground, or too few even stretches.
         """
-        cut = [_LegCutter(record, parameters) for record in records]
-        stretches = [(j, one.leg(float(at_s))) for j, one in enumerate(cut) for at_s in one.edges]
+        cut = _cutters(records, parameters)
+        stretches = [(j, one.leg(float(at_s))) for j, one in cut for at_s in one.edges]
         found = [(j, leg) for j, leg in stretches if isinstance(leg, _Leg)]
         left = Counter(dict.fromkeys(Left, 0))
         left.update(why for _, why in stretches if isinstance(why, Left))
@@ -168,10 +169,10 @@ class Legs:
             record=np.array([j for j, _ in kept]),
             **columns,
             direction=known.pop() if len(known) == 1 else Direction.HEADING,
-            length_s=max(one.length_s for one in cut),
-            geodetic=all(one.geodetic for one in cut),
+            length_s=max(one.length_s for _, one in cut),
+            geodetic=all(one.geodetic for _, one in cut),
             left_out={why: count for why, count in left.items() if count},
-            notes=tuple(note for one in cut for note in one.notes),
+            notes=tuple(dict.fromkeys(note for _, one in cut for note in one.notes)),
         )
 
     def __getitem__(self, part: Int64) -> Legs:
@@ -257,7 +258,7 @@ class Stretches:
         DiagnosisError
             If they have no log, or nothing over ground.
         """
-        cut = [_LegCutter(record, parameters) for record in records]
+        cut = [one for _, one in _cutters(records, parameters)]
         every = [one.stretch(float(at_s)) for one in cut for at_s in one.edges]
         found = [each for each in every if each is not None]
         return cls(
@@ -355,21 +356,47 @@ class _Leg(NamedTuple):
     direction: Direction
 
 
-class _LegCutter:
-    """One record on its way to legs."""
-
-    def __init__(self, record: SailingRecord, parameters: Parameters) -> None:
-        block = record.block
-        if len(block) == 0:
+def _cutters(
+    records: Sequence[SailingRecord], parameters: Parameters
+) -> list[tuple[int, _LegCutter]]:
+    """Return the number of each record with each part of it in which the stamps ascend."""
+    found: list[tuple[int, _LegCutter]] = []
+    for j, record in enumerate(records):
+        if len(record.block) == 0:
             raise DiagnosisError(f'{record.name!r} has no accepted sample: give another record')
-        start_ns, end_ns = int(block.stamp_ns.min()), int(block.stamp_ns.max())
-        try:
-            window = Window.from_block(block, start_ns, end_ns).one_of_each()
-            window = window.by_rep103(parameters.heading_convention)
-        except ValueError as error:
-            raise DiagnosisError(
-                f'{record.name!r}: a clock was set within the record ({error}): cut it there'
-            ) from error
+        parts, failed = _ascending(record.block), list[DiagnosisError]()
+        for part in parts:
+            try:
+                found.append((j, _LegCutter(record, part, parameters)))
+            except DiagnosisError as error:
+                failed.append(error)
+        if len(failed) == len(parts):
+            raise failed[0]
+        if len(parts) > 1:
+            found[-1][1].notes += (
+                f'{record.name}: stamps go back within it (a clock was set, or rows came late): '
+                'what is before and what is after is compared apart',
+            )
+    return found
+
+
+def _ascending(block: Block) -> list[Block]:
+    """Cut a block where the stamps of a channel go back."""
+    cuts = {0, len(block)}
+    for channel in np.unique(block.channel):
+        rows = np.flatnonzero(block.channel == channel)
+        cuts.update(rows[1:][np.diff(block.stamp_ns[rows]) <= 0].tolist())
+    return [block[first:end] for first, end in pairwise(sorted(cuts))]
+
+
+class _LegCutter:
+    """One record, or a part of it, on its way to legs."""
+
+    def __init__(self, record: SailingRecord, block: Block, parameters: Parameters) -> None:
+        start_ns = int(record.block.stamp_ns.min())
+        first_ns, end_ns = int(block.stamp_ns.min()), int(block.stamp_ns.max())
+        window = Window.from_block(block, first_ns, end_ns).one_of_each()
+        window = window.by_rep103(parameters.heading_convention)
         by_place = len(window.position) >= min(_SAMPLES, 1 + len(window.speed_over_ground))
         ground = window.position if by_place else window.speed_over_ground
         if len(window.speed_through_water) < _SAMPLES or len(ground) < _SAMPLES:
@@ -387,10 +414,10 @@ class _LegCutter:
         self.log = _Timed.of(window.speed_through_water, start_ns)
         self.ground = _Timed.of(ground, start_ns)
         self.heading = _Timed.of(window.heading, start_ns)
-        span_s = (end_ns - start_ns) * 1e-9
+        first_s, end_s = (first_ns - start_ns) * 1e-9, (end_ns - start_ns) * 1e-9
         step_s = max(self.log.step_s, self.ground.step_s)
-        self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
-        self.edges = np.arange(0.0, span_s, self.length_s)
+        self.length_s = max(_LEG_S, (end_s - first_s) / _MOST_LEGS, _SAMPLES * step_s)
+        self.edges = np.arange(first_s, end_s, self.length_s)
 
     def leg(self, start_s: float) -> _Leg | Left:
         """Return the leg that begins at a time, or why there is none."""

@@ -160,7 +160,7 @@ class Estimate:
         square; none where they are not known.
     sigma_shared_m_s2
         Part of the sigma of `calm` (m,) that other runs of the ship have too, by the prior of her
-        curve and of her log; empty where it is not known.
+        curve and of her instruments; empty where it is not known.
     """
 
     __repr__ = short_repr

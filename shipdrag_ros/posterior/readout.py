@@ -25,12 +25,12 @@ class ReadOut:
     slope_1_s, slope_sigma_1_s : (m,)
         dr/dv.
     parts_m_s2
-        Parts of sigma by cause (m,): `n_r`, `log`, `held_force`, `wind`, `depth`, `law` and
-        `noise`, whose squares add up to its square. Each is what would go if the cause were
-        known, of what those before it leave.
+        Parts of sigma by cause (m,): `n_r`, `log`, `ground` (its scale), `held_force`, `wind`,
+        `depth`, `law` and `noise`, whose squares add up to its square. Each is what would go if
+        the cause were known, of what those before it leave.
     shared_m_s2 : (m,)
-        What the errors of the ship file's curve and of the log as they are expected, which are
-        those of her other runs too, put into sigma.
+        What the errors of the ship file's curve and of the instruments as they are expected,
+        which are those of her other runs too, put into sigma.
     """
 
     speed_m_s: Float64
@@ -91,7 +91,8 @@ def _shared(found: RunPosterior, cross: Float64) -> Float64:
 
     A posterior covariance V is V (P + D) V, of the errors of prior P and of those of the data D.
     """
-    which = [*range(found.problem.of_hull), *_causes(found)['log']]
+    causes = _causes(found)
+    which = [*range(found.problem.of_hull), *causes['log'], *causes['ground']]
     prior = found.family @ np.array([1.0 / each.precision for each in found.problem.families])
     shared: Float64 = np.sqrt(cross[:, which] ** 2 @ (1.0 / prior[which]))
     return shared
@@ -100,13 +101,16 @@ def _shared(found: RunPosterior, cross: Float64) -> Float64:
 def _causes(found: RunPosterior) -> dict[str, list[int]]:
     """Return the unknowns of each cause."""
     problem, k = found.problem, found.problem.coefficients
+    logs = problem.rows.of(LOG)
+    of_logs, of_ground = (
+        sorted({k + motion.own(code) for code in np.unique(problem.rows.kind[kind])})
+        for kind in (logs, ~logs)
+    )
+    of_log = motion.SCALE, motion.OFFSET, motion.LAG
     causes = {
         'n_r': [k + motion.INERTIA],
-        'log': [
-            k + motion.own(code) + each
-            for code in np.unique(problem.rows.kind[problem.rows.of(LOG)])
-            for each in (motion.SCALE, motion.OFFSET, motion.LAG)
-        ],
+        'log': [own + each for own in of_logs for each in of_log],
+        'ground': [own + motion.GROUND_SCALE for own in of_ground],
     }
     first = problem.of_hull
     for each in problem.influences:

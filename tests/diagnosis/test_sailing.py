@@ -136,6 +136,25 @@ def test_nothing_wrong_nothing_said() -> None:
             assert found.after is None
 
 
+@pytest.mark.parametrize('set_s', [0.0, -3600.0])
+def test_rows_that_came_late_and_a_clock_that_was_set_cost_no_diagnosis(set_s: float) -> None:
+    sailing = Sailing(scale=-0.06, geodetic=True)
+    sound, block = found_in(sailing), sailing.block(1)
+    at = np.arange(len(block)) * 20 // len(block)  # in twenty parts of the record
+    if set_s:
+        after_ns = np.where(at > 9, round(set_s * 1e9), 0)
+        late = replace(block, stamp_ns=block.stamp_ns + after_ns)
+    else:
+        parts = at < 9, at == 10, at == 9, at > 10
+        late = block[np.concatenate([np.flatnonzero(part) for part in parts])]
+    found = diagnose_sailing([SailingRecord('sailing', late)], PARAMETERS)
+    assert [each.name for each in found.effects] == [each.name for each in sound.effects]
+    sizes = [each.effects[0].parameters['factor'].value for each in (found, sound)]
+    assert sizes[0] == pytest.approx(sizes[1], abs=0.01)
+    said = [note for note in found.notes if note.startswith('sailing: stamps go back within it')]
+    assert len(said) == 1
+
+
 @pytest.mark.parametrize('name', CASES)
 def test_what_is_wrong_is_named_and_nothing_else(name: str) -> None:
     # N = 8, seeds 0..7: were fewer than 1 in 2 named, 6 of 8 has a probability < 15 %; no name is

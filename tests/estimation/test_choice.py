@@ -145,6 +145,11 @@ def test_a_log_beside_a_radar_in_a_wrong_scale_is_not_blamed_alone() -> None:
         assert len(said) == (found is of_radar)
     assert away[0] < 0.6 * away[1]
     assert held[1] < held[0] == 1.0
+    # which of the two it is, other runs of hers do not tell
+    shared = [
+        np.mean(each.sigma_shared_m_s2 / each.calm.sigma_m_s2) for each in (of_radar, of_gnss)
+    ]
+    assert shared[1] < 0.8 < 0.95 < shared[0]
 
 
 def test_positions_show_the_scale_and_it_is_said() -> None:

@@ -112,7 +112,7 @@ def test_shallow_water_that_is_measured_is_taken_out() -> None:
 def test_the_parts_of_sigma_add_up() -> None:
     for ship in (SHIP, BARE):
         found = coast(ship, WINDS[0])
-        causes = ['n_r', 'log', 'held_force', 'wind', 'depth', 'law', 'noise']
+        causes = ['n_r', 'log', 'ground', 'held_force', 'wind', 'depth', 'law', 'noise']
         assert list(found.sigma_parts) == causes
         total = sum(part**2 for part in found.sigma_parts.values())
         np.testing.assert_allclose(np.sqrt(total), found.calm.sigma_m_s2, rtol=1e-6)
