@@ -144,8 +144,8 @@ class Monitor:
             )
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        asleep = self._regimes is None or self._silent
-        probability = {} if asleep else self._regimes.probability
+        regimes = None if self._silent else self._regimes
+        probability = {} if regimes is None else regimes.probability
         return MonitorProgress(steady_s, used_s, since_ns, probability)
 
     @property

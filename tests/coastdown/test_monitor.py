@@ -188,6 +188,20 @@ def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
     assert bits(told[0]) == bits(told[1])  # whoever notices the silence
 
 
+def test_each_part_of_a_glide_between_silences_ends_by_itself(ship, record) -> None:
+    orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(620.0, 1.0, 1.0)
+    block = record(orders=orders, duration_s=1200.0)
+    second = (block.stamp_ns - START_NS) // S
+    lost = ((second >= 1060) & (second < 1160)) | ((second >= 1300) & (second < 1380))
+    watched = monitor(ship, estimate=refuse)
+    told = of(EndedCoastdown, watched.update(block[~lost]) + watched.finish())
+    ended = [each.ended_by for each in told]
+    assert ended == [EndedBy.DATA_STOP, EndedBy.DATA_STOP, EndedBy.ENGINE]
+    seconds = [((each.start_ns - START_NS) // S, (each.end_ns - START_NS) // S) for each in told]
+    assert seconds[1] == (1160, 1299)
+    assert seconds[2] == (1380, pytest.approx(1520, abs=15))
+
+
 def test_a_glide_that_ends_in_a_silence_has_no_rest(ship, record) -> None:
     orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(220.0, 1.0, 1.0)
     block = record(orders=orders, duration_s=1500.0)
