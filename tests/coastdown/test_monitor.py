@@ -188,6 +188,15 @@ def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
     assert bits(told[0]) == bits(told[1])  # whoever notices the silence
 
 
+def test_a_compass_tells_no_speed_in_a_silence(ship, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['compass']), duration_s=1200.0)
+    second = (block.stamp_ns - START_NS) // S
+    lost = (second >= 1100) & (second < 1700) & (block.channel == LOG)
+    watched = monitor(ship, estimate=refuse)
+    told = of(EndedCoastdown, watched.update(block[~lost]) + watched.finish())
+    assert [each.ended_by for each in told] == [EndedBy.DATA_STOP, EndedBy.RECORD_END]
+
+
 def test_each_part_of_a_glide_between_silences_ends_by_itself(ship, record) -> None:
     orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(620.0, 1.0, 1.0)
     block = record(orders=orders, duration_s=1200.0)

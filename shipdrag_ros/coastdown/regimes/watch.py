@@ -274,9 +274,9 @@ class RegimeFilter:
 
     def read_after(self, second: float) -> float:
         """
-        Return the begin of the first bin after that of a second in which motion was read [s].
+        Return the begin of the first bin after a second in which motion was read [s].
         """
-        since = max(int((second - self._zero_s) // self._width) + 1, 0)
+        since = max(math.ceil((second - self._zero_s) / self._width), 0)
         gap = np.cumsum(self._read[since:]) == 0
         return float(self._zero_s + (since + int(gap.sum())) * self._width)
 
