@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+import numpy as np
+
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -64,6 +66,13 @@ ENDED_BY = {
     EndedBy.GIVEN: 'the window was given by hand',
 }
 
+_BY_REGIME = {
+    EndedBy.ENGINE: ('driven', 're_engaged'),
+    EndedBy.BRAKE: ('braked',),
+    EndedBy.TURN: ('turning',),
+}
+_SOON = 12  # bins after an end, which is dated to some of them
+
 
 class Dismissal(Enum):
     """Why a stretch of record is not, or no longer, taken for a coastdown."""
@@ -111,6 +120,26 @@ class Regimes:
     probability: Mapping[str, Float64]
     excess: float
     explained: float
+
+    def ends(self, end_ns: int) -> dict[EndedBy, float]:
+        """
+        Return the probability, soon after a glide, of each regime that may have ended it.
+        """
+        soon = np.flatnonzero(self.time_ns > end_ns)[:_SOON]
+        found = {}
+        for ended_by, names in _BY_REGIME.items():
+            chance = np.sum([self.probability[name] for name in names], axis=0)
+            found[ended_by] = float(np.max(chance[soon], initial=0.0))
+        return found
+
+    def ended_by(self, said: EndedBy, end_ns: int) -> EndedBy:
+        """
+        Return what is said to have ended a glide, or the regime that did so more probably.
+        """
+        chances = self.ends(end_ns)
+        if said not in chances:
+            return said
+        return max(chances, key=lambda each: (chances[each], each is said))
 
 
 @dataclass(frozen=True)

@@ -248,7 +248,9 @@ def walk(
                 break
             if (
                 watch.source != NEVER
-                and stamp > alive_ns(guard, tuning.limits, watch.source) + tuning.data_stop_ns
+                and stamp
+                > max(alive_ns(guard, tuning.limits, watch.source), watch.silent_ns)
+                + tuning.data_stop_ns
             ):
                 stop = WalkEvent.SILENCE
                 break

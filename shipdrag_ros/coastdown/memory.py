@@ -34,6 +34,7 @@ WATCH = np.dtype(
         ('level', 'f8'),  # speed there [m/s]
         ('steady_since', 'i8'),  # bin; NEVER if she is not
         ('steady_most', 'i8'),  # the longest that she was [bins]
+        ('silent_ns', 'i8'),  # when the source watched was found silent last; NEVER if it was not
         ('look', 'i8'),  # bin at whose first sample log and track are compared next
         ('doubted', 'i8', (CHANNELS,)),  # up to which each source is not used: another contradicts
     ],
@@ -49,6 +50,7 @@ def fresh_watch() -> NDArray[np.void]:
     watch = np.zeros(1, np.dtype((np.record, WATCH)))
     made = watch[0]
     made.source = made.seen_source = made.seen = made.steady_since = made.look = NEVER
+    made.silent_ns = NEVER
     made.doubted[:] = NEVER
     made.update_ns, made.armed, made.level = ALWAYS, 1, np.nan
     return watch

@@ -47,6 +47,8 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Reason
 from shipdrag_ros.ship import Ship
 
+_SILENT = (EndedBy.DATA_STOP, EndedBy.SILENCE)
+
 
 class Monitor:
     """
@@ -113,6 +115,7 @@ class Monitor:
         self._vouching = Vouching(self._craft)
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None  # while awake
+        self._silent = False  # it goes on unread, as the glide of which the readings ceased may
         # until when glides, whole ones, and what was none were told
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._ended_by: EndedBy | None = None  # what was told of a glide may not be all of it
@@ -141,7 +144,8 @@ class Monitor:
             )
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        probability = {} if self._regimes is None else self._regimes.probability
+        regimes = None if self._silent else self._regimes
+        probability = {} if regimes is None else regimes.probability
         return MonitorProgress(steady_s, used_s, since_ns, probability)
 
     @property
@@ -149,7 +153,7 @@ class Monitor:
         """Where the monitor stands."""
         if self._running is not None:
             return State.COASTDOWN
-        if self._regimes is not None and not self._regimes.even:
+        if self._regimes is not None and not self._silent and not self._regimes.even:
             return State.CANDIDATE
         source = int(self._watch.seen_source)
         if source == NEVER or np.isnan(self._memory.steadiness.limit[source, 0]):
@@ -231,7 +235,7 @@ class Monitor:
                 self._vouch(int(stamp_ns[at]))
             elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
-                    events += self._stop_at_last_sample(EndedBy.DATA_STOP)
+                    events += self._bear_silence(int(stamp_ns[at]))
             elif stop == WalkEvent.SLOPE:
                 source = int(channel[at])
                 self._wake(source, int(self._memory.bins.closed[source]))
@@ -258,6 +262,7 @@ class Monitor:
         events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
+        self._ended_by = None
         self._vouching = Vouching(self._craft)
         return [*events, Reset(receive_ns, reason)]
 
@@ -280,7 +285,7 @@ class Monitor:
         source, tally = int(self._watch.seen_source), self._memory.tally
         if source == NEVER:
             return 'no speed was read yet, so there is nothing to weigh the stop with'
-        if self._regimes is None:
+        if self._regimes is None or self._silent:
             self._wake(source, int(self._watch.seen))
         assert self._regimes is not None
         last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
@@ -353,7 +358,7 @@ class Monitor:
         self._watch.source = source
         width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
         bins = self._vouching.sound(self._memory.bins)
-        self._regimes = RegimeFilter(self._ship, bins, width, number)
+        self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
 
@@ -387,7 +392,7 @@ class Monitor:
             return events + (self._rest(regimes, number) if slow else [])
         if slow and not regimes.caught_up:  # long ago: she has sailed since
             return []
-        if slow or regimes.asleep:
+        if slow or regimes.asleep or (self._silent and self._lost(regimes)):
             return self._rest(regimes, number)
         if regimes.full:
             return self._anew(regimes, number)
@@ -423,13 +428,13 @@ class Monitor:
         """Return the glides that were not told; of one said to have ended under way, the rest."""
         since_s, found = self._reported_s, []
         last_s = np.inf if last_ns is None else last_ns / SECOND_NS
+        silent = self._ended_by in _SILENT
+        heard_s = regimes.read_after(since_s) if silent else since_s
         for each in (self._as_read(glide, regimes) for glide in regimes.glides()):
-            if each.begin_s >= since_s:
+            if each.begin_s >= heard_s:
                 found.append(each)
-            elif self._ended_by is not EndedBy.SPEED and each.ended_by is None:
-                rest = each.since(since_s)
-                if self._ended_by in (EndedBy.DATA_STOP, EndedBy.SILENCE):
-                    rest = each.since(regimes.read_after(since_s), since_s)
+            elif silent or (self._ended_by is not EndedBy.SPEED and each.ended_by is None):
+                rest = each.since(heard_s, since_s) if silent else each.since(since_s)
                 if rest.end_s >= rest.begin_s + numbers.SHORTEST_S:
                     found.append(rest)
         return [each for each in found if each.begin_s < min(last_s, each.end_s)]
@@ -448,6 +453,7 @@ class Monitor:
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
+        self._silent = False
         if self._estimator is not None:
             self._watch.update_ns = self._running.due_ns(onset.detected_ns)
         return onset
@@ -513,7 +519,10 @@ class Monitor:
         if ended_by is None and slow_s is not None:
             otherwise, last_ns = EndedBy.SPEED, _ns(slow_s)
         dated = self._unreported(regimes, last_ns)
-        events = self._tell(dated, regimes, number, otherwise, last_ns)
+        before, events = self._silent, self._tell(dated, regimes, number, otherwise, last_ns)
+        if before:  # what was none was said when the readings ceased
+            self._stand_down()
+            return events
         if not dated:
             was = regimes.dismissal(since_s)
             if was is not None:
@@ -595,6 +604,22 @@ class Monitor:
 
     # how a coastdown ends
 
+    def _bear_silence(self, now_ns: int) -> list[Event]:
+        """End what runs once the source watched is silent; what may glide on goes on unread."""
+        watch, events = self._watch, list[Event]()
+        if not self._silent or self._memory.guard.last_ns[watch.source] > watch.silent_ns:
+            events = self._stop_at_last_sample(EndedBy.DATA_STOP)
+        watch.silent_ns = now_ns
+        number = now_ns // SECOND_NS
+        return events + self._vouching.explained(self._judged(number, number))
+
+    def _lost(self, regimes: RegimeFilter) -> bool:
+        """Say whether a glide of which the readings ceased has probably ended by now."""
+        since_s = self._reported_s
+        unread = regimes.read_after(since_s) >= regimes.taken_s
+        chance = regimes.gliding_since(since_s) if unread else regimes.gliding
+        return chance <= float(numbers.ANNOUNCE[1])
+
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
         if self._regimes is None:
@@ -607,7 +632,13 @@ class Monitor:
             return self._vouching.explained(events)
         if self._running is not None:
             events += self._end_glide(regimes, number, ended_by, end_ns)
+        source, end_s = int(self._watch.source), end_ns / SECOND_NS
         events += self._rest(regimes, number, ended_by, end_ns)
+        if ended_by in _SILENT:
+            self._reported_s, self._ended_by = end_s, ended_by
+            self._watch.silent_ns = end_ns
+            if not self._lost(regimes):
+                self._regimes, self._watch.source, self._silent = regimes, source, True
         return self._vouching.explained(events)
 
     def _stand_down(self) -> None:
@@ -616,7 +647,7 @@ class Monitor:
         watch.source = NEVER
         watch.update_ns = ALWAYS
         watch.armed = 0
-        self._running = self._regimes = None
+        self._running, self._regimes, self._silent = None, None, False
 
 
 def _ns(second: float | None) -> int | None:

@@ -129,11 +129,12 @@ class RunningCoastdown:
             estimate = estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             failure = str(error)
+        ended_by = dated.ended_by or otherwise or EndedBy.ENGINE
         ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,
-            dated.ended_by or otherwise or EndedBy.ENGINE,
+            ended_by if regimes is None else regimes.ended_by(ended_by, end_ns),
             estimate,
             failure,
             self._heading_rad,

@@ -35,10 +35,8 @@ _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
-_BY_REGIME = (EndedBy.ENGINE, EndedBy.BRAKE, EndedBy.TURN)
 _FOLLOWED_NS = 3600 * SECOND_NS  # after a gap
 _OF_MOTION = [channel for channel in Channel if channel.input in ALL_MOTION]
-_SOON = 12  # bins after an end, which is dated to some of them
 _UNEXPLAINED = 0.05  # of the records that were explained less well; below it, it is said
 _SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
@@ -71,14 +69,12 @@ def explained(regimes: Regimes) -> str:
 
 def ended(coastdown: EndedCoastdown) -> str:
     """
-    Say what ended a coastdown; how likely she glided no more, where the regimes alone tell.
+    Say what ended a coastdown, and how likely that is, where the regimes alone tell.
     """
     text, regimes = ENDED_BY[coastdown.ended_by], coastdown.regimes
-    if regimes is None or coastdown.ended_by not in _BY_REGIME:
-        return text
-    gliding = regimes.probability['run_down'] + regimes.probability['gliding']
-    after = gliding[regimes.time_ns > coastdown.end_ns][:_SOON]
-    return f'{text} (P {1.0 - float(after.min()):.2f})' if len(after) else text
+    chances = {} if regimes is None else regimes.ends(coastdown.end_ns)
+    chance = f'{chances.get(coastdown.ended_by, 0.0):.2f}'
+    return text if chance == '0.00' else f'{text} (P {chance})'
 
 
 def recorded_sentence(recorded: Recorded) -> str:
@@ -238,12 +234,12 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
         *_inputs(result.inputs),
         *_resets(result.events),
         *_unexplained(result.events),
-        *_not_judged(result),
+        *_not_found_again(result),
     )
 
 
-def _not_judged(result: ReplayResult) -> Iterator[str]:
-    """Say what of a glide was not judged, as the readings had ceased in it."""
+def _not_found_again(result: ReplayResult) -> Iterator[str]:
+    """Say of which glides the readings ceased, and no rest was found once they were back."""
     told = [each for each in result.events if isinstance(each, EndedCoastdown) and each.stands]
     followed = {cut.start_ns for each in told for cut in each.cuts}
     for one in told:
@@ -262,7 +258,7 @@ def _not_judged(result: ReplayResult) -> Iterator[str]:
         at = _moment(one.end_ns, span_ns)
         yield (
             f'the readings of speed ceased for {silent_s:.0f} s at {at}: the coastdown ends '
-            'there, and what she did after it was not judged; if she went on '
+            'there, and no rest of it was found; if she went on '
             f'without thrust, say so with --window {again_s:.0f} {last_s:.0f}'
         )
 

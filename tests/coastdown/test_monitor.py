@@ -152,9 +152,73 @@ def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, s
     # noticed as soon as 30 s are over, not when the record is
     late = watched.update(block[:0])
     assert late == []
+    assert watched.state is not State.CANDIDATE
+    assert watched.finish() == []
     kept = block[~silent]
     before = kept[kept.stamp_ns <= START_NS + 1330 * S]
     assert of(EndedCoastdown, monitor(ship, data_stop_s=30.0).update(before)) == []
+
+
+@pytest.mark.parametrize('inputs', ['log', 'log shaft', 'log compass'])
+@pytest.mark.parametrize('gap_s', [(960, 1030), (1061, 1360), (1300, 1420)])
+def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
+    ship, record, sensors, inputs, gap_s
+) -> None:
+    block = record(sensors=tuple(sensors[each] for each in inputs.split()))
+    second = (block.stamp_ns - START_NS) // S
+    lost = (second >= gap_s[0]) & (second < gap_s[1]) & (block.channel != Channel.HEADING)
+    heard, before = block[~lost], second[~lost] < gap_s[0]
+    told = []
+    for by_clock in (False, True):
+        watched = monitor(ship, estimate=refuse)
+        events = watched.update(heard[before])
+        assert of(EndedCoastdown, events) == []
+        if by_clock:
+            events += watched.fall_silent()
+            assert watched.state is not State.CANDIDATE
+        for i in range(int(before.sum()), len(heard)):
+            events += watched.update(heard[i : i + 1])
+        first, rest = of(EndedCoastdown, events + watched.finish())
+        assert first.ended_by is (EndedBy.SILENCE if by_clock else EndedBy.DATA_STOP)
+        assert first.end_ns == block.stamp_ns[(second < gap_s[0]) & (block.channel == LOG)][-1]
+        assert 0 <= rest.start_ns - (START_NS + gap_s[1] * S) <= 5 * S
+        assert (rest.end_ns, rest.ended_by) == (heard.stamp_ns[-1], EndedBy.RECORD_END)
+        assert [cut.reason for cut in rest.cuts] == [Dismissal.GAP]
+        told.append(rest)
+    assert bits(told[0]) == bits(told[1])  # whoever notices the silence
+
+
+def test_a_compass_tells_no_speed_in_a_silence(ship, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['compass']), duration_s=1200.0)
+    second = (block.stamp_ns - START_NS) // S
+    lost = (second >= 1100) & (second < 1700) & (block.channel == LOG)
+    watched = monitor(ship, estimate=refuse)
+    told = of(EndedCoastdown, watched.update(block[~lost]) + watched.finish())
+    assert [each.ended_by for each in told] == [EndedBy.DATA_STOP, EndedBy.RECORD_END]
+
+
+def test_each_part_of_a_glide_between_silences_ends_by_itself(ship, record) -> None:
+    orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(620.0, 1.0, 1.0)
+    block = record(orders=orders, duration_s=1200.0)
+    second = (block.stamp_ns - START_NS) // S
+    lost = ((second >= 1060) & (second < 1160)) | ((second >= 1300) & (second < 1380))
+    watched = monitor(ship, estimate=refuse)
+    told = of(EndedCoastdown, watched.update(block[~lost]) + watched.finish())
+    ended = [each.ended_by for each in told]
+    assert ended == [EndedBy.DATA_STOP, EndedBy.DATA_STOP, EndedBy.ENGINE]
+    seconds = [((each.start_ns - START_NS) // S, (each.end_ns - START_NS) // S) for each in told]
+    assert seconds[1] == (1160, 1299)
+    assert seconds[2] == (1380, pytest.approx(1520, abs=15))
+
+
+def test_a_glide_that_ends_in_a_silence_has_no_rest(ship, record) -> None:
+    orders = EngineOrder(0.0, 0.0, 0.0), EngineOrder(220.0, 1.0, 1.0)
+    block = record(orders=orders, duration_s=1500.0)
+    second = (block.stamp_ns - START_NS) // S
+    watched = monitor(ship, estimate=refuse)
+    events = watched.update(block[(second < 1100) | (second >= 1300)]) + watched.finish()
+    assert [each.ended_by for each in of(EndedCoastdown, events)] == [EndedBy.DATA_STOP]
+    assert of(NotCoastdown, events) == []
 
 
 def test_a_gap_shorter_than_data_stop_s_does_not_end_a_coastdown(ship, record) -> None:

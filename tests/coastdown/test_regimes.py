@@ -10,6 +10,7 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Update
+from shipdrag_ros.coastdown.regimes import read_out
 from shipdrag_ros.coastdown.regimes.births import bear, brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
@@ -388,3 +389,15 @@ def test_a_glide_that_may_have_been_held_at_first_is_followed_whole(ship, one_gl
     weight = np.array([one_glide, *[other] * 5])
     spans = Spans(what, begin_s, begin_s, begin_s, end_s, weight, what, what == LEVEL)
     assert unpowered(spans, 120, BankSetting.of(HullPrior.of(ship), BIN_S)) == found
+
+
+def test_no_glide_is_told_twice(ship) -> None:
+    """One that probably ended at a doubt, and after it another, or the same all along."""
+    begin_s, end_s = np.array([20.0, 20.0, 310.0]), np.array([300.0, 600.0, 600.0])
+    what = np.full(3, GLIDE)
+    spans = Spans(
+        what, begin_s, begin_s, begin_s, end_s, np.array([0.4, 0.32, 0.28]), what, what < 0
+    )
+    setting = BankSetting.of(HullPrior.of(ship), BIN_S)
+    told = read_out.glides(spans, setting, np.linspace(7.0, 3.0, 120))
+    assert [(each.begin_s, each.end_s) for each in told] == [(20.0, 300.0)]

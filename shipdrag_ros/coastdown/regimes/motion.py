@@ -673,8 +673,9 @@ def weigh(
     )
     if not np.isnan(said[s.RATE]):
         u = math.exp(x[s.LN_U])
-        # errors of fixes turn a course by more, the shorter the way
-        sd = noise[s.N_RATE] * math.exp(min(max(log_first - x[s.LN_U], 0.0), 1.5))
+        sd = noise[s.N_RATE]
+        if not np.isnan(said[s.ADVANCE]):  # the shorter a way, the more errors of fixes turn it
+            sd *= math.exp(min(max(log_first - x[s.LN_U], 0.0), 1.5))
         wide = n.TURN_RATE * u / setting.hull.length_m + sd
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[s.RATE], wide) + (1.0 - share) * _normal(said[s.RATE], sd)

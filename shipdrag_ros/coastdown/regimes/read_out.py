@@ -179,14 +179,16 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
     all_of: list[SmoothedGlide] = []
     for first, last in stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())
-        # a glide that was not over at a doubt goes on after it
-        if peak < n.HOLD[1] or (all_of and first * step_s < all_of[-1].end_s):
+        if peak < n.HOLD[1]:
             continue
         shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.gone_s, first * step_s)
         one = shared > 0.5 * (last - first) * step_s
         if not one.any():
             continue
         glide = _one(found.part(one))
+        # one that was not over at a doubt goes on after it
+        if all_of and min(glide.begin_s, first * step_s) < all_of[-1].end_s:
+            continue
         even_s = _even_s(speed, glide, step_s)
         if even_s < glide.end_s:
             glide = glide._replace(end_s=even_s, after=s.LEVEL)
