@@ -277,12 +277,13 @@ def compare(
 def effects_about(seen: Sequence[Observation]) -> list[Effect]:
     """Return the effects that her ship file and the instruments of her runs can show."""
     ship, read = seen[0].ship, {name for run in seen for name in run.inputs}
+    geodetic = _geodetic(seen)
     return [
         effect
         for effect in effects_of(ship).values()
         if not effect.missing(ship)
         and (not effect.errs_in or read.intersection(effect.errs_in))
-        and (effect.in_geodetic or not _geodetic(seen))
+        and (effect.in_geodetic or not geodetic)
     ]
 
 

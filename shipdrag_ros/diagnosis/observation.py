@@ -74,8 +74,6 @@ class Observation:
         Length of the steady record.
     time_s : (m,)
         Times of all rows, ascending, from the start of the steady record.
-    stop_sd_s
-        How well the time of the stop, at the end of the lead-in, is known.
     run_down_s, run_down_sd_s
         Of the shaft: as the ship file states it, else as it was seen; 0: not known.
     heading_rad, heading_sd_rad
@@ -101,7 +99,6 @@ class Observation:
     name: str
     lead_in_s: float
     time_s: Float64
-    stop_sd_s: float
     run_down_s: float
     run_down_sd_s: float
     heading_rad: float
@@ -114,6 +111,11 @@ class Observation:
     ship: Ship
     geodetic: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def stop_sd_s(self) -> float:
+        """How well the time of the stop is known."""
+        return self.context.stop.sd_s
 
     @property
     def stopped_ns(self) -> int:
@@ -190,7 +192,6 @@ class Observation:
             name,
             lead_in_s,
             times,
-            run_down.stop_sd_s,
             *(
                 (run_down.shaft_s, run_down.shaft_sd_s)
                 if ship.propulsion is None

@@ -275,7 +275,7 @@ def _all_families(
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
-    errors: Mapping[int, Declared],
+    wrong_scales: Mapping[int, Declared],
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
@@ -294,7 +294,7 @@ def _all_families(
         chance = hull.chance * math.prod(each.chance for each in state)
         usual = all(each is of.states[0] for each, of in zip(state, influences))
         for lag, force, wrong in product(
-            _lags(kinds), _after_stop(stop, added, hull.level), _wrong_scales(errors)
+            _lags(kinds), _after_stop(stop, added, hull.level), _wrong_scales(wrong_scales)
         ):
             own, known = mean.copy(), precision.copy()
             for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *wrong.unknown):

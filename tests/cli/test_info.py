@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros import __version__
+from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
 
 
@@ -37,6 +38,14 @@ def test_the_json(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert about['warnings'] == []
     shaft = next(topic for topic in about['topics'] if topic['topic'] == '/shaft')
     assert (shaft['input'], shaft['messages'], shaft['rate_hz']) == ('shaft', 302, 1.0)
+
+
+def test_an_attachment_is_told_with_its_size_in_bytes(tmp_path: Path, capsys) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.attach('ship.yaml', 'é')
+    assert main(['info', str(tmp_path / 'a.mcap'), '--json']) == 0
+    (about,) = json.loads(capsys.readouterr().out)['bags']
+    assert about['attachments'] == {'ship.yaml': 2}
 
 
 def test_a_remapping_changes_what_is_heard(steady_bag: Path, capsys) -> None:

@@ -13,6 +13,7 @@ import pytest
 from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
 from shipdrag_ros.inference.noise import WHITE, Noise, Settings, whiten
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.parameter import Declared
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import mix
 from shipdrag_ros.posterior.motion import predict
@@ -28,6 +29,7 @@ from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
 
 
 def problem_of(
@@ -134,6 +136,15 @@ def test_each_scale_may_be_wrong_but_that_of_latitude_and_longitude(ship: Ship) 
             assert sum(each.chance for each in wide) == pytest.approx(WRONG_SCALE.mean * may)
             for each in wide:
                 assert each.precision[at] ** -0.5 == pytest.approx(size.sd)
+
+
+@pytest.mark.parametrize(
+    ('name', 'size'), [('log_scale', WRONG_LOG_SCALE), ('radar_scale', WRONG_GROUND_SCALE)]
+)
+def test_a_wrong_scale_is_as_wide_and_as_likely_as_its_effect(name: str, size: Declared) -> None:
+    effect = LIBRARY[name]
+    assert effect.parameters[0].prior == size.prior
+    assert effect.odds == pytest.approx(WRONG_SCALE.mean)
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:
