@@ -122,7 +122,7 @@ _RUNS_AWAY = (
 )
 
 
-class Mixture(NamedTuple):
+class NormalMixture(NamedTuple):
     """
     Normal distributions that count, of some unknowns.
 
@@ -144,10 +144,10 @@ class Mixture(NamedTuple):
         within = np.tensordot(self.weight, self.covariance, 1)
         return mean, within + (self.weight * away.T) @ away
 
-    def of(self, columns: Float64) -> Mixture:
+    def of(self, columns: Float64) -> NormalMixture:
         """Return those of what columns (p, v) make of the unknowns, each v by itself."""
         variance = np.einsum('pv,mpq,qv->mv', columns, self.covariance, columns, optimize=True)
-        return Mixture(self.weight, self.mean @ columns, variance)
+        return NormalMixture(self.weight, self.mean @ columns, variance)
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class RunPosterior:
     problem: RunModel
     mean: Float64
     covariance: Float64
-    force: Mixture
+    force: NormalMixture
     family: Float64
     noise: NoisePosterior
 
@@ -202,7 +202,7 @@ def mix(
     weight : (s, f)
         Of all; adds up to 1.
     kept, step, covariance
-        Of those that count, as `Mixture` has them.
+        Of those that count, as `NormalMixture` has them.
     """
     s, f, p = len(products), len(families.log_chance), families.mean.shape[1]
     t = len(taught.log_chance)
@@ -256,29 +256,29 @@ def _likely(problem: RunModel, now: Float64, typical: Settings, least: float) ->
     return replace(problem, families=problem.families.of(logs - logs.max() > least))
 
 
-class _Step(NamedTuple):
+class _Averaged(NamedTuple):
     """What the linear models about some unknowns say: the mixture, and from where it counts."""
 
     weight: Float64  # (s, f)
-    free: Mixture
+    free: NormalMixture
     step: Float64  # (p,), as the next
     covariance: Float64
 
 
-def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Settings) -> _Step:
+def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Settings) -> _Averaged:
     """Return what is said about some unknowns; noise was learnt by `taught`."""
     table, white = _linear(problem, now)
     families, of_taught = (each.about(now, problem.free) for each in (problem.families, taught))
     products, log_det = whitened_products(table, problem.rows, white, problem.steady, settings)
     weight, *kept = mix(products, log_det, settings.weight, families, of_taught)
-    of_free, spread = Mixture(*kept).moments()
+    of_free, spread = NormalMixture(*kept).moments()
     step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families.precision[0])
     step[problem.free] = of_free
     covariance[np.ix_(problem.free, problem.free)] = spread
-    return _Step(weight, Mixture(*kept), step, covariance)
+    return _Averaged(weight, NormalMixture(*kept), step, covariance)
 
 
-def _of_force(problem: RunModel, found: _Step) -> Mixture:
+def _of_force(problem: RunModel, found: _Averaged) -> NormalMixture:
     """Return the mixture of the coefficients of forces, less their mean."""
     weight, mean, covariance = found.free
     k, free = problem.coefficients, problem.free[problem.free < problem.coefficients]
@@ -286,7 +286,7 @@ def _of_force(problem: RunModel, found: _Step) -> Mixture:
     means, spread = np.zeros((len(many), k)), np.zeros((len(many), k, k))
     means[:, free] = mean[:, :f] - found.step[free]
     spread[np.ix_(many, free, free)] = covariance[:, :f, :f]
-    return Mixture(weight, means, spread)
+    return NormalMixture(weight, means, spread)
 
 
 def _seen(problem: RunModel, now: Float64) -> Seen:
@@ -375,7 +375,7 @@ def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
     return now
 
 
-def _moved(problem: RunModel, found: _Step) -> float:
+def _moved(problem: RunModel, found: _Averaged) -> float:
     """Return by how many standard deviations r(v) moves at most, over the speeds of the run."""
     k, speed = problem.coefficients, problem.law.speed_m_s
     inside = (speed >= problem.low_m_s) & (speed <= problem.speed_m_s)

@@ -12,7 +12,7 @@ import numpy as np
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Mixture, RunPosterior
+from shipdrag_ros.posterior.laplace import NormalMixture, RunPosterior
 from shipdrag_ros.samples import Float64
 
 _BAND = 0.95
@@ -95,7 +95,7 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
     )
 
 
-def _half_band(force: Mixture, columns: Float64) -> Float64:
+def _half_band(force: NormalMixture, columns: Float64) -> Float64:
     """
     Return half of the band of 95 % about the mean, over that of a normal distribution of the
     same variance, from speed to speed.

@@ -15,7 +15,7 @@ from shipdrag_ros.inference.linear import Families, of_family, products_of, whit
 from shipdrag_ros.inference.noise import WHITE, Noise, Settings, whiten
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Mixture, mix
+from shipdrag_ros.posterior.laplace import NormalMixture, mix
 from shipdrag_ros.posterior.motion import predict
 from shipdrag_ros.posterior.priors import (
     HELD,
@@ -179,7 +179,7 @@ def test_a_linear_model_has_its_closed_form() -> None:
     alone = Settings(np.array([WHITE]), np.ones((1, 3)), np.ones(1), np.ones(1))
     products, log_dets = whitened_products(table, rows, noise, 0, alone)
     weight, *kept = mix(products, log_dets, alone.weight, families, families)
-    step, covariance = Mixture(*kept).moments()
+    step, covariance = NormalMixture(*kept).moments()
     exact = np.linalg.inv(columns @ columns.T / variance + np.diag(sd**-2.0))
     np.testing.assert_allclose(covariance, exact, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(

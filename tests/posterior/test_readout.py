@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Mixture, RunPosterior, infer
+from shipdrag_ros.posterior.laplace import NormalMixture, RunPosterior, infer
 from shipdrag_ros.posterior.readout import read
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.ship import Ship
@@ -42,7 +42,7 @@ def test_the_band_holds_95_percent_of_draws_from_the_mixture(found, rare: float)
     away -= np.array([1.0 - rare, rare]) @ away
     narrow = found.covariance[:k, :k]
     weight = np.array([1.0 - rare, rare])
-    mixed = replace(found, force=Mixture(weight, away, np.stack([narrow, 4.0 * narrow])))
+    mixed = replace(found, force=NormalMixture(weight, away, np.stack([narrow, 4.0 * narrow])))
     mixed = replace(mixed, covariance=found.covariance.copy())
     mixed.covariance[:k, :k] = mixed.force.moments()[1]
     part = read(mixed, SPEED_M_S)
