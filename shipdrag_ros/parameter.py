@@ -129,6 +129,24 @@ class Prior:
             case _:
                 return a + b * z
 
+    def moments(self) -> tuple[float, float]:
+        """
+        Return mean and sd.
+
+        Raises
+        ------
+        ValueError
+            If the prior is neither normal nor log-normal.
+        """
+        match self.shape:
+            case Shape.NORMAL:
+                return self.first, self.second
+            case Shape.LOG_NORMAL:
+                mean = self.first * math.exp(0.5 * self.second**2)
+                return mean, abs(mean) * math.sqrt(math.expm1(self.second**2))
+            case _:
+                raise ValueError(f'no moments of a prior that is {self}')
+
     def inverse(self, value: float) -> float:
         """
         Return z of a value, of its own sign where either is alike.

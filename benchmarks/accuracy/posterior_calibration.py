@@ -82,9 +82,10 @@ def count_of_rows() -> int:
 def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
     """Draw a run: its model, what holds, and the true r at `SPEEDS`, calm and in its weather."""
     model = model_of(np.zeros(count_of_rows()))
-    chances = np.array([each.chance for each in model.families])
-    family = model.families[rng.choice(len(chances), p=chances / chances.sum())]
-    unknowns = family.mean + rng.standard_normal(len(family.mean)) / np.sqrt(family.precision)
+    families = model.families
+    which = int(rng.choice(len(families), p=families.chance / families.chance.sum()))
+    mean, precision = families.mean[which], families.precision[which]
+    unknowns = mean + rng.standard_normal(len(mean)) / np.sqrt(precision)
     k = model.coefficients
     unknowns[k] = SPEED_M_S  # the vague ones as they are
     table, speed = predict(model.forces, unknowns, model.grid_s, model.rows)
@@ -107,7 +108,8 @@ def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
         calm -= adds
         if each.name == HELD:
             conditions -= adds
-    return model_of(disturbed - table[0]), family.name, np.stack([calm, conditions])
+    name = str(families.name[which])
+    return model_of(disturbed - table[0]), name, np.stack([calm, conditions])
 
 
 def place(rng: np.random.Generator) -> Place:
@@ -125,7 +127,7 @@ def place(rng: np.random.Generator) -> Place:
         (part.resistance_m_s2 - each) / part.sigma_m_s2
         for part, each in zip((read(found, SPEEDS, without=out) for out in OUT), true)
     )
-    names = list(dict.fromkeys(each.name for each in model.families))
+    names = list(dict.fromkeys(model.families.name.tolist()))
     best = max(names, key=found.chance)
     return Place(
         float(np.mean(np.abs(calm) < WIDE)),

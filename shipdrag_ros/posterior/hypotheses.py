@@ -366,13 +366,12 @@ class ShipRuns:
         found = {}
         for name in (priors.NOTHING, priors.SMOOTH):
             # without a baseline the hull is something smooth in any case
-            hulls = [each for each in families if each.name == name] or families
+            hulls = families.named(name) or families
             bases = [self._base(name, number) for number in range(len(hulls))]
             mean, precision = (np.array(each) for each in zip(*bases))
-            mean[:, :k] = [hull.mean[:k] for hull in hulls]
-            precision[:, :k] = [hull.precision[:k] for hull in hulls]
-            chance = np.array([hull.chance for hull in hulls])
-            found[name] = Families(mean, precision, np.log(chance / chance.sum()))
+            mean[:, :k], precision[:, :k] = hulls.mean[:, :k], hulls.precision[:, :k]
+            chance = hulls.chance / hulls.chance.sum()
+            found[name] = Families(mean, precision, np.log(chance))
         return found
 
     @cached_property
@@ -391,10 +390,10 @@ class ShipRuns:
         calm = priors.sheltered(max(run.model.speed_m_s for run in self.runs))
         for run, place in zip(self.runs, self.places):
             all_ = run.model.families
-            alike = [each for each in all_ if each.name == name] or all_
-            family = alike[number % len(alike)]  # a run without a log has fewer
+            alike = all_.named(name) or all_
+            which = number % len(alike)  # a run without a log has fewer
             own, own_mean, own_precision = (
-                each[k:] for each in (place[_OF_MOTION], family.mean, family.precision)
+                each[k:] for each in (place[_OF_MOTION], alike.mean[which], alike.precision[which])
             )
             # an instrument that runs share may not be in all of them
             acts = own_precision < _ABSENT

@@ -35,7 +35,7 @@ from shipdrag_ros.inference.noise import Noise, NoisePosterior, Settings
 from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.motion import damping_of, predict
-from shipdrag_ros.posterior.problem import Family, RunModel
+from shipdrag_ros.posterior.problem import FamilySet, RunModel
 from shipdrag_ros.samples import Float64
 
 _POINTS = 400  # of the time after the stop
@@ -122,6 +122,34 @@ _RUNS_AWAY = (
 )
 
 
+class NormalMixture(NamedTuple):
+    """
+    Normal distributions that count, of some unknowns.
+
+    Attributes
+    ----------
+    weight : (m,)
+        Adds up to 1.
+    mean, covariance : (m, p), (m, p, p)
+    """
+
+    weight: Float64
+    mean: Float64
+    covariance: Float64
+
+    def moments(self) -> tuple[Float64, Float64]:
+        """Return mean and covariance of all."""
+        mean = self.weight @ self.mean
+        away = self.mean - mean
+        within = np.tensordot(self.weight, self.covariance, 1)
+        return mean, within + (self.weight * away.T) @ away
+
+    def of(self, columns: Float64) -> NormalMixture:
+        """Return those of what columns (p, v) make of the unknowns, each v by itself."""
+        variance = np.einsum('pv,mpq,qv->mv', columns, self.covariance, columns, optimize=True)
+        return NormalMixture(self.weight, self.mean @ columns, variance)
+
+
 @dataclass(frozen=True)
 class RunPosterior:
     """
@@ -132,6 +160,8 @@ class RunPosterior:
     problem
     mean, covariance : (p,), (p, p)
         Of the mixture over families and settings of the noise.
+    force
+        That mixture, of the coefficients of forces less their mean.
     family : (f,)
         Probability of each family of `problem.families`.
     noise
@@ -141,6 +171,7 @@ class RunPosterior:
     problem: RunModel
     mean: Float64
     covariance: Float64
+    force: NormalMixture
     family: Float64
     noise: NoisePosterior
 
@@ -148,14 +179,13 @@ class RunPosterior:
         """
         Return the probability of all families of a hypothesis.
         """
-        mine = [each.name == name for each in self.problem.families]
-        return float(self.family[mine].sum())
+        return float(self.family[self.problem.families.name == name].sum())
 
 
 @compiled
 def mix(
     products: Float64, log_det: Float64, prior: Float64, families: Families, taught: Families
-) -> tuple[Float64, Float64, Float64]:
+) -> tuple[Float64, Float64, Float64, Float64]:
     """
     Average linear models over settings of the noise and families of priors.
 
@@ -169,8 +199,10 @@ def mix(
 
     Returns
     -------
-    step, covariance, weight
-        Of the mixture; `weight` (s, f) sums to 1.
+    weight : (s, f)
+        Of all; adds up to 1.
+    kept, step, covariance
+        Of those that count, as `NormalMixture` has them.
     """
     s, f, p = len(products), len(families.log_chance), families.mean.shape[1]
     t = len(taught.log_chance)
@@ -187,35 +219,15 @@ def mix(
                 of_family_q = np.exp(logs[k, q] - top + families.log_chance[q])
                 weight[k, q] = prior[k] * of_family_q / alike
     weight /= weight.sum()
-    mean, second = np.zeros(p), np.zeros((p, p))
-    kept, least = 0.0, _LEAST * weight.max()
-    for k in range(s):
-        for q in range(f):
-            if weight[k, q] < least:
-                continue
-            kept += weight[k, q]
-            _, step, lower, scale = of_family(products[k], families.mean[q], families.precision[q])
-            covariance = substitute(lower, scale, np.eye(p))
-            for a in range(p):
-                mean[a] += weight[k, q] * step[a]
-                for b in range(p):
-                    second[a, b] += weight[k, q] * (covariance[a, b] + step[a] * step[b])
-    mean /= kept
-    second /= kept
-    for a in range(p):
-        for b in range(p):
-            second[a, b] -= mean[a] * mean[b]
-    return mean, second, weight
-
-
-def _families(problem: RunModel, families: tuple[Family, ...], now: Float64) -> Families:
-    """Return what families say of the unknowns that are free, from some unknowns on."""
-    free = problem.free
-    return Families(
-        np.array([each.mean for each in families])[:, free] - now[free],
-        np.array([each.precision for each in families])[:, free],
-        np.log(np.array([each.chance for each in families])),
-    )
+    which = np.argwhere(weight >= _LEAST * weight.max())
+    m = len(which)
+    kept, step, covariance = np.empty(m), np.empty((m, p)), np.empty((m, p, p))
+    for j in range(m):
+        k, q = which[j]
+        _, step[j], lower, scale = of_family(products[k], families.mean[q], families.precision[q])
+        covariance[j] = substitute(lower, scale, np.eye(p))
+        kept[j] = weight[k, q]
+    return weight, kept / kept.sum(), step, covariance
 
 
 def _linear(problem: RunModel, now: Float64) -> tuple[Float64, Noise]:
@@ -241,28 +253,45 @@ def _likely(problem: RunModel, now: Float64, typical: Settings, least: float) ->
     logs = _each_family(problem, now, _linear(problem, now), typical).log_evidence
     if not np.isfinite(logs.max()):
         raise EstimationError(_RUNS_AWAY)
-    kept = zip(problem.families, logs - logs.max())
-    return replace(problem, families=tuple(each for each, log in kept if log > least))
+    return replace(problem, families=problem.families.of(logs - logs.max() > least))
 
 
-def _mixed(
-    problem: RunModel, taught: tuple[Family, ...], now: Float64, settings: Settings
-) -> tuple[Float64, Float64, Float64]:
-    """Return step, covariance and weights at some unknowns; noise was learnt by `taught`."""
+class _Averaged(NamedTuple):
+    """What the linear models about some unknowns say: the mixture, and from where it counts."""
+
+    weight: Float64  # (s, f)
+    free: NormalMixture
+    step: Float64  # (p,), as the next
+    covariance: Float64
+
+
+def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Settings) -> _Averaged:
+    """Return what is said about some unknowns; noise was learnt by `taught`."""
     table, white = _linear(problem, now)
-    families = _families(problem, problem.families, now)
-    of_taught = _families(problem, taught, now)
+    families, of_taught = (each.about(now, problem.free) for each in (problem.families, taught))
     products, log_det = whitened_products(table, problem.rows, white, problem.steady, settings)
-    of_free, spread, weight = mix(products, log_det, settings.weight, families, of_taught)
-    step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families[0].precision)
+    weight, *kept = mix(products, log_det, settings.weight, families, of_taught)
+    of_free, spread = NormalMixture(*kept).moments()
+    step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families.precision[0])
     step[problem.free] = of_free
     covariance[np.ix_(problem.free, problem.free)] = spread
-    return step, covariance, weight
+    return _Averaged(weight, NormalMixture(*kept), step, covariance)
+
+
+def _of_force(problem: RunModel, found: _Averaged) -> NormalMixture:
+    """Return the mixture of the coefficients of forces, less their mean."""
+    weight, mean, covariance = found.free
+    k, free = problem.coefficients, problem.free[problem.free < problem.coefficients]
+    many, f = np.arange(len(weight)), len(free)
+    means, spread = np.zeros((len(many), k)), np.zeros((len(many), k, k))
+    means[:, free] = mean[:, :f] - found.step[free]
+    spread[np.ix_(many, free, free)] = covariance[:, :f, :f]
+    return NormalMixture(weight, means, spread)
 
 
 def _seen(problem: RunModel, now: Float64) -> Seen:
     table, white = _linear(problem, now)
-    families = _families(problem, problem.taught, now)
+    families = problem.taught.about(now, problem.free)
     return Seen(problem.rows, table, families.mean, families.precision, white, problem.steady)
 
 
@@ -282,17 +311,17 @@ def _each_family(
     n = len(problem.rows.time_s)
     misfit = float(products[0, 0, 0])
     products *= min(1.0, n / misfit)
-    priors = _families(problem, problem.families, now)
+    priors = problem.families.about(now, problem.free)
     logs, steps, _ = solve(products, priors.mean, priors.precision, 0, 0)
     return _Linear(misfit, logs[0] + priors.log_chance, steps[0])
 
 
 def _objective(problem: RunModel, now: Float64, misfit: float, which: int) -> float:
-    family, free = problem.families[which], problem.free
-    away = now[free] - family.mean[free]
+    families, free = problem.families, problem.free
+    away = now[free] - families.mean[which, free]
     n = len(problem.rows.time_s)
     tempered = misfit if misfit < n else n * (1.0 + float(np.log(misfit / n)))
-    return tempered + float(family.precision[free] @ away**2)
+    return tempered + float(families.precision[which, free] @ away**2)
 
 
 def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
@@ -304,9 +333,9 @@ def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
     """
     now = problem.start.copy()
     table, white = _prepared(problem, now, along_readings(problem, seen))
-    none = _families(problem, problem.families[:1], now)
+    none = problem.families.about(now, problem.free)
     typical = prior_of(
-        Seen(problem.rows, table, none.mean, none.precision, white, problem.steady),
+        Seen(problem.rows, table, none.mean[:1], none.precision[:1], white, problem.steady),
         problem.speed_m_s,
     ).typical
     length_s = float(problem.rows.time_s[-1]) / seen.shape[1]
@@ -315,9 +344,8 @@ def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
     linear = _each_family(problem, now, (table, white), typical)
     which = int(np.argmax(linear.log_evidence))
     now[problem.free] += linear.step[which]
-    level = problem.families[which].level
-    alike = tuple(each for each in problem.families if each.level == level)
-    return replace(problem, families=alike), now
+    level = problem.families.level
+    return replace(problem, families=problem.families.of(level == level[which])), now
 
 
 def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
@@ -347,15 +375,15 @@ def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
     return now
 
 
-def _moved(problem: RunModel, step: Float64, covariance: Float64) -> float:
+def _moved(problem: RunModel, found: _Averaged) -> float:
     """Return by how many standard deviations r(v) moves at most, over the speeds of the run."""
     k, speed = problem.coefficients, problem.law.speed_m_s
     inside = (speed >= problem.low_m_s) & (speed <= problem.speed_m_s)
     columns = problem.forces.columns[0][:, inside]
     columns[problem.of_hull : problem.of_hull + 1] = 0.0  # a held force is no part of r
-    variance = np.einsum('km,kl,lm->m', columns, covariance[:k, :k], columns)
+    variance = np.einsum('km,kl,lm->m', columns, found.covariance[:k, :k], columns)
     with np.errstate(invalid='ignore', divide='ignore'):
-        return float(np.max(np.abs(step[:k] @ columns) / np.sqrt(variance)))
+        return float(np.max(np.abs(found.step[:k] @ columns) / np.sqrt(variance)))
 
 
 def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False) -> RunPosterior:
@@ -387,26 +415,31 @@ def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False
         problem.taught,
         _likely(problem, now, noise.typical, _QUICK if quick else _UNLIKELY),
     )
-    step, covariance, weight = _mixed(problem, taught, now, noise.settings)
-    away, part = _moved(problem, step, covariance), 1.0
+    found = _mixed(problem, taught, now, noise.settings)
+    away, part = _moved(problem, found), 1.0
     for _ in range(_ROUNDS):
         if away < _STILL or part < _SHORTEST:
             break
-        trial = now + part * step
+        trial = now + part * found.step
         there = _mixed(problem, taught, trial, noise.settings)
-        nearer = _moved(problem, *there[:2])
+        nearer = _moved(problem, there)
         if nearer < away:
-            now, away, (step, covariance, weight) = trial, nearer, there
+            now, away, found = trial, nearer, there
             part = min(2.0 * part, 1.0)
         else:  # it leads astray, or the motion runs away
             part *= 0.5
-    now = now + part * step
     if not away < _SETTLED:
         raise EstimationError(
             'the fit of the motion does not settle: the record allows motions that are too '
             'different; give a longer window, one without a turn or thrust, or a ship file with a '
             'baseline'
         )
-    settings = noise.settings._replace(weight=weight.sum(axis=1))
-    noise = replace(noise, settings=settings)
-    return RunPosterior(problem, now, covariance, weight.sum(axis=0), noise)
+    settings = noise.settings._replace(weight=found.weight.sum(axis=1))
+    return RunPosterior(
+        problem,
+        now + part * found.step,
+        found.covariance,
+        _of_force(problem, found),
+        found.weight.sum(axis=0),
+        replace(noise, settings=settings),
+    )

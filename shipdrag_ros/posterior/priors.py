@@ -119,18 +119,6 @@ GROUND_LAG = Declared(
     'lambda_g', 'filter of a speed over ground', normal(3.0, mean=1.0), 's', '1 to 8 s, or none'
 )
 
-WRONG_SCALE = Declared(
-    'b_1, g',
-    'chance of a wrong scale, of each instrument; none of latitude and longitude',
-    0.04,
-    '',
-    'odds of the effects',
-)
-WRONG_LOG_SCALE = Declared('b_1', 'scale of such a log, less one', normal(0.08), '', 'its effect')
-WRONG_GROUND_SCALE = Declared(
-    'g', 'the same of a radar or plotter', normal(0.03), '', 'its effect'
-)
-
 
 def any_log_lag() -> tuple[float, float]:
     """

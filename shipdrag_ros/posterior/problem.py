@@ -9,29 +9,36 @@ probability. All families share the rows and the unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shipdrag_ros.inference.linear import Families
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE, Declared
+from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
+from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.effects import LIBRARY
 
 _STEPS = 80  # of the integration, longer as the ship slows down
 _SPREAD = 25.0  # of all over the time from which steps grow
 _STEPS_A_RUN_DOWN = 3.0
 _VAGUE_SPEED, _VAGUE_S = 0.3, 300.0  # of the steady speed, and of where she was
+_OF_LOG = {'log_scale': motion.SCALE, 'log_offset': motion.OFFSET, 'log_lag': motion.LAG}
+_OF_GROUND = {'radar_scale': motion.GROUND_SCALE}
 EXACT = 1e-8  # sd of what does not act, so that every prior is proper
+LEFT_OPEN = EXACT**-2.0 / 4.0  # precision of what acts is less
 
 
 @dataclass(frozen=True)
@@ -56,20 +63,44 @@ class StopPrior:
 
 
 @dataclass(frozen=True)
-class Family:
+class FamilySet:
     """
-    A prior of all unknowns: mean and precision (p,), and the probability of the family.
+    Families, each a prior of all unknowns.
 
-    `level` is that of the hull over the generic one, about which the prior is; `usual` says
-    whether wind and depth are in their first state, and no scale is wrong.
+    Attributes
+    ----------
+    name : (f,)
+        Of its hypothesis.
+    chance : (f,)
+    mean, precision : (f, p)
+    level : (f,)
+        Of the hull over the generic one, about which the prior is.
+    usual : (f,)
+        Whether wind and depth are in their first state, and no instrument is wrong.
     """
 
-    name: str
-    chance: float
+    name: NDArray[np.str_]
+    chance: Float64
     mean: Float64
     precision: Float64
-    level: float = 1.0
-    usual: bool = True
+    level: Float64
+    usual: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.chance)
+
+    def of(self, which: NDArray[np.bool_]) -> FamilySet:
+        """Return some of them."""
+        return FamilySet(*(each[which] for each in vars(self).values()))
+
+    def named(self, name: str) -> FamilySet:
+        """Return those of a hypothesis."""
+        return self.of(self.name == name)
+
+    def about(self, now: Float64, free: Int64) -> Families:
+        """Return what they say of the unknowns that are free, counted from some unknowns."""
+        mean, precision = self.mean[:, free] - now[free], self.precision[:, free]
+        return Families(mean, precision, np.log(self.chance))
 
 
 @dataclass(frozen=True)
@@ -101,7 +132,7 @@ class RunModel:
     forces: Forces
     grid_s: Float64
     start: Float64
-    families: tuple[Family, ...]
+    families: FamilySet
     low_m_s: float
     speed_m_s: float
     law: HullLaw
@@ -120,21 +151,21 @@ class RunModel:
     @cached_property
     def free(self) -> Int64:
         """Which unknowns some family leaves open."""
-        least = np.min([each.precision for each in self.families], axis=0)
-        return np.flatnonzero(least < EXACT**-2.0 / 4.0)
+        return np.flatnonzero(self.families.precision.min(axis=0) < LEFT_OPEN)
 
     @cached_property
-    def taught(self) -> tuple[Family, ...]:
+    def taught(self) -> FamilySet:
         """One family a hypothesis, with its mean and variance: noise is learnt by these."""
-        names = dict.fromkeys(each.name for each in self.families)
-        return tuple(
-            _merged(name, [each for each in self.families if each.name == name]) for name in names
-        )
+        names = [*dict.fromkeys(self.families.name.tolist())]
+        merged = (_merged(self.families.named(name)) for name in names)
+        chance, mean, precision = (np.array(each) for each in zip(*merged))
+        every = np.ones(len(names))
+        return FamilySet(np.array(names), chance, mean, precision, every, every > 0.0)
 
     @property
     def usual(self) -> RunModel:
-        """The same with wind, depth and scales as they usually are: a fit climbs there."""
-        return replace(self, families=tuple(each for each in self.families if each.usual))
+        """The same with wind, depth and instruments as they usually are: a fit climbs there."""
+        return replace(self, families=self.families.of(self.families.usual))
 
     @classmethod
     def of(
@@ -189,8 +220,8 @@ class RunModel:
                 place = rows.value[rows.kind == code]
                 at = np.searchsorted(rows.time_s[rows.kind == code], 0.0)
                 start[k + motion.own(code) + motion.PLACE] = place[min(int(at), len(place) - 1)]
-        scales = _scales(kinds, geodetic) if weather is not None else {}
-        families = tuple(_all_families(ship, law, adds, stop, start[k:], kinds, scales))
+        wrong = [_Option(1.0)] if weather is None else [*_wrong(kinds, geodetic)]
+        families = _all_families(ship, law, adds, stop, start[k:], kinds, wrong)
         found = cls(
             rows,
             Noise(variance, WHITE, ones, ones),
@@ -204,18 +235,16 @@ class RunModel:
             law,
             adds,
         )
-        start[:k] = families[0].mean[:k]
+        start[:k] = families.mean[0, :k]
         return found
 
 
-def _merged(name: str, families: list[Family]) -> Family:
-    """Return a normal prior with the mean and variance of a mixture."""
-    chance = np.array([each.chance for each in families])
-    total, part = float(chance.sum()), chance / chance.sum()
-    means = np.array([each.mean for each in families])
-    mean = part @ means
-    variance = part @ (1.0 / np.array([each.precision for each in families]) + (means - mean) ** 2)
-    return Family(name, total, mean, 1.0 / variance)
+def _merged(families: FamilySet) -> tuple[float, Float64, Float64]:
+    """Return probability, mean and precision of a mixture."""
+    total, part = float(families.chance.sum()), families.chance / families.chance.sum()
+    mean = part @ families.mean
+    variance = part @ (1.0 / families.precision + (families.mean - mean) ** 2)
+    return total, mean, 1.0 / variance
 
 
 def _tau_s(stop: StopPrior) -> float:
@@ -275,46 +304,60 @@ def _all_families(
     stop: StopPrior,
     start: Float64,
     kinds: frozenset[int],
-    wrong_scales: Mapping[int, Declared],
-) -> Iterator[Family]:
-    extra_mean, extra_sd = _extras(ship, stop, start, kinds)
-    zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
-    states = tuple(product(*(each.states for each in influences)))
-    added = sum(len(each.columns) for each in influences)
-    extra = 2 + len(zeros) + added
-    for hull, state in product(_hulls(ship), states):
-        others = [each.mean for each in state]
-        mean = np.concatenate([[each[0] for each in hull.scales], zeros, *others, extra_mean])
-        sizes = np.full(len(law.shapes), hull.size)
-        humps = np.full(len(law.humps), hull.level * priors.GENERIC_HUMPS.sd)
-        dry = np.full(len(law.dry), max(hull.dry, priors.SHIP_DRY.mean))
-        others = [each.sd for each in state]
-        scales = [each[1] for each in hull.scales]
-        precision = np.concatenate([scales, sizes, humps, dry, *others, extra_sd]) ** -2.0
-        chance = hull.chance * math.prod(each.chance for each in state)
-        usual = all(each is of.states[0] for each, of in zip(state, influences))
-        for lag, force, wrong in product(
-            _lags(kinds), _after_stop(stop, added, hull.level), _wrong_scales(wrong_scales)
-        ):
-            own, known = mean.copy(), precision.copy()
-            for place, prior_mean, prior_sd in (*lag.unknown, *force.unknown, *wrong.unknown):
-                own[extra + place], known[extra + place] = prior_mean, prior_sd**-2.0
-            part = chance * lag.chance * force.chance * wrong.chance
-            plain = usual and not wrong.unknown
-            yield Family(force.name or hull.name, part, own, known, hull.level, plain)
+    wrong: Sequence[_Option],
+) -> FamilySet:
+    bases = [*product(_hulls(ship), product(*(each.states for each in influences)))]
+    zeros = [0.0] * (len(law.shapes) + len(law.humps) + len(law.dry))
+    means = [
+        [*(each[0] for each in hull.scales), *zeros, *chain(*(each.mean for each in state))]
+        for hull, state in bases
+    ]
+    sds = [
+        [each[1] for each in hull.scales]
+        + [hull.size] * len(law.shapes)
+        + [hull.level * priors.GENERIC_HUMPS.sd] * len(law.humps)
+        + [max(hull.dry, priors.SHIP_DRY.mean)] * len(law.dry)
+        + [*chain(*(each.sd for each in state))]
+        for hull, state in bases
+    ]
+    extra, added = len(means[0]), sum(len(each.columns) for each in influences)
+    level = np.array([hull.level for hull, _ in bases])
+    options = [*product(_lags(kinds), _after_stop(stop, added, level), wrong)]
+    many = len(options)
+    mean, sd = (
+        np.repeat(np.hstack([each, np.tile(of_extra, (len(bases), 1))]), many, axis=0)
+        for each, of_extra in zip((means, sds), _extras(ship, stop, start, kinds))
+    )
+    for j, option in enumerate(options):
+        for place, prior_mean, prior_sd in chain(*(each.unknown for each in option)):
+            mean[j::many, extra + place], sd[j::many, extra + place] = prior_mean, prior_sd
+    chance = [hull.chance * math.prod(each.chance for each in state) for hull, state in bases]
+    parts = [math.prod(each.chance for each in option) for option in options]
+    usual = [
+        all(each is of.states[0] for each, of in zip(state, influences)) for _, state in bases
+    ]
+    return FamilySet(
+        np.array([force.name or hull.name for hull, _ in bases for _, force, _ in options]),
+        np.outer(chance, parts).ravel(),
+        mean,
+        sd**-2.0,
+        np.repeat(level, many),
+        np.outer(usual, [not option[-1].unknown for option in options]).ravel(),
+    )
 
 
 class _Option(NamedTuple):
     """
-    One of some that exclude each other: of an unknown its place behind the coefficients, mean, sd.
+    One of some that exclude each other: of an unknown its place behind the coefficients, mean, and
+    sd, one each for the hulls where it differs.
     """
 
     chance: float
-    unknown: tuple[tuple[int, float, float], ...] = ()
+    unknown: tuple[tuple[int, float, float | Float64], ...] = ()
     name: str = ''
 
 
-def _after_stop(stop: StopPrior, added: int, level: float) -> Iterator[_Option]:
+def _after_stop(stop: StopPrior, added: int, level: Float64) -> Iterator[_Option]:
     """Yield what acts after the stop and no input shows; `added` columns begin with `_held`."""
     if added == 0 or stop.sd_s == 0.0:  # the window is given: who gives it says that she glides
         yield _Option(1.0)
@@ -352,25 +395,22 @@ def _lags(kinds: frozenset[int]) -> Iterator[_Option]:
         yield _Option(chance, ((motion.LAG, lag.mean, lag.sd),))
 
 
-def _scales(kinds: Iterable[int], geodetic: Iterable[int]) -> dict[int, Declared]:
-    """Return, by the place of the unknown, the scales that may be wrong."""
-    of_earth = set(map(motion.own, geodetic))
-    found = {}
+def _wrong(kinds: Iterable[int], geodetic: Iterable[int]) -> Iterator[_Option]:
+    """
+    Yield what is wrong with an instrument: nothing, or what one effect of the library says.
+
+    The library's parameters stand as normal priors.
+    """
+    of_earth, effects = set(map(motion.own, geodetic)), dict[int, Effect]()
     for code in sorted(kinds):
         own = motion.own(code)
-        if code % KIND_COUNT == LOG:
-            found[own + motion.SCALE] = priors.WRONG_LOG_SCALE
-        elif own not in of_earth:
-            found[own + motion.GROUND_SCALE] = priors.WRONG_GROUND_SCALE
-    return found
-
-
-def _wrong_scales(scales: Mapping[int, Declared]) -> Iterator[_Option]:
-    """Yield which instrument is in a wrong scale: none, or one."""
-    chance = priors.WRONG_SCALE.mean
-    yield _Option(1.0 - chance * len(scales))
-    for place, size in scales.items():
-        yield _Option(chance, ((place, size.mean, size.sd),))
+        for name, place in (_OF_LOG if code % KIND_COUNT == LOG else _OF_GROUND).items():
+            if LIBRARY[name].in_geodetic or own not in of_earth:
+                effects[own + place] = LIBRARY[name]
+    nothing = 1.0 / (1.0 + sum(each.odds for each in effects.values()))
+    yield _Option(nothing)
+    for place, effect in effects.items():
+        yield _Option(nothing * effect.odds, ((place, *effect.parameters[0].prior.moments()),))
 
 
 class _Hull(NamedTuple):

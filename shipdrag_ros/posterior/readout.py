@@ -3,15 +3,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import RunPosterior
+from shipdrag_ros.posterior.laplace import NormalMixture, RunPosterior
 from shipdrag_ros.samples import Float64
+
+_BAND = 0.95
+_NORMAL = 1.959964  # sd of a normal distribution within which so much is
+_FARTHEST = (1.0 - _BAND) ** -0.5  # sd of any (Chebyshev)
+_BAND_AT = 8  # speeds at which the band of a mixture is sought
+_HALVINGS = 12
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,8 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
     theta, covariance = found.mean[:k], found.covariance
     cross = columns.T @ covariance[:k]  # of r with every unknown
     variance = np.einsum('km,mk->m', columns, cross[:, :k])
+    half = _half_band(found.force, columns)
+    variance, cross = variance * half**2, cross * half[:, None]
     of_slope = np.einsum('km,kl,lm->m', slopes, covariance[:k, :k], slopes)
     return ReadOut(
         speed_m_s,
@@ -85,6 +95,42 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
     )
 
 
+def _half_band(force: NormalMixture, columns: Float64) -> Float64:
+    """
+    Return half of the band of 95 % about the mean, over that of a normal distribution of the
+    same variance, from speed to speed.
+
+    A mixture with a rare model far away has a large variance, which its band does not show.
+    """
+    at = np.unique(np.linspace(0, columns.shape[1] - 1, _BAND_AT).astype(int))
+    weight, mean, variance = force.of(columns[:, at])
+    size = np.sqrt(weight @ (variance + mean**2))
+    half = _quantile(weight, np.abs(mean) / size, np.sqrt(variance) / size)
+    return np.interp(np.arange(columns.shape[1]), at, half / _NORMAL)
+
+
+@compiled
+def _quantile(weight: Float64, mean: Float64, sd: Float64) -> Float64:
+    """Return what 95 % of each mixture (m, v) of variance 1 about 0 is not beyond, by halving."""
+    m, v = mean.shape
+    half = np.empty(v)
+    for i in range(v):
+        low, high = 0.0, _FARTHEST
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            inside = 0.0
+            for j in range(m):
+                scale = np.sqrt(2.0) * sd[j, i]
+                inside += 0.5 * weight[j] * math.erf((middle - mean[j, i]) / scale)
+                inside += 0.5 * weight[j] * math.erf((middle + mean[j, i]) / scale)
+            if inside < _BAND:
+                low = middle
+            else:
+                high = middle
+        half[i] = 0.5 * (low + high)
+    return half
+
+
 def _shared(found: RunPosterior, cross: Float64) -> Float64:
     """
     Return the sd of r by the prior of what her runs share.
@@ -93,7 +139,7 @@ def _shared(found: RunPosterior, cross: Float64) -> Float64:
     """
     causes = _causes(found)
     which = [*range(found.problem.of_hull), *causes['log'], *causes['ground']]
-    prior = found.family @ np.array([1.0 / each.precision for each in found.problem.families])
+    prior = found.family @ (1.0 / found.problem.families.precision)
     shared: Float64 = np.sqrt(cross[:, which] ** 2 @ (1.0 / prior[which]))
     return shared
 

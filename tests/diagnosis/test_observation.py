@@ -35,9 +35,8 @@ def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(seen_of, car
     alone, beside = (sight(slow, seen, cargo).model for seen in ([slow], [fast, slow]))
     for model in (alone, beside):
         at = model.coefficients + motion.SPEED
-        for family in model.families:
-            assert family.mean[at] == pytest.approx(slow.speed_m_s)
-            assert family.precision[at] == pytest.approx((0.3 * slow.speed_m_s) ** -2)
+        assert model.families.mean[:, at] == pytest.approx(slow.speed_m_s)
+        assert model.families.precision[:, at] == pytest.approx((0.3 * slow.speed_m_s) ** -2)
     assert alone.law.speed_m_s[-1] < fast.speed_m_s < beside.law.speed_m_s[-1]
 
 

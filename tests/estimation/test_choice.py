@@ -93,8 +93,9 @@ def test_the_band_of_a_log_alone_holds_its_scale(estimator, scale: float) -> Non
     )
     true = (1.0 + float(BARE.n_r(AT_M_S))) * DRAG_1_M * AT_M_S**2
     assert abs(r - true) < 2.0 * sigma
-    # r at a speed goes with the scale where it is quadratic
-    assert sigma == pytest.approx(LOG_SCALE.sd * r, rel=0.4)
+    # r at a speed goes with the scale where it is quadratic; one log of ten is more wrong than
+    # that, or in offset or filter, and the band of 95 % reaches into these
+    assert LOG_SCALE.sd * r < sigma < 1.7 * LOG_SCALE.sd * r
 
 
 @pytest.mark.parametrize('scale', [-0.03, 0.02])
@@ -112,7 +113,7 @@ def test_a_baseline_does_not_make_a_log_exact(estimator, scale: float) -> None: 
         if of is not None:
             true = float(of.resistance_n(AT_M_S)) / of.mass_kg
         assert abs(r - true) < 2.0 * sigma
-        assert 0.5 * LOG_SCALE.sd * r < sigma < 1.5 * LOG_SCALE.sd * r
+        assert 0.5 * LOG_SCALE.sd * r < sigma < 1.9 * LOG_SCALE.sd * r
 
 
 def _of_file(scale: float) -> Window:
@@ -161,7 +162,7 @@ def test_positions_show_the_scale_and_it_is_said() -> None:
     )
     true = (1.0 + float(BARE.n_r(AT_M_S))) * DRAG_1_M * AT_M_S**2
     assert abs(r - true) < 3.0 * sigma
-    assert sigma < 0.8 * LOG_SCALE.sd * r
+    assert sigma < 0.9 * LOG_SCALE.sd * r
     assert any('the log reads +' in note and 'in the band' in note for note in found.notes)
 
 

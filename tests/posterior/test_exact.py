@@ -9,21 +9,18 @@ from functools import partial
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
 from shipdrag_ros.inference.noise import WHITE, Noise, Settings, whiten
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.parameter import Declared
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import mix
+from shipdrag_ros.posterior.laplace import NormalMixture, mix
 from shipdrag_ros.posterior.motion import predict
 from shipdrag_ros.posterior.priors import (
     HELD,
     HELD_CHANCE,
     HELD_FORCE,
-    WRONG_GROUND_SCALE,
-    WRONG_LOG_SCALE,
-    WRONG_SCALE,
 )
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.weather import Weather
@@ -88,13 +85,13 @@ def test_derivatives_are_those_of_the_prediction(ship: Ship, codes: tuple[int, .
 
 def test_a_held_force_is_sized_by_r_of_the_hull_it_slows(ship: Ship) -> None:
     problem = problem_of(replace(ship, baseline=None), weather=Weather(None, None))
-    held = [each for each in problem.families if each.name == HELD_FORCE]
-    sizes = {each.level: each.precision[problem.of_hull] ** -0.5 for each in held}
+    held = problem.families.named(HELD_FORCE)
+    sizes = dict(zip(held.level, held.precision[:, problem.of_hull] ** -0.5))
     assert len(sizes) > 2
     for level, size in sizes.items():
         assert size == pytest.approx(HELD.sd * level)
-    assert sum(each.chance for each in problem.families) == pytest.approx(1.0)
-    assert sum(each.chance for each in held) == pytest.approx(HELD_CHANCE.mean)
+    assert problem.families.chance.sum() == pytest.approx(1.0)
+    assert held.chance.sum() == pytest.approx(HELD_CHANCE.mean)
 
 
 def test_thrust_that_is_left_is_part_of_that_before_the_stop(ship: Ship) -> None:
@@ -120,31 +117,38 @@ def test_each_log_and_each_ground_source_has_its_own_unknowns_and_all_one_curren
     assert np.array_equal(current, ~rows.of(LOG))
 
 
-def test_each_scale_may_be_wrong_but_that_of_latitude_and_longitude(ship: Ship) -> None:
+def _all_right(problem: RunModel) -> NDArray[np.bool_]:
+    """Return which families hold that no instrument is wrong."""
+    families, first = problem.families, problem.coefficients + motion.SCALE
+    usual = families.precision[families.usual][:, first:]
+    return np.any(np.all(families.precision[:, None, first:] == usual, axis=2), axis=1)
+
+
+def test_each_instrument_may_be_wrong_but_the_scale_of_latitude_and_longitude(ship: Ship) -> None:
     codes = LOG, OVER_GROUND, POSITION, CODES['position_2']
     second = motion.GROUND_SCALE + motion.own(codes[3])
-    sizes = {motion.SCALE: WRONG_LOG_SCALE, motion.GROUND_SCALE: WRONG_GROUND_SCALE}
-    sizes[second] = WRONG_GROUND_SCALE
+    effects = {
+        motion.SCALE: LIBRARY['log_scale'],
+        motion.OFFSET: LIBRARY['log_offset'],
+        motion.LAG: LIBRARY['log_lag'],
+        motion.GROUND_SCALE: LIBRARY['radar_scale'],
+        second: LIBRARY['radar_scale'],
+    }
     of_earth = {motion.GROUND_SCALE: {POSITION}, second: {codes[3]}}
     for geodetic in ((), (POSITION,), codes[2:]):
         problem = problem_of(ship, codes=codes, weather=Weather(None, None), geodetic=geodetic)
-        assert sum(each.chance for each in problem.families) == pytest.approx(1.0)
-        for place, size in sizes.items():
+        families = problem.families
+        nothing = families.usual
+        assert families.chance.sum() == pytest.approx(1.0)
+        for place, effect in effects.items():
             at = problem.coefficients + place
-            wide = [each for each in problem.families if each.precision[at] ** -0.5 > 0.025]
+            mean, sd = effect.parameters[0].prior.moments()
+            wrong = np.isclose(families.precision[:, at] ** -0.5, sd)
             may = not of_earth.get(place, set()) & set(geodetic)
-            assert sum(each.chance for each in wide) == pytest.approx(WRONG_SCALE.mean * may)
-            for each in wide:
-                assert each.precision[at] ** -0.5 == pytest.approx(size.sd)
-
-
-@pytest.mark.parametrize(
-    ('name', 'size'), [('log_scale', WRONG_LOG_SCALE), ('radar_scale', WRONG_GROUND_SCALE)]
-)
-def test_a_wrong_scale_is_as_wide_and_as_likely_as_its_effect(name: str, size: Declared) -> None:
-    effect = LIBRARY[name]
-    assert effect.parameters[0].prior == size.prior
-    assert effect.odds == pytest.approx(WRONG_SCALE.mean)
+            assert np.all(families.mean[wrong, at] == mean)
+            assert not np.any(wrong & nothing)
+            odds = families.chance[wrong].sum() / families.chance[_all_right(problem)].sum()
+            assert odds == pytest.approx(effect.odds * may)
 
 
 def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:
@@ -174,7 +178,8 @@ def test_a_linear_model_has_its_closed_form() -> None:
     table = np.concatenate([value[None], columns])
     alone = Settings(np.array([WHITE]), np.ones((1, 3)), np.ones(1), np.ones(1))
     products, log_dets = whitened_products(table, rows, noise, 0, alone)
-    step, covariance, weight = mix(products, log_dets, alone.weight, families, families)
+    weight, *kept = mix(products, log_dets, alone.weight, families, families)
+    step, covariance = NormalMixture(*kept).moments()
     exact = np.linalg.inv(columns @ columns.T / variance + np.diag(sd**-2.0))
     np.testing.assert_allclose(covariance, exact, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
@@ -194,22 +199,20 @@ def test_a_linear_model_has_its_closed_form() -> None:
 def test_log_evidence_is_that_of_long_sampling(ship: Ship, seed: int) -> None:
     # 4000 points by importance, seeds 0 and 1; the motion is not linear, within 0.5
     problem = problem_of(ship, seed=seed)
-    family = problem.families[0]
+    mean, precision = problem.families.mean[0], problem.families.precision[0]
 
     def log_joint(unknowns: Float64) -> float:
         table, _ = predict(problem.forces, unknowns, problem.grid_s, problem.rows)
         white = table[:1] / np.sqrt(problem.white.variance)
-        away = unknowns - family.mean
-        of_prior = 0.5 * np.log(family.precision) - 0.5 * family.precision * away**2
+        away = unknowns - mean
+        of_prior = 0.5 * np.log(precision) - 0.5 * precision * away**2
         return float(-0.5 * (white**2).sum() + of_prior.sum())
 
-    now = family.mean.copy()
+    now = mean.copy()
     for _ in range(6):
         table, _ = predict(problem.forces, now, problem.grid_s, problem.rows)
         table /= np.sqrt(problem.white.variance)
-        log_evidence, step, lower, scale = of_family(
-            products_of(table), family.mean - now, family.precision
-        )
+        log_evidence, step, lower, scale = of_family(products_of(table), mean - now, precision)
         now = now + step
     covariance = np.linalg.inv((lower / scale[:, None]) @ (lower / scale[:, None]).T)
     root = np.linalg.cholesky(covariance) * 1.1

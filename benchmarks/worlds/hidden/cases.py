@@ -286,7 +286,7 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recor
     )
 
 
-_WEATHER = 'wind', 'shallow_water'
+_WEATHER = ('wind', 'shallow_water', 'waves')
 
 
 def _acting(case: _Case, which: int) -> tuple[Effect, ...]:

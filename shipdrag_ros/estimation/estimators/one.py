@@ -27,7 +27,7 @@ from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
 from shipdrag_ros.posterior.priors import HELD_FORCE, LEFT_S, THRUST_LEFT
-from shipdrag_ros.posterior.problem import EXACT, RunModel, StopPrior
+from shipdrag_ros.posterior.problem import LEFT_OPEN, RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
 from shipdrag_ros.samples import Float64
@@ -204,7 +204,7 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
     problem, k = found.problem, found.problem.coefficients
     chances = ', '.join(
         f'{name} {found.chance(name):.2g}'
-        for name in dict.fromkeys(each.name for each in problem.families)
+        for name in dict.fromkeys(problem.families.name.tolist())
     )
     yield f'averaged over what the hull may differ by and what else may act: {chances}'
     sd = np.sqrt(np.diag(found.covariance))
@@ -284,8 +284,7 @@ def _ground_scale_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
             inputs.setdefault(motion.own(CODES[name]), []).append(name)
     for own, names in inputs.items():
         at = k + own + motion.GROUND_SCALE
-        wrong = [each.precision[at] < EXACT**-2.0 / 4.0 for each in found.problem.families]
-        chance = float(found.family[wrong].sum())
+        chance = float(found.family[found.problem.families.precision[:, at] < LEFT_OPEN].sum())
         if chance > _WORTH_A_NOTE:
             scale, sd = float(found.mean[at]), float(np.sqrt(found.covariance[at, at]))
             yield (
