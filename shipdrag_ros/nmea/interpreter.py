@@ -306,14 +306,12 @@ class Interpreter:
         sentence, stamp_ns, read_ns = stamped
         if stamp_ns < read_ns:
             _count(self.behind, address)
-        if sentence.kind not in sentences.READERS:
-            if sentence.kind not in sentences.TIMED:
-                _count(self.unknown, sentence.talker + sentence.kind)
-            return []
-        if sentence.talker not in NMEA_TALKERS:
+        if sentence.name not in sentences.USED:
+            _count(self.unknown, sentence.talker + sentence.kind)
+        elif sentence.kind and sentence.talker not in NMEA_TALKERS:
             _count(self.unknown, f'talker {sentence.talker}')
         for channel, reason in sentence.refused:
-            _count(self.no_value, f'{channel.input} {sentence.kind}: {reason}')
+            _count(self.no_value, f'{channel.input} {sentence.name}: {reason}')
         samples = []
         for value in sentence.values:
             choice = self._choices.setdefault(value.channel, _Choice(read_ns))

@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import Enum
+from functools import partial
 from time import monotonic
 from typing import NamedTuple
 
@@ -30,14 +30,6 @@ _NET = re.compile(r'(udp|tcp)://(\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(\d{1,5})(?
 _SERIAL = re.compile(r'serial:(/\S+):(\d{3,7})')
 
 
-class Way(Enum):
-    """How the bytes arrive."""
-
-    UDP = 'udp'
-    TCP = 'tcp'
-    SERIAL = 'serial'
-
-
 @dataclass(frozen=True)
 class Address:
     """
@@ -46,7 +38,7 @@ class Address:
     Attributes
     ----------
     way
-        How the bytes arrive.
+        How the bytes arrive: udp, tcp or serial.
     place
         Address to hear on (UDP), host to connect to (TCP), or path of a serial device.
     number
@@ -58,7 +50,7 @@ class Address:
         system chooses.
     """
 
-    way: Way
+    way: str
     place: str
     number: int
     text: str
@@ -67,7 +59,7 @@ class Address:
     @property
     def is_multicast(self) -> bool:
         """Whether datagrams come to a group, which is to be joined."""
-        return self.way is Way.UDP and _is_multicast(self.place)
+        return self.way == 'udp' and _is_multicast(self.place)
 
     def __str__(self) -> str:
         return self.text
@@ -97,11 +89,11 @@ class Address:
         if found := _NET.fullmatch(text):
             if not 0 < int(found[3]) < 65536:
                 raise ShipdragError(f'NMEA source {text!r}: port {found[3]}, expected 1 to 65535')
-            address = cls(Way(found[1]), found[2].strip('[]'), int(found[3]), text, found[4] or '')
+            address = cls(found[1], found[2].strip('[]'), int(found[3]), text, found[4] or '')
             address._check_group()
             return address
         if found := _SERIAL.fullmatch(text):
-            return cls(Way.SERIAL, found[1], int(found[2]), text)
+            return cls('serial', found[1], int(found[2]), text)
         raise ShipdragError(f'NMEA source {text!r}: expected {FORMS}')
 
     def _check_group(self) -> None:
@@ -157,7 +149,8 @@ _SO_RXQ_OVFL = 40  # Linux: the kernel says how many datagrams it dropped
 
 # lines that arrived together
 Deliver = Callable[[Address, list[str]], None]
-Read = Callable[[], bytes | None]
+# raises TimeoutError where nothing came for a while
+Read = Callable[[], bytes]
 LINE_BYTES = 512
 """A sentence has 82 characters; one with a TAG block, or of a careless maker, has more."""
 
@@ -205,9 +198,7 @@ class LineSplitter:
         """
         Take what is open as a line: the datagram, or the connection, has ended.
         """
-        line, self._open = self._open, b''
-        skipping, self._skipping = self._skipping, False
-        return [] if skipping else self._line(line)
+        return self.feed(b'\n')
 
     def _line(self, line: bytes) -> list[str]:
         if len(line) > LINE_BYTES:
@@ -322,17 +313,18 @@ class LineListener:
         heard_s = monotonic()
         try:
             while not self._closing.is_set():
-                data = read()
-                if data is None:
-                    if self.address.way is Way.TCP and monotonic() - heard_s > SILENT_S:
-                        raise OSError(0, f'nothing came for {SILENT_S:.0f} s')
+                try:
+                    data = read()
+                except TimeoutError:
+                    if self.address.way == 'tcp' and monotonic() - heard_s > SILENT_S:
+                        raise OSError(0, f'nothing came for {SILENT_S:.0f} s') from None
                     continue
                 heard_s = monotonic()
                 lines = self._splitter.feed(data)
-                if self.address.way is Way.UDP:  # a datagram is whole
+                if self.address.way == 'udp':  # a datagram is whole
                     lines += self._splitter.end()
                 self._take(lines)
-                if not data and self.address.way is not Way.UDP:
+                if not data and self.address.way != 'udp':
                     return
                 self._slow_down(max(len(lines), len(data) / 80.0))
         finally:  # a line that the end cut is recorded, and counted as what it is
@@ -372,11 +364,8 @@ def _udp(address: Address, counts: SourceCounts) -> Iterator[Read]:
             _join(heard, address)
         heard.settimeout(_WAKE_S)
 
-        def read() -> bytes | None:
-            try:
-                data, extra, _, _ = heard.recvmsg(65536, 64)
-            except TimeoutError:
-                return None
+        def read() -> bytes:
+            data, extra, _, _ = heard.recvmsg(65536, 64)
             for level, kind, value in extra:
                 if level == socket.SOL_SOCKET and kind == _SO_RXQ_OVFL:
                     counts.dropped = dropped_before + struct.unpack('=I', value[:4])[0]
@@ -403,14 +392,7 @@ def _tcp(address: Address, counts: SourceCounts) -> Iterator[Read]:
     where = (address.place, address.number)
     with socket.create_connection(where, timeout=_CONNECT_S) as line:
         line.settimeout(_WAKE_S)
-
-        def read() -> bytes | None:
-            try:
-                return line.recv(_READ_BYTES)
-            except TimeoutError:
-                return None
-
-        yield read
+        yield partial(line.recv, _READ_BYTES)
 
 
 @contextmanager
@@ -420,10 +402,16 @@ def _serial(address: Address, counts: SourceCounts) -> Iterator[Read]:
     if not stat.S_ISCHR(os.stat(address.place).st_mode):
         raise OSError(0, f'{address.place!r} is no serial device')
     with serial.Serial(address.place, address.number, timeout=_WAKE_S, exclusive=True) as line:
-        yield lambda: line.read(min(line.in_waiting or 1, _READ_BYTES)) or None
+
+        def read() -> bytes:
+            if data := line.read(min(line.in_waiting or 1, _READ_BYTES)):
+                return bytes(data)
+            raise TimeoutError
+
+        yield read
 
 
-_OPENERS = {Way.UDP: _udp, Way.TCP: _tcp, Way.SERIAL: _serial}
+_OPENERS = {'udp': _udp, 'tcp': _tcp, 'serial': _serial}
 
 
 WAITING_LINES = 8000

@@ -341,9 +341,11 @@ READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
 TIMED = ('RMC', 'GGA', 'GLL', 'ZDA')
 """Sentences that hold the time."""
 
-_NAMES = {
-    kind: tuple(NMEA_PAYLOADS_GET[kind]) for kind in (*READERS, 'ZDA') if kind in NMEA_PAYLOADS_GET
-} | {'PUHAW': ('kind', 'east', 'north', 'heading')}
+USED = frozenset((*READERS, *TIMED))
+"""Sentences that hold anything that is used here."""
+
+_NAMES = {kind: tuple(NMEA_PAYLOADS_GET[kind]) for kind in USED if kind in NMEA_PAYLOADS_GET}
+_NAMES['PUHAW'] = ('kind', 'east', 'north', 'heading')
 
 
 START = re.compile('[$!]')
@@ -424,6 +426,11 @@ class Sentence(NamedTuple):
     values: tuple[SentenceValue, ...]
     refused: tuple[tuple[Channel, str], ...]
 
+    @property
+    def name(self) -> str:
+        """Under which `READERS` has it: a proprietary sentence is all talker."""
+        return self.kind or self.talker
+
 
 class SentenceReader:
     """
@@ -463,7 +470,7 @@ class SentenceReader:
             return 'no address'
         talker, kind = parts
         name = kind or talker  # a proprietary one is all talker
-        if name not in READERS and name not in TIMED:
+        if name not in USED:
             return Sentence(talker, kind, None, (), ())
         fields = Fields(name, texts, self._transducer_m)
         values, refused = [], []
@@ -534,12 +541,34 @@ def _of_day_ns(text: str) -> int:
     found = _TIME.fullmatch(text)
     if found is None:
         raise NoValue('no time of day')
-    hour, minute, second = int(found[1]), int(found[2]), int(found[3])
-    leap = (hour, minute, second) == (23, 59, 60)
-    if hour > 23 or minute > 59 or (second > 59 and not leap):
+    return of_day_ns(*found.groups())
+
+
+def of_day_ns(hour: str, minute: str, second: str | None, fraction: str | None) -> int:
+    """
+    Return the time since midnight [ns]; a leap second is that of the midnight after it.
+
+    Parameters
+    ----------
+    hour, minute, second, fraction
+        Digits, the last of them those behind the point.
+
+    Raises
+    ------
+    NoValue
+        If no clock shows them.
+    """
+    clock = int(hour), int(minute), int(second or 0)
+    if clock > (23, 59, 60) or clock[1] > 59 or (clock[2] > 59 and clock != (23, 59, 60)):
         raise NoValue('no time of day')
-    fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
-    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns
+    return (3600 * clock[0] + 60 * clock[1] + clock[2]) * SECOND_NS + fraction_ns(fraction)
+
+
+def fraction_ns(digits: str | None) -> int:
+    """
+    Return the part of a second [ns] that the digits behind its point are.
+    """
+    return int((digits or '')[:9].ljust(9, '0'))
 
 
 def _day(fields: Fields) -> int | None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import codecs
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
@@ -225,8 +224,6 @@ def best_of(formats: Sequence[Format], head: Head) -> Format:
     if scores[best.name] <= NO:
         if head.path.is_dir():
             raise ImportDataError(f'{str(head.path)!r} is a folder that is no bag; give a file')
-        if head.raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            raise ImportDataError(f'{str(head.path)!r} is in UTF-16; save it as UTF-8')
         known = ', '.join(each.kind for each in formats)
         raise ImportDataError(
             f'{str(head.path)!r} is of no format known here; it begins with '

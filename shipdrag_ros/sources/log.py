@@ -15,16 +15,15 @@ from typing import ClassVar
 import numpy as np
 
 from shipdrag_ros import display
+from shipdrag_ros.bags.run import BATCH
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, kind_of
+from shipdrag_ros.nmea.sentences import fraction_ns
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Int64, kind_of
 
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
-
-BATCH_SAMPLES = 4096
-"""Taken at a time."""
 
 BASE_NS = 946_684_800 * SECOND_NS
 """2000-01-01, where times that are no dates begin."""
@@ -60,11 +59,41 @@ Refused = dict[str, dict[str, Rejected]]
 """What was rejected, by input, 'time' or 'line', and reason."""
 
 
-def reject(refused: Refused, name: str, reason: str, line: int, text: str) -> None:
+@dataclass
+class Tally:
     """
-    Count one more.
+    What becomes of a file while it is read.
+
+    Attributes
+    ----------
+    records
+        Lines or messages read.
+    rejected
+        By input, 'time' or 'line', and reason.
+    not_used
+        Messages that state no input, by name.
+    notes
+        Sentences for the user.
     """
-    refused.setdefault(name, {}).setdefault(reason, Rejected()).add(line, text)
+
+    records: int = 0
+    rejected: Refused = field(default_factory=dict)
+    not_used: Counter[str] = field(default_factory=Counter)
+    notes: list[str] = field(default_factory=list)
+
+    def reject(self, name: str, reason: str, text: str, line: int | None = None) -> None:
+        """
+        Count what was rejected; it stands on the line, or is the last of the `records`.
+        """
+        reasons = self.rejected.setdefault(name, {})
+        reasons.setdefault(reason, Rejected()).add(self.records if line is None else line, text)
+
+    def note(self, text: str) -> None:
+        """
+        Keep a sentence for the user, once.
+        """
+        if text not in self.notes:
+            self.notes.append(text)
 
 
 @dataclass(frozen=True)
@@ -118,7 +147,7 @@ class Log:
 
     Attributes
     ----------
-    blocks
+    block
         Samples in order of arrival, their variances unknown.
     messages
         Yields the messages of a file that holds messages and no samples, in order of arrival;
@@ -134,7 +163,7 @@ class Log:
     """
 
     def __init__(self) -> None:
-        self.blocks: list[Block] = []
+        self.block = Block.empty()
         self.messages: Callable[[], Iterator[EncodedMessage]] | None = None
         self.counts: Counter[tuple[str, str]] = Counter()
         self.attachments: dict[str, str] = {}
@@ -148,21 +177,27 @@ class Log:
         times = (*(self.span_ns or ()), *received_ns)
         self.span_ns = (min(times), max(times))
 
-    def write_samples(self, block: Block) -> None:
+    def take(self, block: Block) -> None:
         """
-        Take samples that arrived after those before.
+        Take the samples of a file, in order of arrival.
         """
+        self.block = block
         for number, place, count in zip(
             *np.unique(block.channel, return_index=True, return_counts=True), strict=True
         ):
             channel = Channel(number)
-            if channel not in self.first:
-                values = block.value[place, : 2 if channel.kind in _TWO_VALUES else 1]
-                self.first[channel] = tuple(values.tolist())
+            values = block.value[place, : 2 if channel.kind in _TWO_VALUES else 1]
+            self.first[channel] = tuple(values.tolist())
             self.counts[key_of(channel)] += int(count)
         if len(block):
             self.include(int(block.receive_ns[0]), int(block.receive_ns[-1]))
-            self.blocks.append(block)
+
+    def pieces(self) -> Iterator[Block]:
+        """
+        Yield the samples, as many at a time as are encoded together.
+        """
+        for first in range(0, len(self.block), BATCH):
+            yield self.block[first : first + BATCH]
 
     def copy_to(self, bag: BagWriter) -> None:
         """
@@ -175,7 +210,7 @@ class Log:
         """
         for name, text in self.attachments.items():
             bag.attach(name, text)
-        for block in self.blocks:
+        for block in self.pieces():
             bag.write_samples(block)
         for message in self.messages() if self.messages is not None else ():
             bag.put(message)
@@ -241,7 +276,7 @@ def iso_ns(text: str, zone: tzinfo) -> int | None:
         seconds = int(moment.timestamp())
     except (ValueError, OverflowError):
         return None
-    time_ns = seconds * SECOND_NS + int((found[3] or '')[:9].ljust(9, '0'))
+    time_ns = seconds * SECOND_NS + fraction_ns(found[3])
     return time_ns if 0 <= time_ns < LIMIT_NS else None
 
 
@@ -345,6 +380,14 @@ class ImportResult:
         ]
         unused = [f'{self.unused}: {most_of(self.not_used)}'] if self.not_used else []
         return lines + rejected_words(self.rejected) + unused
+
+
+def out_of_order(stamp_ns: Int64) -> tuple[int, int]:
+    """
+    Return how many of (n,) times are before, and how many as, the latest one before them.
+    """
+    newest = np.maximum.accumulate(stamp_ns)[:-1]
+    return int(np.sum(stamp_ns[1:] < newest)), int(np.sum(stamp_ns[1:] == newest))
 
 
 def most_of(counts: Mapping[str, int] | Sequence[str]) -> str:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import IO, cast
@@ -20,6 +21,7 @@ LINE_BYTES = 1 << 16
 """No line of a log is as long as this; of one that is, nothing is used."""
 
 _FREE_BYTES = 64 << 20  # unpacked from any file
+_SHOWN_LINES = 1000  # between two calls of the progress
 _RATIO = 200  # text packs to a tenth, a bomb to a thousandth
 BROKEN = (OSError, EOFError, zlib.error)
 """What reading a damaged file raises."""
@@ -44,7 +46,7 @@ def beginning(path: Path) -> bytes:
             size = len(raw)
             while file is not packed and size <= _FREE_BYTES and (more := file.read(1 << 20)):
                 size += len(more)
-                check_unpacked(path, size, packed.tell())
+                check_unpacked(path, size, packed)
     except BROKEN as error:
         if raw:
             return raw  # whoever reads it says how far it goes
@@ -67,12 +69,51 @@ def opened(path: Path) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     raw, file
         The first shows how far the reading is, the second is read.
     """
-    with path.open('rb') as raw:
-        if raw.peek(2)[:2] != GZIP:
-            yield raw, raw
-            return
-        with gzip.open(raw) as unpacked:
-            yield raw, cast(IO[bytes], unpacked)
+    with path.open('rb') as raw, ExitStack() as stack:
+        file: IO[bytes] = raw
+        if raw.peek(2)[:2] == GZIP:
+            file = cast(IO[bytes], stack.enter_context(gzip.open(raw)))
+        if cast(BufferedReader, file).peek(2)[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            raise ImportDataError(f'{str(path)!r} is in UTF-16; save it as UTF-8')
+        yield raw, file
+
+
+def lines_of(
+    path: Path,
+    longest: int,
+    *,
+    encoding: str = 'utf-8-sig',
+    newline: str | None = None,
+    progress: PartDone | None = None,
+) -> Iterator[str]:
+    """
+    Yield the lines of a text file, of one that is too long its first characters.
+
+    Parameters
+    ----------
+    path
+        Plain or packed with gzip.
+    longest
+        Characters of a line.
+    encoding, newline
+        As `TextIOWrapper` takes them.
+    progress
+        Called with how many bytes are read, and of how many.
+    """
+    number, size, total = 0, 0, path.stat().st_size
+    with opened(path) as (raw, file):
+        reader = cast(BufferedReader, file)
+        text = TextIOWrapper(reader, encoding=encoding, errors='replace', newline=newline)
+        whole = True
+        while piece := text.readline(longest):
+            if whole:
+                yield piece
+                number += 1
+                if progress is not None and number % _SHOWN_LINES == 0:
+                    progress(raw.tell(), total)
+            whole = len(piece) < longest or piece.endswith('\n')
+            size += len(piece)
+            check_unpacked(path, size, raw)
 
 
 class Lines:
@@ -118,48 +159,37 @@ class Lines:
     def __iter__(self) -> Iterator[str]:
         self.number, self.too_long, self.damage = 0, [], ''
         try:
-            with opened(self.path) as (raw, file):
-                yield from self._lines(raw, file)
-        except BROKEN as error:
-            self.damage = f'after line {self.number}: {error}'
-
-    def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
-        # a line ends with LF, CR or both; a serial adapter writes CR alone
-        text = TextIOWrapper(cast(BufferedReader, file), encoding=self._encoding, errors='replace')
-        most, size, total = self._longest, 0, self.path.stat().st_size
-        packed = file is not raw
-        try:
-            while line := text.readline(most):
+            # a line ends with LF, CR or both; a serial adapter writes CR alone
+            for line in lines_of(
+                self.path, self._longest, encoding=self._encoding, progress=self._progress
+            ):
                 self.number += 1
-                rest, length = line, len(line)
-                while len(rest) == most and not rest.endswith('\n'):
-                    rest = text.readline(most)
-                    length += len(rest)
-                    if packed:
-                        check_unpacked(self.path, size + length, raw.tell())
-                size += length
-                if packed:
-                    check_unpacked(self.path, size, raw.tell())
-                if self._progress is not None and self.number % 1000 == 0:
-                    self._progress(raw.tell(), total)
-                if len(line) >= most - 1:
+                if len(line) >= self._longest - 1:
                     self.too_long.append(self.number)
                 else:
                     yield line.strip()
-        finally:
-            text.detach()  # whoever opened the file closes it
+        except BROKEN as error:
+            self.damage = f'after line {self.number}: {error}'
 
 
-def check_unpacked(path: Path, size: int, packed: int) -> None:
+def check_unpacked(path: Path, size: int, raw: IO[bytes]) -> None:
     """
     Refuse a packed file that unpacks to much more than any log does.
+
+    Parameters
+    ----------
+    path
+    size
+        Of what was unpacked.
+    raw
+        From which, see `opened`.
 
     Raises
     ------
     ImportDataError
         Naming both sizes.
     """
-    if size > _FREE_BYTES and size > _RATIO * max(packed, 1):
+    if size > _FREE_BYTES and size > _RATIO * max(raw.tell(), 1):
         raise ImportDataError(
             f'{str(path)!r} unpacks to more than {_RATIO} times its size; no log does. Unpack it '
             'and look'

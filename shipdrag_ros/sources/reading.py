@@ -156,11 +156,10 @@ def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[Counter[str]], list
     names = [name for name, _ in logs]
     _refuse_two_ships(names, blocks)
     taken, lost = _taken(blocks)
-    whole = in_arrival_order(taken)
     joined = Log()
     about = {name: log.attachments.get(ATTACHMENT, '') for name, log in logs}
     joined.attachments[ATTACHMENT] = strict_yaml.dump({'sources': about})
-    joined.write_samples(whole)
+    joined.take(in_arrival_order(taken))
     notes = [
         f'{name}: {", ".join(sorted(counts))} not taken for the time that an earlier file gives '
         'it too.'
@@ -173,7 +172,7 @@ def join(logs: Sequence[tuple[str, Log]]) -> tuple[Log, list[Counter[str]], list
 def _block(log: Log) -> Block:
     """Return all samples of a log; messages as their topics say."""
     if log.messages is None:
-        return concatenate(log.blocks)
+        return log.block
     return concatenate([item for item in LogRun(log, []).inputs() if isinstance(item, Block)])
 
 
@@ -252,9 +251,8 @@ class LogPart:
                 yield found if wanted.all() else found[wanted]
 
     def _all(self) -> Iterator[Messages]:
-        for block in self._log.blocks:
-            for first in range(0, len(block), BATCH):
-                yield self._encoded(block[first : first + BATCH])
+        for block in self._log.pieces():
+            yield self._encoded(block)
         stored = iter(()) if self._log.messages is None else self._log.messages()
         for some in iter(lambda: tuple(islice(stored, BATCH)), ()):
             ends = np.fromiter(accumulate((len(one.payload) for one in some), initial=0), np.int64)

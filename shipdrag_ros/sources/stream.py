@@ -12,10 +12,11 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
+from math import cos, isfinite, pi, remainder, sin
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +28,13 @@ from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.format import Format, Head, Job, Option
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
-    BATCH_SAMPLES,
     LIMIT_NS,
     ImportResult,
     Log,
-    Refused,
+    Tally,
     Understood,
     most_of,
-    reject,
+    out_of_order,
     rejected_words,
 )
 from shipdrag_ros.sources.opened import Lines
@@ -74,40 +74,19 @@ class Reading(NamedTuple):
     b: float = 0.0
 
 
-@dataclass
-class Tally:
+def yaw(compass: float) -> float:
     """
-    What becomes of a file while it is read.
-
-    Attributes
-    ----------
-    records
-        Lines or messages read.
-    rejected
-        By input, 'time' or 'line', and reason.
-    not_used
-        Messages that state no input, by name.
-    notes
-        Sentences for the user.
+    Return REP-103 yaw [rad] of an angle clockwise from north [rad]; what is none stays none.
     """
+    angle = pi / 2.0 - compass
+    return remainder(angle, 2.0 * pi) if isfinite(angle) else angle
 
-    records: int = 0
-    rejected: Refused = field(default_factory=dict)
-    not_used: Counter[str] = field(default_factory=Counter)
-    notes: list[str] = field(default_factory=list)
 
-    def reject(self, name: str, reason: str, text: str) -> None:
-        """
-        Count what was rejected; `records` is where it stands.
-        """
-        reject(self.rejected, name, reason, self.records, text)
-
-    def note(self, text: str) -> None:
-        """
-        Keep a sentence for the user, once.
-        """
-        if text not in self.notes:
-            self.notes.append(text)
+def wind(speed: float, angle: float) -> tuple[float, float]:
+    """
+    Return the velocity forward and to port of a wind that comes from an angle off the bow [rad].
+    """
+    return -speed * cos(angle), speed * sin(angle)
 
 
 FileReader = Callable[[Tally], Iterator[Reading]]
@@ -134,10 +113,7 @@ class StreamResult(ImportResult):
         return f'{self.records} records'
 
 
-AnyOrigin = TypeVar('AnyOrigin', bound=tuple[Any, ...])
-
-
-class SourcedValues(Generic[AnyOrigin]):
+class SourcedValues:
     """
     Values with who sends them, from which one source an input is chosen in the end.
 
@@ -152,9 +128,9 @@ class SourcedValues(Generic[AnyOrigin]):
     def __init__(self) -> None:
         self.at, self.a, self.b = array('q'), array('d'), array('d')
         self._source = array('i')
-        self._numbers: dict[tuple[Channel, AnyOrigin], int] = {}
+        self._numbers: dict[tuple[Channel, Any], int] = {}
 
-    def add(self, channel: Channel, origin: AnyOrigin, at: int, a: float, b: float) -> None:
+    def add(self, channel: Channel, origin: Any, at: int, a: float, b: float) -> None:
         """
         Take one more.
         """
@@ -163,17 +139,17 @@ class SourcedValues(Generic[AnyOrigin]):
         self.a.append(a)
         self.b.append(b)
 
-    def counts(self) -> dict[Channel, Counter[AnyOrigin]]:
+    def counts(self) -> dict[Channel, Counter[Any]]:
         """
         Return the number of values by source, of each channel.
         """
-        found: dict[Channel, Counter[AnyOrigin]] = {}
+        found: dict[Channel, Counter[Any]] = {}
         counts = np.bincount(np.array(self._source), minlength=len(self._numbers)).tolist()
         for (channel, origin), number in zip(self._numbers, counts, strict=True):
             found.setdefault(channel, Counter())[origin] = number
         return dict(sorted(found.items()))
 
-    def chosen(self) -> dict[Channel, AnyOrigin]:
+    def chosen(self) -> dict[Channel, Any]:
         """
         Return the one source of each channel.
         """
@@ -186,7 +162,7 @@ class SourcedValues(Generic[AnyOrigin]):
         chosen, source = self.chosen(), np.array(self._source, np.intp)
         use = np.array([chosen[c] == each for c, each in self._numbers], np.bool_)
         code = np.array([channel for channel, _ in self._numbers], np.uint8)
-        place = np.flatnonzero(use[source]) if len(source) else source
+        place = np.flatnonzero(use[source])
         return place, code[source[place]]
 
     def block(self, place: NDArray[np.intp], code: UInt8, stamp_ns: Int64) -> Block:
@@ -200,7 +176,7 @@ class SourcedValues(Generic[AnyOrigin]):
         stamp_ns : (n,)
         """
         value = np.column_stack((np.array(self.a)[place], np.array(self.b)[place]))
-        arrived = np.maximum.accumulate(stamp_ns) if len(stamp_ns) else stamp_ns
+        arrived = np.maximum.accumulate(stamp_ns)
         return Block(code, stamp_ns, arrived, value, np.full(value.shape, np.nan))
 
     def about(self, block: Block, log: Log) -> dict[str, Any]:
@@ -213,8 +189,7 @@ class SourcedValues(Generic[AnyOrigin]):
             From `block`, with one sample at least.
         log
         """
-        for first in range(0, len(block), BATCH_SAMPLES):
-            log.write_samples(block[first : first + BATCH_SAMPLES])
+        log.take(block)
         chosen = self.chosen()
         sources: dict[str, dict[str, None]] = {}
         not_taken: dict[str, Counter[str]] = {}
@@ -223,10 +198,11 @@ class SourcedValues(Generic[AnyOrigin]):
             others = {str(each): n for each, n in counts.items() if each != chosen[channel]}
             if others:
                 not_taken.setdefault(channel.input, Counter()).update(others)
-        backward, repeated = _out_of_order(block)
+        stamps = [block.stamp_ns[block.channel == code] for code in np.unique(block.channel)]
+        backward, repeated = map(sum, zip(*map(out_of_order, stamps), strict=True))
         written: Counter[str] = Counter()
-        for code, number in zip(*np.unique(block.channel, return_counts=True), strict=True):
-            written[Channel(code).input] += int(number)
+        for (topic, _), count in log.counts.items():
+            written[topic[1:]] += count
         return {
             'written': {name: written[name] for name in INPUTS if written[name]},
             'sources': {name: ', '.join(each) for name, each in sources.items()},
@@ -246,17 +222,6 @@ class SourcedValues(Generic[AnyOrigin]):
                 for channel, first in sorted(log.first.items())
             ),
         }
-
-
-def _out_of_order(block: Block) -> tuple[int, int]:
-    """Return how many samples are stamped before, and how many as, an earlier one."""
-    backward = repeated = 0
-    for code in np.unique(block.channel):
-        stamps = block.stamp_ns[block.channel == code]
-        newest = np.maximum.accumulate(stamps)[:-1]
-        backward += int(np.sum(stamps[1:] < newest))
-        repeated += int(np.sum(stamps[1:] == newest))
-    return backward, repeated
 
 
 def read_stream(
@@ -288,7 +253,7 @@ def read_stream(
     half as many values as the most frequent.
     """
     tally = Tally()
-    values: SourcedValues[Origin] = SourcedValues()
+    values = SourcedValues()
     for channel, origin, stamp_ns, a, b in _checked(read(tally), tally):
         values.add(channel, origin, stamp_ns, a, b)
     if not len(values.at):
@@ -348,60 +313,53 @@ def counted(lines: Lines, tally: Tally) -> Iterator[str]:
 
 
 def _checked(readings: Iterator[Reading], tally: Tally) -> Iterator[Reading]:
-    """Leave out values that cannot be, and times that jump away and back again."""
-    jumps = _Jumps(tally)
+    """
+    Leave out values that cannot be, and times that jump away and back again.
+
+    What stands after a step of the time is held until the next one shows whether it was one.
+    """
+    held: list[Reading] = []
+    last_ns: int | None = None
+    sparse = False  # whether such steps are usual here
+
+    def drop() -> None:
+        for each in held:
+            tally.reject('time', 'jumps away and back', f'{each.stamp_ns} ns')
+        held.clear()
+
     for reading in readings:
+        stamp_ns = reading.stamp_ns
         if not _possible(reading):
             tally.reject(reading.channel.input, 'no possible value', f'{reading.a}, {reading.b}')
-        elif not 0 < reading.stamp_ns < LIMIT_NS:
-            tally.reject('time', 'no possible date', str(reading.stamp_ns))
+            continue
+        if not 0 < stamp_ns < LIMIT_NS:
+            tally.reject('time', 'no possible date', str(stamp_ns))
+            continue
+        goes_on = _near(stamp_ns, last_ns)
+        if goes_on:
+            drop()
+        elif held and (stamp_ns != held[0].stamp_ns or len(held) >= _HELD):
+            first_ns = held[0].stamp_ns
+            forward = last_ns is None or first_ns > last_ns
+            goes_on = _near(stamp_ns, first_ns)
+            if goes_on or forward != (stamp_ns < first_ns):
+                yield from held
+                held.clear()
+                last_ns, sparse = first_ns, not goes_on
+            else:
+                drop()  # back to where it was, or beyond: the step was a damaged time
+        if goes_on:
+            last_ns = stamp_ns
+            yield reading
         else:
-            yield from jumps.take(reading)
-    yield from jumps.finish()
+            held.append(reading)
+    if last_ns is not None and not sparse:
+        drop()  # nothing goes on from it
+    yield from held
 
 
-class _Jumps:
-    """Holds what stands after a step of the time until the next one shows whether it was one."""
-
-    def __init__(self, tally: Tally) -> None:
-        self._tally = tally
-        self._held: list[Reading] = []
-        self._last_ns: int | None = None
-        self._sparse = False  # whether such steps are usual here
-
-    def take(self, reading: Reading) -> list[Reading]:
-        stamp_ns = reading.stamp_ns
-        if self._near(stamp_ns, self._last_ns):
-            self._drop()
-            self._last_ns = stamp_ns
-            return [reading]
-        if not self._held or (stamp_ns == self._held[0].stamp_ns and len(self._held) < _HELD):
-            self._held.append(reading)
-            return []
-        first_ns = self._held[0].stamp_ns
-        forward = self._last_ns is None or first_ns > self._last_ns
-        goes_on = self._near(stamp_ns, first_ns)
-        if not goes_on and forward == (stamp_ns < first_ns):
-            self._drop()  # back to where it was, or beyond: the step was a damaged time
-            self._held = [reading]
-            return []
-        settled, self._held = self._held, []
-        self._sparse = not goes_on
-        self._last_ns = settled[-1].stamp_ns
-        return settled + self.take(reading)
-
-    def finish(self) -> list[Reading]:
-        if self._last_ns is not None and not self._sparse:
-            self._drop()  # nothing goes on from it
-        return self._held
-
-    def _drop(self) -> None:
-        for each in self._held:
-            self._tally.reject('time', 'jumps away and back', f'{each.stamp_ns} ns')
-        self._held = []
-
-    def _near(self, one_ns: int, other_ns: int | None) -> bool:
-        return other_ns is not None and abs(one_ns - other_ns) <= JUMP_NS
+def _near(one_ns: int, other_ns: int | None) -> bool:
+    return other_ns is not None and abs(one_ns - other_ns) <= JUMP_NS
 
 
 def _possible(reading: Reading) -> bool:

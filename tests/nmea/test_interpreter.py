@@ -58,6 +58,7 @@ def settled(*contents: str) -> tuple[Interpreter, dict[Channel, tuple[float, flo
         ('WIMWV,0.0,R,10.0,M,A', Channel.WIND_APPARENT, (-10, 0)),
         ('SDDPT,20.0,5.0', Channel.DEPTH, (25, 0)),
         ('IIRSA,10.0,A,,V', Channel.RUDDER, (math.radians(10), 0)),
+        ('PUHAW,UVH,3.0,4.0,0.0', Channel.SPEED_THROUGH_WATER, (4 * KNOT_M_S, 0)),
     ],
 )
 def test_each_sentence(content: str, channel: Channel, value: tuple[float, float]) -> None:

@@ -25,7 +25,6 @@ from shipdrag_ros.nmea.live import (
     LineSplitter,
     LiveNmea,
     SourceCounts,
-    Way,
     parse_addresses,
 )
 
@@ -185,10 +184,10 @@ def test_each_form() -> None:
         'udp://0.0.0.0:10110'
     )
     assert [(each.way, each.place, each.number) for each in found] == [
-        (Way.UDP, '0.0.0.0', 10110),
-        (Way.TCP, 'mux.local', 2000),
-        (Way.TCP, '::1', 2000),
-        (Way.SERIAL, '/dev/ttyUSB0', 4800),
+        ('udp', '0.0.0.0', 10110),
+        ('tcp', 'mux.local', 2000),
+        ('tcp', '::1', 2000),
+        ('serial', '/dev/ttyUSB0', 4800),
     ]
     assert str(found[0]) == 'udp://0.0.0.0:10110'
     assert parse_addresses('') == ()

@@ -300,6 +300,34 @@ def test_rows_out_of_order_stay_in_their_order_and_are_counted(import_text: Impo
     assert result.backward == 1
 
 
+@pytest.mark.parametrize('before', [1000, 1022, 1023, 1024])
+def test_a_clock_set_back_is_seen_wherever_rows_are_cut(import_text: Import, before: int) -> None:
+    times = [*range(before), *range(before - 100, before + 100)]
+    rows = '\n'.join(f'{t},1' for t in times)
+    _, block = import_text(f't,u\n{rows}\n', 'shaft=u', time='t')
+    steps = np.diff(block.receive_ns) // 10**9
+    assert steps[before - 1] == 0
+    assert np.all(np.delete(steps, before - 1) == 1)
+
+
+def test_a_leap_second_of_a_table_is_the_midnight_after_it(import_text: Import) -> None:
+    rows = '\n'.join(f'2016-12-31T23:59:{second}Z,1' for second in (58, 59, 60))
+    result, block = import_text(f't,u\n{rows}\n2017-01-01T00:00:01Z,1\n', 'shaft=u', time='t')
+    assert np.diff(block.stamp_ns).tolist() == [10**9] * 3
+    assert result.rejected == {}
+
+
+def test_a_month_has_two_digits_at_most(import_text: Import) -> None:
+    with pytest.raises(ImportDataError, match='no possible date'):
+        import_text('t,u\n0001-01-02,1\n', 'shaft=u', time='t')
+
+
+@pytest.mark.filterwarnings('error')
+def test_what_a_unit_makes_larger_than_any_number_is_no_warning(import_text: Import) -> None:
+    _, block = import_text('t,u\n0,1e308\n1,5\n', 'shaft=u:rps', time='t')
+    assert np.isinf(block.value[0, 0])
+
+
 def test_many_rows_are_the_same_rows(import_text: Import) -> None:
     values = np.random.default_rng(2).normal(5.0, 1.0, 10_000)
     told: list[tuple[int, int]] = []

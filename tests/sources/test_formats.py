@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import gzip
 import json
 import math
@@ -188,6 +189,49 @@ def test_a_coordinate_may_have_thirty_decimals(tmp_path: Path) -> None:
     )
     path.write_text(f'<gpx><trk><trkseg>{"".join(points)}</trkseg></trk></gpx>')
     assert values(block_of(path), Channel.POSITION_GEODETIC)[:, 1] == pytest.approx(10.252)
+
+
+def test_a_log_that_begins_before_midnight_is_of_the_day_before(tmp_path: Path) -> None:
+    """The first message with a date comes after midnight."""
+    day = (made.START.date() - made.datetime(1970, 1, 1).date()).days
+    speed = '00F401FFFF00FFFF'
+    lines = [f'A2359{k}.000 23FF2 1F503 {speed}' for k in (57, 58, 59)]
+    lines += [f'A0000{k:02d}.000 23FF2 1F503 {speed}' for k in range(5)]
+    dated = made.struct.pack('<BBHI', 0, 0xF0, day, 20_000).hex()
+    path = tmp_path / 'log.txt'
+    path.write_text('\n'.join([*lines[:5], f'A000002.000 23FF2 1F010 {dated}', *lines[5:]]))
+    stamps = block_of(path).stamp_ns
+    assert stamps.tolist() == [(86_400 * day + k) * 10**9 for k in range(-3, 5)]
+
+
+def test_a_rate_next_to_nothing_gives_one_frame_a_date(files: dict[str, Path]) -> None:
+    assert len(block_of(files['candump'], rate=1e-300)) == 1
+
+
+def test_the_date_that_is_given_is_not_said_to_be_another(tmp_path: Path, capsys) -> None:
+    path = tmp_path / 'slcan.log'
+    lines = made.slcan().decode().splitlines()
+    dated = f'T{made._can_id(126992):08X}'
+    path.write_text('\n'.join(line for line in lines if not line.startswith(dated)))
+    line = ['import', str(path), '-o', str(tmp_path / 'a.mcap'), '--date', '2024-05-17']
+    assert main(line) == 0
+    shown = capsys.readouterr().out
+    assert 'from 2024-05-17' in shown
+    assert '2000-01-01' not in shown
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_damaged_number_of_an_ulog_is_no_warning(files: dict[str, Path], tmp_path: Path) -> None:
+    needs('ulog')
+    path, speed = tmp_path / 'log.ulg', made.struct.pack('<f', made.sog(3))
+    path.write_bytes(files['ulog'].read_bytes().replace(speed, b'\1\0\x80\x7f'))
+    assert len(values(block_of(path), Channel.SPEED_OVER_GROUND)) == made.ROWS - 1
+
+
+def test_a_bag_is_closed(files: dict[str, Path], recwarn: pytest.WarningsRecorder) -> None:
+    read_any([files['ros1']])
+    gc.collect()
+    assert not [each for each in recwarn if each.category is ResourceWarning]
 
 
 def test_engine_revolutions_are_the_shaft_only_with_a_gear(files: dict[str, Path]) -> None:

@@ -397,6 +397,42 @@ def test_times_of_day_before_the_first_date_are_of_the_day_before_midnight() -> 
     ]
 
 
+@pytest.mark.parametrize('day', [date.min, date.max])
+def test_a_date_beyond_all_stamps_is_refused(day: date) -> None:
+    log = sentence('GPGGA,120000,5430.000,N,01030.000,E,1,8,1.0,0,M,0,M,,')
+    with pytest.raises(ImportDataError, match='no possible date'):
+        run(log, date=day)
+
+
+def test_times_without_a_fix_alone_are_times_of_day() -> None:
+    with pytest.raises(ImportDataError, match='has times of day, but no date'):
+        run(sentence('GPGGA,120000,5430.0,N,01030.0,E,0,8,1,0,M,0,M,,'))
+
+
+def test_a_sentence_without_a_time_is_counted_once() -> None:
+    result, block = run(lines(rmc(0), sentence('GPGLL,4612.9,N,00610.1,E,246000,A'), rmc(1)))
+    assert list(result.rejected) == ['time']
+    assert result.not_taken == {}
+    assert len(block) == 4
+
+
+def test_the_first_receipt_dates_what_stands_before_it() -> None:
+    bodies = [f'GPGGA,12000{k},5430.0,N,01030.0,E,1,8,1,0,M,0,M,,' for k in range(3)]
+    first, *others = map(sentence, bodies)
+    received = [f'{START_NS // SECOND + k} {each}' for k, each in enumerate(others, 1)]
+    _, block = run('\n'.join([first, *received]))
+    assert (block.stamp_ns - START_NS).tolist() == [0, SECOND, 2 * SECOND]
+
+
+def test_times_of_day_that_count_beyond_all_stamps_are_rejected() -> None:
+    bodies = (
+        f'GPGGA,{11 * k % 24:02d}0000,5430.000,N,01030.000,E,1,8,1.0,0,M,0,M,,' for k in range(9)
+    )
+    result, block = run('\n'.join(map(sentence, bodies)), date=date(2038, 1, 18))
+    assert 0 < len(block) < 9
+    assert result.rejected['position']['no possible date'].count == 9 - len(block)
+
+
 def test_a_leap_second_is_the_midnight_after_it() -> None:
     _, block = run(lines(gga('235959'), gga('235960'), gga('000000')), date=date(2016, 12, 31))
     assert stamps(block) == [

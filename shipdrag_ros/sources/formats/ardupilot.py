@@ -10,13 +10,13 @@ import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, redirect_stdout
 from io import StringIO
-from math import isfinite, pi, radians, remainder
+from math import pi, radians
 from typing import Any
 
 from shipdrag_ros.samples import SHAFTS, Channel
 from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
-from shipdrag_ros.sources.log import BASE_NS, UNDATED
-from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
+from shipdrag_ros.sources.log import BASE_NS, UNDATED, Tally
+from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 
 # a message begins with A3 95, the first one defines the definitions (type 80)
 _MAGIC = b'\xa3\x95\x80\x80'
@@ -83,9 +83,7 @@ def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, 
     elif kind == 'POS':
         yield Channel.POSITION_GEODETIC, 10, name, float(fields['Lat']), float(fields['Lng'])
     elif kind == 'ATT':
-        yaw = pi / 2.0 - radians(float(fields['Yaw']))
-        yaw = remainder(yaw, 2.0 * pi) if isfinite(yaw) else yaw
-        yield Channel.HEADING, 0, name, yaw, 0.0
+        yield Channel.HEADING, 0, name, yaw(radians(float(fields['Yaw']))), 0.0
     elif kind == 'ESC' and number < len(SHAFTS):
         yield SHAFTS[number], 0, name, float(fields['RPM']) * pi / 30.0, 0.0
     elif kind == 'RPM':

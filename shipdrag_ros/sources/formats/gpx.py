@@ -4,22 +4,21 @@ The points of tracks with their times, and their speeds [m/s]; ways and routes h
 and are counted.
 """
 
-# The parser is expat's, which fetches nothing; a declaration of an entity ends the reading, so
-# that none can be expanded.
+# The parser fetches nothing; a document type, which alone can declare entities, ends the reading.
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 from datetime import UTC
-from xml.parsers import expat
+from xml.etree.ElementTree import ParseError, XMLParser
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Head, Job
-from shipdrag_ros.sources.log import iso_ns
+from shipdrag_ros.sources.log import Tally, iso_ns
 from shipdrag_ros.sources.opened import check_unpacked, opened
-from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
+from shipdrag_ros.sources.stream import Origin, Reading, stream_format
 
 _CHUNK = 1 << 16
 _DEEPEST = 32
@@ -38,16 +37,19 @@ def _score(head: Head) -> float:
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
     points = _Points(tally)
+    parser = XMLParser(target=points)
     size, total, chunk = 0, job.source.stat().st_size, b' '
     with opened(job.source) as (raw, file):
         while chunk:
             try:
                 chunk = file.read(_CHUNK)
                 size += len(chunk)
-                if file is not raw:
-                    check_unpacked(job.source, size, raw.tell())
-                points.parser.Parse(chunk, not chunk)
-            except (expat.ExpatError, LookupError, ValueError, OSError, EOFError) as error:
+                check_unpacked(job.source, size, raw)
+                if chunk:
+                    parser.feed(chunk)
+                else:
+                    parser.close()
+            except (ParseError, LookupError, ValueError, OSError, EOFError) as error:
                 tally.note(f'The file is damaged, {error}; this is what stands before.')
                 chunk = b''
             yield from points.found
@@ -61,41 +63,40 @@ class _Points:
 
     def __init__(self, tally: Tally) -> None:
         self.found: list[Reading] = []
-        self.parser = expat.ParserCreate(namespace_separator=' ')
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._text
-        self.parser.EntityDeclHandler = self.parser.StartDoctypeDeclHandler = self._refuse
         self._tally = tally
         self._depth = 0
         self._name = ''
         self._point: dict[str, str] | None = None  # attributes, time and speed of the open one
 
-    def _refuse(self, *_: object) -> None:
+    def doctype(self, *_: object) -> None:
+        """Refuse what may declare entities."""
         raise ImportDataError(
             'the file declares XML entities or a document type, which no GPX needs and which may '
             'unpack without end; it is not read. Export the track again'
         )
 
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        """Begin an element."""
         self._depth += 1
         if self._depth > _DEEPEST:
             raise ImportDataError(f'the elements of the file stand more than {_DEEPEST} deep')
-        self._name = name.rpartition(' ')[2]
+        self._name = name.rpartition('}')[2]
         if self._name == 'trkpt':
             self._point = {**attributes, 'time': '', 'speed': ''}
         elif self._name in ('wpt', 'rtept'):
             self._tally.not_used[self._name] += 1
 
-    def _text(self, text: str) -> None:
+    def data(self, text: str) -> None:
+        """Take text of the element."""
         point = self._point
         if point is not None and self._name in ('time', 'speed'):
             point[self._name] = (point[self._name] + text)[:_LONGEST]
 
-    def _end(self, name: str) -> None:
+    def end(self, name: str) -> None:
+        """End an element."""
         self._depth -= 1
         self._name = ''
-        if name.rpartition(' ')[2] == 'trkpt' and self._point is not None:
+        if name.rpartition('}')[2] == 'trkpt' and self._point is not None:
             self._tally.records += 1
             self._take(self._point)
             self._point = None

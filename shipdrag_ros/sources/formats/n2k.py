@@ -13,19 +13,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from datetime import UTC
+from fractions import Fraction
 from functools import cache
 from itertools import chain, islice, pairwise
-from math import cos, pi, remainder, sin
+from math import pi
 from typing import Any, NamedTuple
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of
+from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of, fraction_ns, of_day_ns
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources import format
-from shipdrag_ros.sources.log import BASE_NS, iso_ns
+from shipdrag_ros.sources.log import BASE_NS, Tally, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, Tally, counted, stream_format
+from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
 
 MINUTE_NS = 60 * SECOND_NS
 _SINCE = r'\((?P<seconds>\d{1,10})\.(?P<fraction>\d{1,9})\)\s+'
@@ -108,11 +110,13 @@ def _frame(parts: dict[str, str]) -> N2kFrame | None:
         if len(digits) < end or len(clock) not in (0, 4) or (time_ns or 0) >= MINUTE_NS:
             return None
     elif 'hour' in parts:
-        time_ns, cycle_ns = _of_day_ns(parts), DAY_NS
+        cycle_ns = DAY_NS
+        with suppress(NoValue):
+            time_ns = of_day_ns(parts['hour'], parts['minute'], parts['second'], parts['fraction'])
     elif 'iso' in parts:
         time_ns = iso_ns(f'{parts["iso"][:10]}T{parts["iso"][11:]}', UTC)
     elif parts['seconds']:
-        time_ns = int(parts['seconds']) * SECOND_NS + _fraction_ns(parts)
+        time_ns = int(parts['seconds']) * SECOND_NS + fraction_ns(parts['fraction'])
     if len(digits) % 2:
         return None
     data = bytes.fromhex(digits)
@@ -128,17 +132,6 @@ def _frame(parts: dict[str, str]) -> N2kFrame | None:
     pgn = int(parts['decimal_pgn']) if 'decimal_pgn' in parts else int(parts['pgn'], 16)
     whole = 'hex_sender' in parts or ('decimal_pgn' in parts and len(data) > 8)
     return N2kFrame(time_ns, cycle_ns, pgn, sender, data, whole)
-
-
-def _of_day_ns(parts: dict[str, str]) -> int | None:
-    hour, minute, second = (int(parts[name]) for name in ('hour', 'minute', 'second'))
-    if hour > 23 or minute > 59 or second > 60:
-        return None
-    return (3600 * hour + 60 * minute + second) * SECOND_NS + _fraction_ns(parts)
-
-
-def _fraction_ns(parts: dict[str, str]) -> int:
-    return int(parts['fraction'][:9].ljust(9, '0'))
 
 
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
@@ -161,7 +154,7 @@ class FrameClock:
 
     def __init__(self, base_ns: int = 0, rate_hz: float | None = None) -> None:
         self._base_ns = base_ns
-        self._rate_hz = rate_hz
+        self._frame_ns = None if rate_hz is None else SECOND_NS / Fraction(rate_hz)
         self._frames = -1
         self._cycles = 0
         self._last_ns = 0
@@ -171,8 +164,8 @@ class FrameClock:
         Return the time of the next frame [ns since 1970], None where it has none.
         """
         self._frames += 1
-        if self._rate_hz is not None:
-            return self._base_ns + round(self._frames / self._rate_hz * SECOND_NS)
+        if self._frame_ns is not None:
+            return self._base_ns + round(self._frames * self._frame_ns)
         if frame.time_ns is None:
             return None
         time_ns = (
@@ -231,18 +224,18 @@ def clock_of(job: format.Job, tally: Tally) -> FrameClock:
         tally.note(
             'The times of the frames count within a minute: a pause of a minute is not seen.'
         )
-        if known_ns is not None:
-            return FrameClock(known_ns)
-        tally.note('No frame states the date; the times count from 2000-01-01.')
-        return FrameClock(BASE_NS if days is None else days * DAY_NS)
-    if days is None and known_ns is not None:
-        days = known_ns // DAY_NS
-    if days is None:
+        if known_ns is None and days is None:
+            tally.note('No frame states the date; the times count from 2000-01-01.')
+            known_ns = BASE_NS
+        return FrameClock(known_ns or (days or 0) * DAY_NS)
+    if days is not None:
+        known_ns = days * DAY_NS
+    if known_ns is None:
         raise ImportDataError(
             f'{name} has times of day, and no date (no PGN 126992 or 129029 with one); give '
             '--date YYYY-MM-DD of its first time, in UTC'
         )
-    return FrameClock(days * DAY_NS)
+    return FrameClock(known_ns)
 
 
 def _start_in(frames: Iterable[N2kFrame]) -> int | None:
@@ -251,7 +244,9 @@ def _start_in(frames: Iterable[N2kFrame]) -> int | None:
     """
     packets, clock = _Packets(), FrameClock()
     for frame in frames:
-        since_ns = 0 if frame.time_ns is None else clock.counted_on(frame.time_ns, frame.cycle_ns)
+        if frame.time_ns is None:
+            continue
+        since_ns = clock.counted_on(frame.time_ns, frame.cycle_ns)
         if frame.pgn in (_SYSTEM_TIME, _GNSS):
             data = packets.whole(frame)
             place = 2 if frame.pgn == _SYSTEM_TIME else 1
@@ -260,8 +255,10 @@ def _start_in(frames: Iterable[N2kFrame]) -> int | None:
                 of_day = int.from_bytes(data[place + 2 : place + 6], 'little')  # [0.1 ms]
                 if 0 < days < 0xFFFD and of_day < 864_000_000:
                     time_ns = days * DAY_NS + of_day * 100_000 - since_ns
-                    # a time of day is the line's own, to which the message gives its day
-                    return time_ns if frame.cycle_ns == MINUTE_NS else days * DAY_NS
+                    # a day begins at midnight, by the line's own time of day
+                    return (
+                        time_ns if frame.cycle_ns != DAY_NS else round(time_ns / DAY_NS) * DAY_NS
+                    )
     return None
 
 
@@ -392,14 +389,13 @@ def _heading(fields: _Fields) -> N2kValue:
             heading += (deviation or 0.0) + variation
     elif reference != 'True':
         raise NoValue('neither true nor magnetic')
-    return Channel.HEADING, rank, remainder(pi / 2.0 - heading, 2.0 * pi), 0.0
+    return Channel.HEADING, rank, yaw(heading), 0.0
 
 
 def _wind(fields: _Fields) -> N2kValue:
     if fields.value('reference') != 'Apparent':
         raise NoValue(f'wind that is not apparent: {fields.value("reference")}')
-    speed, angle = fields.number('windSpeed'), fields.number('windAngle')
-    return Channel.WIND_APPARENT, 0, -speed * cos(angle), speed * sin(angle)
+    return Channel.WIND_APPARENT, 0, *wind(fields.number('windSpeed'), fields.number('windAngle'))
 
 
 def _depth(fields: _Fields) -> N2kValue:

@@ -34,10 +34,11 @@ from shipdrag_ros.sources.log import (
     LIMIT_NS,
     ImportResult,
     Log,
+    Tally,
     most_of,
     rejected_words,
 )
-from shipdrag_ros.sources.stream import Tally
+from shipdrag_ros.sources.opened import beginning
 
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20
@@ -85,8 +86,7 @@ def _score(head: Head) -> float:
 
 
 def _open(job: Job, log: Log) -> CopyResult:
-    first = b'' if job.source.is_dir() else job.source.open('rb').read(len(_SQLITE))
-    ros1 = first.startswith(_ROS1)
+    ros1 = not job.source.is_dir() and beginning(job.source).startswith(_ROS1)
     kind = 'ROS 1' if ros1 else 'rosbag2 (sqlite3)'
 
     def messages(tally: Tally | None = None) -> Iterator[EncodedMessage]:
@@ -106,11 +106,6 @@ def _open(job: Job, log: Log) -> CopyResult:
         )
     log.messages = messages
     log.attachments[ATTACHMENT] = strict_yaml.dump({'source': job.source.name, 'kind': kind})
-    return _result(kind, log, tally)
-
-
-def _result(kind: str, log: Log, tally: Tally) -> CopyResult:
-    """Say which topics carry inputs."""
     inputs = {}
     written: Counter[str] = Counter()
     for (topic, _), count in log.counts.items():

@@ -13,19 +13,21 @@ from collections import Counter
 from collections.abc import Iterator
 from datetime import UTC
 from itertools import accumulate
-from math import cos, pi, remainder, sin
+from math import pi
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
 from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Head, Job
-from shipdrag_ros.sources.log import iso_ns
+from shipdrag_ros.sources.log import Tally, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.stream import Origin, Reading, Tally, counted, stream_format
+from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
 
 _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')
 _DEEPEST = 12  # brackets in a delta
-_PLAIN: dict[str, tuple[Channel, int]] = {
+_POSITION = 'navigation.position'
+_SPEED, _ANGLE = 'environment.wind.speedApparent', 'environment.wind.angleApparent'
+_NUMBERS: dict[str, tuple[Channel, int]] = {
     'navigation.speedThroughWater': (Channel.SPEED_THROUGH_WATER, 0),
     'navigation.speedThroughWaterLongitudinal': (Channel.SPEED_THROUGH_WATER, 1),
     'navigation.speedOverGround': (Channel.SPEED_OVER_GROUND, 0),
@@ -33,10 +35,10 @@ _PLAIN: dict[str, tuple[Channel, int]] = {
     'navigation.headingMagnetic': (Channel.HEADING, 1),
     'steering.rudderAngle': (Channel.RUDDER, 0),
     'environment.depth.belowSurface': (Channel.DEPTH, 0),
+    _SPEED: (Channel.WIND_APPARENT, 0),
+    _ANGLE: (Channel.WIND_APPARENT, 0),
 }
 _MAGNETIC = 'MAGNETIC: good for finding turns, not for directions over ground.'
-_POSITION = 'navigation.position'
-_SPEED, _ANGLE = 'environment.wind.speedApparent', 'environment.wind.angleApparent'
 _TOGETHER_NS = 2_000_000_000  # a wind's speed and angle that far apart are not one measurement
 _ENGINE = re.compile(r'propulsion\.([^.]+)\.(?:.*\.)?revolutions')
 _SHAFTS = {'starboard': 1, '1': 1, '2': 2, '3': 3}
@@ -125,32 +127,32 @@ class _Deltas:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
             if _is_number(latitude) and _is_number(longitude) and abs(latitude) <= 90.0:
+                here = float(latitude), float(longitude)
                 origin = origin._replace(unit='deg')
-                return Reading(
-                    Channel.POSITION_GEODETIC, origin, stamp_ns, float(latitude), float(longitude)
-                )
+                return Reading(Channel.POSITION_GEODETIC, origin, stamp_ns, *here)
             self._tally.reject('position', 'no latitude and longitude', str(value))
-        elif engine is not None and self._gear is None:
-            self._tally.not_used[f'{path} (of the engine: --gear RATIO makes it the shaft)'] += 1
-        elif engine is None and path not in (*_PLAIN, _SPEED, _ANGLE):
-            self._tally.not_used[path] += 1
-        elif not _is_number(value):
-            wind = Channel.WIND_APPARENT
-            channel = Channel.SHAFT if engine is not None else _PLAIN.get(path, (wind, 0))[0]
-            self._tally.reject(channel.input, 'no number', f'{path} {value}')
+            return None
+        if path in _NUMBERS:
+            channel, rank = _NUMBERS[path]
         elif engine is not None and self._gear is not None:
-            rate = float(value) * 2.0 * pi / self._gear
-            return Reading(SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], origin, stamp_ns, rate)
-        elif path in _PLAIN:
-            channel, rank = _PLAIN[path]
-            if channel is Channel.HEADING:
-                value = remainder(pi / 2.0 - value, 2.0 * pi)
-            if path == 'navigation.headingMagnetic':
-                self._tally.note(f'A heading is {_MAGNETIC}')
-            return Reading(channel, origin._replace(rank=rank), stamp_ns, float(value))
+            channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
         else:
-            return self._wind(path, float(value), stamp_ns, source)
-        return None
+            hint = '' if engine is None else ' (of the engine: --gear RATIO makes it the shaft)'
+            self._tally.not_used[path + hint] += 1
+            return None
+        if not _is_number(value):
+            self._tally.reject(channel.input, 'no number', f'{path} {value}')
+            return None
+        number = float(value)
+        if channel is Channel.WIND_APPARENT:
+            return self._wind(path, number, stamp_ns, source)
+        if engine is not None and self._gear is not None:
+            number = number * 2.0 * pi / self._gear
+        elif channel is Channel.HEADING:
+            number = yaw(number)
+        if path == 'navigation.headingMagnetic':
+            self._tally.note(f'A heading is {_MAGNETIC}')
+        return Reading(channel, origin._replace(rank=rank), stamp_ns, number)
 
     def _wind(self, path: str, value: float, stamp_ns: int, source: str) -> Reading | None:
         self._winds[path, source] = (stamp_ns, value)
@@ -159,8 +161,8 @@ class _Deltas:
             return None
         del self._winds[_SPEED, source], self._winds[_ANGLE, source]
         origin = Origin(0, f'environment.wind {source}'.strip())
-        ahead, port = -speed[1] * cos(angle[1]), speed[1] * sin(angle[1])
-        return Reading(Channel.WIND_APPARENT, origin, max(speed[0], angle[0]), ahead, port)
+        stamp_ns = max(speed[0], angle[0])
+        return Reading(Channel.WIND_APPARENT, origin, stamp_ns, *wind(speed[1], angle[1]))
 
 
 def _is_number(value: Any) -> TypeGuard[float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import redirect_stdout
 from io import StringIO
-from math import pi, remainder
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
 from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
-from shipdrag_ros.sources.log import BASE_NS, UNDATED
-from shipdrag_ros.sources.stream import Origin, Reading, Tally, stream_format
+from shipdrag_ros.sources.log import BASE_NS, UNDATED, Tally
+from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 
 _MAGIC = b'ULog\x01\x12\x35'
 _LIMIT_BYTES = 2 << 30  # pyulog holds the whole log in memory
@@ -50,7 +50,8 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
             f'{str(job.source)!r} is an ULog that cannot be read: {error or type(error).__name__}'
         ) from error
     try:
-        readings = _readings(found, tally)
+        with np.errstate(invalid='ignore'):  # a damaged number is rejected as what it is
+            readings = _readings(found, tally)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         # definitions that are damaged name other columns
         raise ImportDataError(
@@ -111,7 +112,7 @@ def _values(name: str, columns: dict[str, Any]) -> Iterator[tuple[Channel, Float
         w, x, y, z = (columns[f'q[{k}]'].astype(np.float64) for k in range(4))
         # from north, clockwise; REP-103 counts from east and the other way
         north = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        yield Channel.HEADING, np.array([remainder(pi / 2.0 - a, 2.0 * pi) for a in north]), 0.0
+        yield Channel.HEADING, np.array([*map(yaw, north)]), 0.0
     elif name == 'esc_status':
         for place, channel in enumerate(SHAFTS):
             if (rpm := columns.get(f'esc[{place}].esc_rpm')) is not None:

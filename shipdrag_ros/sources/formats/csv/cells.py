@@ -12,7 +12,7 @@ from decimal import Decimal
 from fractions import Fraction
 from itertools import count
 from math import cos, hypot, isfinite, pi, remainder, sin
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, of_day_ns
 from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import (
     COMPASS,
@@ -46,34 +47,28 @@ _SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
 _THOUSANDS = re.compile(r'[-+]?[1-9]\d{0,2}(\.\d{3})+')
 
 
-class BadCell(Exception):
-    """
-    A cell that cannot be used.
+class BadCell(NamedTuple):
+    """Why a cell cannot be used, and what it holds."""
 
-    Attributes
-    ----------
-    cell
-        What it holds.
-    """
-
-    cell = ''
-
-    @property
-    def reason(self) -> str:
-        """Why it cannot be used."""
-        return str(self)
+    reason: str
+    cell: str
 
 
 Bad = dict[int, BadCell]
 """Cells that cannot be used, by their places."""
 
 
+def usable(count: int, bad: Bad) -> NDArray[np.bool_]:
+    """
+    Return whether each of so many cells can be used.
+    """
+    good = np.ones(count, np.bool_)
+    good[list(bad)] = False
+    return good
+
+
 def read_each(
-    read: Callable[[Any], float],
-    cells: Iterable[Any],
-    places: Iterable[int],
-    found: NDArray[Any],
-    bad: Bad,
+    read: Callable[[str], float], cells: Cells, some: NDArray[Any], found: NDArray[Any], bad: Bad
 ) -> None:
     """
     Read cells one by one.
@@ -81,20 +76,19 @@ def read_each(
     Parameters
     ----------
     read
-        Returns the value of a cell, or raises `BadCell`.
-    cells, places
-        Each cell and its place.
+        Returns the value of a cell, or raises `NoValue`.
+    cells, some : (n,)
+        Of a column, and which of them are to be read.
     found : (n,)
         Where the values go.
     bad
         Where the others go.
     """
-    for place, cell in zip(places, cells, strict=True):
+    for place, cell in zip(np.flatnonzero(some).tolist(), texts_of(cells[some]), strict=True):
         try:
             found[place] = read(cell)
-        except BadCell as error:
-            error.cell = str(cell)
-            bad.setdefault(place, error)
+        except NoValue as reason:
+            bad.setdefault(place, BadCell(str(reason), cell))
 
 
 @dataclass(frozen=True)
@@ -122,18 +116,18 @@ class CellReader:
 
         Raises
         ------
-        BadCell
+        NoValue
             If it holds no usable number.
         """
         if not cell:
-            raise BadCell('empty')
+            raise NoValue('empty')
         if self.comma and not self.side and '.' in cell:
-            raise BadCell('a point where others have a decimal comma')
+            raise NoValue('a point where others have a decimal comma')
         text = cell.replace(',', '.', 1) if self.comma else cell
         if self.side:
             return self._coordinate(text.strip().upper())
         if not NUMBER.fullmatch(text):
-            raise BadCell('not a number')
+            raise NoValue('not a number')
         return float(text)
 
     def all(self, cells: Cells, bad: Bad) -> Float64:
@@ -150,8 +144,7 @@ class CellReader:
         if are_numbers(cells):
             cells = written(cells) if self.minutes else cells.astype(np.float64)
         found = self._at_once(cells)
-        left = np.flatnonzero(np.isnan(found))
-        read_each(self.one, texts_of(cells[left]), left.tolist(), found, bad)
+        read_each(self.one, cells, np.isnan(found), found, bad)
         return found
 
     def _at_once(self, cells: Cells) -> Float64:
@@ -179,7 +172,7 @@ class CellReader:
                 value = 0.0 - value if found[1] == '-' else value
                 # a longitude counted from 0 to 360 is one too
                 return value - 360.0 if value > half else value
-        raise BadCell('no latitude and longitude')
+        raise NoValue('no latitude and longitude')
 
 
 def has_decimal_commas(cells: Iterable[str]) -> bool:
@@ -310,7 +303,7 @@ def order_of(texts: Iterable[str], table: LogTable) -> tuple[str, str]:
     order, known_by
         The order is '' where day and month are ambiguous.
     """
-    days = [day for text in texts if (day := parts(text)[0])]
+    days = [*dict.fromkeys(day for text in texts if (day := parts(text)[0]))]
     if not days:
         return '', 'times of day without a date'
     possible = [order for order in ORDERS if all(_fits(day, order) for day in days)]
@@ -354,11 +347,12 @@ def _numbers(day: str, order: str) -> tuple[int, int, int]:
         return int(found[1]), int(found[2]), int(found[3])
     found = _DAY.fullmatch(day)
     if found is None:
-        raise BadCell('no date')
+        raise NoValue('no date')
     named = dict(zip(order, (found[1], found[3], found[4]), strict=True))
     year = named['y']
-    if len(year) not in (2, 4) or len(named['d']) > 2 or (order == 'ymd' and len(year) != 4):
-        raise BadCell('no possible date')
+    short = len(named['m']) <= 2 and len(named['d']) <= 2
+    if not short or len(year) not in (2, 4) or (order == 'ymd' and len(year) != 4):
+        raise NoValue('no possible date')
     century = 2000 if len(year) == 2 else 0
     return century + int(year), int(named['m']), int(named['d'])
 
@@ -366,7 +360,7 @@ def _numbers(day: str, order: str) -> tuple[int, int, int]:
 def _fits(day: str, order: str) -> bool:
     try:
         datetime(*_numbers(day, order))
-    except (BadCell, ValueError):
+    except (NoValue, ValueError):
         return False
     return True
 
@@ -377,22 +371,18 @@ def _clock_ns(text: str) -> tuple[int, tzinfo | None]:
         return 0, None
     found = _CLOCK.fullmatch(text)
     if found is None:
-        raise BadCell('no time of day')
-    hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
-    if found[5] and 1 <= hour <= 12:
-        hour = hour % 12 + (12 if found[5].lower() == 'pm' else 0)
-    elif found[5]:
-        hour = 24  # half a day has no such hour
-    if hour > 23 or minute > 59 or second > 59:
-        raise BadCell('no time of day')
+        raise NoValue('no time of day')
+    hour, half = found[1], found[5]
+    if half and not 1 <= int(hour) <= 12:
+        raise NoValue('no time of day')  # half a day has no such hour
+    if half:
+        hour = str(int(hour) % 12 + (12 if half.lower() == 'pm' else 0))
     zone = zone_of(found[6] if found[6][0] in '+-' else 'UTC') if found[6] else None
-    fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
-    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns, zone
+    return of_day_ns(hour, found[2], found[3], found[4]), zone
 
 
 # a count of seconds below this, March 1973, is no date
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
-_DAY_NS = 86_400 * SECOND_NS
 _COUNTS_FROM = (('ns', 10**17), ('us', 10**14), ('ms', 10**11))  # since 1970, from 1973 on
 
 
@@ -433,16 +423,14 @@ class RowClock:
         found, exact = np.zeros(len(cells), np.int64), np.zeros(len(cells), np.bool_)
         if are_numbers(cells):
             found, exact = _counts_ns(cells, len(str(NANOSECONDS[self.unit])) - 1)
-        left = np.flatnonzero(~exact)
-        read_each(self._bounded_ns, texts_of(cells[left]), left.tolist(), found, bad)
-        good = np.ones(len(found), np.bool_)
-        good[list(bad)] = False
+        read_each(self._bounded_ns, cells, ~exact, found, bad)
+        good = usable(len(found), bad)
         if self.unit and not self._begun and good.any():
             self._begun = True
             self.base_ns = BASE_NS if found[good.argmax()] < _RELATIVE_BELOW_NS else None
         found += self.base_ns or 0
-        beyond = np.flatnonzero(good & ((found < 0) | (found >= LIMIT_NS)))
-        read_each(_impossible, texts_of(cells[beyond]), beyond.tolist(), found, bad)
+        beyond = good & ((found < 0) | (found >= LIMIT_NS))
+        read_each(_impossible, cells, beyond, found, bad)
         return found
 
     def _bounded_ns(self, cell: str) -> int:
@@ -451,7 +439,7 @@ class RowClock:
 
 
 def _impossible(cell: str) -> NoReturn:
-    raise BadCell('no possible date')
+    raise NoValue('no possible date')
 
 
 def row_clock(
@@ -520,7 +508,7 @@ def _counts(time: TimeColumn, texts: Sequence[str]) -> RowClock:
         return (number(cell) * NANOSECONDS[unit]).to_integral_value()
 
     for text in texts[: not unit]:
-        with suppress(BadCell):
+        with suppress(NoValue):
             size = abs(number(text))
             unit = next((each for each, least in _COUNTS_FROM if size >= least), '')
     if unit != time.unit:
@@ -552,12 +540,12 @@ class _Dates:
         Return the time of a cell [ns], of a time of day from the first midnight on.
         """
         if not cell:
-            raise BadCell('empty')
+            raise NoValue('empty')
         day, clock = parts(cell)
         clock_ns, zone = _clock_ns(clock)
         if not self._order:
             if day:
-                raise BadCell('a date where others have none')
+                raise NoValue('a date where others have none')
             return self._since_midnight(clock_ns)
         try:
             midnight = datetime(*_numbers(day, self._order), tzinfo=zone or self._zone)
@@ -569,12 +557,12 @@ class _Dates:
 
     def _since_midnight(self, of_day_ns: int) -> int:
         """Add the midnights passed: a time of day that goes back by hours is of the next day."""
-        if of_day_ns < self._last_of_day_ns - _DAY_NS // 2:
+        if of_day_ns < self._last_of_day_ns - DAY_NS // 2:
             self._midnights += 1
-        elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
+        elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * DAY_NS // 24:
             self._midnights -= 1  # a row from before the midnight behind one from after it
         self._last_of_day_ns = of_day_ns
-        return self._midnights * _DAY_NS + of_day_ns
+        return self._midnights * DAY_NS + of_day_ns
 
 
 def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.bool_]]:

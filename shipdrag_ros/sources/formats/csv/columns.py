@@ -16,26 +16,26 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import FURTHER, GEODETIC, PITCHES, SHAFTS, Channel, kind_of
 
 _KNOT, _KMH, _MPH = 1852.0 / 3600.0, 1.0 / 3.6, 0.44704
-_SPEED = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
-SPEED_UNITS: Mapping[str, float] = _SPEED
+SPEED_UNITS = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
 """Units of speed [m/s]."""
-_LENGTH = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
-_ANGLE = {'rad': 1.0, 'deg': pi / 180.0}
+LENGTH_UNITS = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
+"""Units of length [m]."""
+ANGLE_UNITS = {'rad': 1.0, 'deg': pi / 180.0}
+"""Units of angles [rad]."""
 _TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi, 'rps': 2.0 * pi}
-_PITCH = {'ratio': 1.0, '%': 0.01, **_ANGLE}
+_PITCH = {'ratio': 1.0, '%': 0.01, **ANGLE_UNITS}
 COMPASS = 'compass'
-_LATITUDE = {'deg': 1.0}  # as they are sent
 _UNITS: dict[Channel, Mapping[str, float]] = {
-    Channel.SPEED_THROUGH_WATER: _SPEED,
-    Channel.SPEED_OVER_GROUND: _SPEED,
-    Channel.POSITION: _LENGTH,
-    Channel.POSITION_GEODETIC: _LATITUDE,
-    Channel.HEADING: {**_ANGLE, COMPASS: pi / 180.0},
+    Channel.SPEED_THROUGH_WATER: SPEED_UNITS,
+    Channel.SPEED_OVER_GROUND: SPEED_UNITS,
+    Channel.POSITION: LENGTH_UNITS,
+    Channel.POSITION_GEODETIC: {'deg': 1.0},  # as they are sent
+    Channel.HEADING: {**ANGLE_UNITS, COMPASS: pi / 180.0},
     Channel.SHAFT: _TURN_RATE,
     Channel.PITCH: _PITCH,
-    Channel.RUDDER: _ANGLE,
-    Channel.WIND_APPARENT: {**_SPEED, **_ANGLE},
-    Channel.DEPTH: _LENGTH,
+    Channel.RUDDER: ANGLE_UNITS,
+    Channel.WIND_APPARENT: {**SPEED_UNITS, **ANGLE_UNITS},
+    Channel.DEPTH: LENGTH_UNITS,
 }
 _UNITS |= {each: _UNITS[each.kind] for each in Channel if each.input in FURTHER}
 _COUNTS = {
@@ -88,7 +88,7 @@ class InputColumns:
     @property
     def is_polar(self) -> bool:
         """Whether a wind is its speed, and where it comes from, clockwise from ahead."""
-        return [unit in _ANGLE for unit in self.units] == [False, True]
+        return [unit in ANGLE_UNITS for unit in self.units] == [False, True]
 
     def by_channel(self) -> Iterator[InputColumns]:
         """
@@ -187,8 +187,8 @@ def columns_of(name: str, columns: Sequence[str], stated: Sequence[str]) -> Inpu
     found = InputColumns(channel, tuple(columns), units, stated=bool(given))
     expected = ''
     if not known.keys() >= {*units}:
-        expected = f'in deg, or both in {", ".join(_LENGTH)}'
-    elif channel is Channel.WIND_APPARENT and _ANGLE.keys() & {*units} and not found.is_polar:
+        expected = f'in deg, or both in {", ".join(LENGTH_UNITS)}'
+    elif channel is Channel.WIND_APPARENT and ANGLE_UNITS.keys() & {*units} and not found.is_polar:
         expected = 'in a unit of speed, or the second in deg'
     if expected:
         text = f'{name}={",".join(columns)}'

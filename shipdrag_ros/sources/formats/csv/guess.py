@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC
-from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,14 +27,18 @@ from shipdrag_ros.sources.formats.csv.cells import (
     MIDNIGHT,
     Bad,
     CellReader,
+    RowClock,
     coordinate_readers,
     has_decimal_commas,
     is_date,
     parts,
     row_clock,
+    usable,
 )
 from shipdrag_ros.sources.formats.csv.columns import (
+    ANGLE_UNITS,
     COMPASS,
+    LENGTH_UNITS,
     NANOSECONDS,
     SPEED_UNITS,
     InputColumns,
@@ -118,7 +122,7 @@ def unit_of(values: Float64, track_m_s: Float64, stated: str = '') -> str:
 
 
 _SAMPLE_ROWS = 20_000
-_FEW_ROWS = 1000  # that show whether positions may be degrees
+_STYLE_ROWS = 2000  # of these, by which the way of writing is known
 
 
 @dataclass(frozen=True)
@@ -137,13 +141,11 @@ class NamedColumn:
 
 class FirstRows:
     """
-    The first rows of a table that has a header.
+    The first rows of a table.
 
     Parameters
     ----------
     table
-    most
-        How many.
 
     Attributes
     ----------
@@ -153,16 +155,19 @@ class FirstRows:
         Columns by what their names say they are, in their order.
     """
 
-    def __init__(self, table: LogTable, most: int = _SAMPLE_ROWS) -> None:
+    def __init__(self, table: LogTable) -> None:
         self.table = table
         self.header = table.header or ()
         self.roles: dict[str, list[NamedColumn]] = {}
-        self._rows = table.first_rows(most)
+        self._rows = table.first_rows(_SAMPLE_ROWS)
         for place, name in enumerate(self.header):
             role, unit = role_and_unit(*table.about(place))
             key = name if self.header.count(name) == 1 else str(place + 1)
             if role:
                 self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
+        self._style = self._rows[np.arange(len(self._rows)) < _STYLE_ROWS]
+        texts = (cells for cells in self._style.columns if not are_numbers(cells))
+        self._comma = has_decimal_commas(chain.from_iterable(texts))
 
     def texts(self, place: int) -> Cells:
         """
@@ -187,9 +192,18 @@ class FirstRows:
         """
         Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
         """
-        readers = coordinate_readers(*map(self.texts, places))
+        readers = coordinate_readers(*map(self._style.texts, places))
         cells = [self._rows.columns[place] for place in places]
         return [read.all(each, {}) for read, each in zip(readers, cells, strict=True)]
+
+    def readers(self, columns: InputColumns) -> list[CellReader]:
+        """
+        Return what reads the cells of each column, as they are written in the first rows.
+        """
+        places = self.table.columns(columns.names)
+        if columns.channel.kind is Channel.POSITION_GEODETIC:
+            return coordinate_readers(*map(self._style.texts, places))
+        return [CellReader(comma=self._comma)] * len(places)
 
     def may_be_degrees(self, places: Sequence[int]) -> bool:
         """
@@ -201,20 +215,26 @@ class FirstRows:
             for degrees, number in zip(self.coordinates(places), numbers, strict=True)
         )
 
+    def clock(self, time: TimeColumn | None, rate_hz: float | None = None) -> RowClock:
+        """
+        Return the clock of the table, see `row_clock`.
+        """
+        places = [] if time is None else self.table.columns(time.names)
+        return row_clock(time, rate_hz, self._style.joined(places), self.table)
+
     def seconds(self, time: TimeColumn | None) -> Float64 | None:
         """
         Return (n,) times of the rows from the first one [s], NaN where there is none.
         """
         if time is None:
             return None
-        cells = self._rows.joined([self.table.column(name) for name in time.names])
         bad: Bad = {}
+        cells = self._rows.joined(self.table.columns(time.names))
         try:
-            times = row_clock(time, None, cells, self.table).times(cells, bad)
+            times = self.clock(time).times(cells, bad)
         except ImportDataError:
             return None
-        good = np.ones(len(times), np.bool_)
-        good[list(bad)] = False
+        good = usable(len(times), bad)
         return np.where(good, (times - times[good][:1].sum()) * 1e-9, np.nan)
 
 
@@ -292,23 +312,15 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
 
 
 PLAIN_TIMES = ('time', 'time_s', 't', 't_s')
-PLAIN_COLUMNS = {
-    'speed_through_water': 'speed_through_water',
-    'speed_over_ground': 'speed_over_ground',
-    'heading': 'heading',
-    'shaft': 'shaft',
-    'rudder': 'rudder',
-    'depth': 'depth',
-    'x,y': 'position',
-    'latitude,longitude': 'position',
-    **{name: name for name, kind in FURTHER.items() if kind != 'position'},
-}
-"""Columns named as the inputs are, in SI units, and their input."""
+PLAIN_COLUMNS = (
+    *('speed_through_water', 'speed_over_ground', 'heading', 'shaft', 'rudder', 'depth'),
+    *('x,y', 'latitude,longitude'),
+    *(name for name, kind in FURTHER.items() if kind != 'position'),
+)
+"""Columns named as the inputs are, and those of a position, in SI units."""
 
 _TURN = 6.4  # no angle in rad is larger
 _NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
-_LENGTHS = frozenset(('m', 'km', 'ft', 'nmi'))
-_ANGLES = ('rad', 'deg')
 # inputs, and the likely units of their columns by the roles of these
 _USUAL: Sequence[tuple[str, Mapping[str, str]]] = (
     ('position', {'lat': 'deg', 'lon': 'deg'}),
@@ -381,6 +393,8 @@ class Guess:
         Columns to take.
     time
         Column of the time; None where rows are counted.
+    rows
+        The first rows of the table.
     notes
         How it is known, a sentence each.
     unclear
@@ -395,10 +409,11 @@ class Guess:
     def __init__(self, table: LogTable, options: Mapping[str, Any]) -> None:
         self.notes: list[str] = []
         self.unclear: list[str] = []
+        self.rows = FirstRows(table)
         self._table = table
         self._speed_unit: str = options.get('speed_unit', '')
         self._track: Float64 | None = None
-        self.inputs = [placed(table, parse_input(text)) for text in options.get('map', ())]
+        self.inputs = [placed(self.rows, parse_input(text)) for text in options.get('map', ())]
         given = Counter(each.name for each in self.inputs)
         for name, count in given.items():
             if count > 1:
@@ -413,15 +428,11 @@ class Guess:
             if table.header is None:
                 why = 'give --time COLUMN[:unit] or --rate HZ'
                 raise ImportDataError(f'the times of the rows: {why}')
-            time = guessed_time(self._rows, self.notes)
+            time = guessed_time(self.rows, self.notes)
         order, zone = options.get('date_order', ''), options.get('zone', UTC)
         self.time = None if time is None else replace(time, order=order, zone=zone)
         if not given:
             self._find()
-
-    @cached_property
-    def _rows(self) -> FirstRows:
-        return FirstRows(self._table)
 
     def _find(self) -> None:
         """Find the inputs by names and values."""
@@ -434,7 +445,7 @@ class Guess:
 
     def _all(self, roles: Iterable[str]) -> list[NamedColumn]:
         """Return the columns of some roles, none where one is missing."""
-        found = [self._rows.roles.get(role, []) for role in roles]
+        found = [self.rows.roles.get(role, []) for role in roles]
         for first, *others in filter(None, found):
             if others:
                 keys = ', '.join(repr(each.key) for each in others)
@@ -446,9 +457,9 @@ class Guess:
             self.unclear.append(text)
 
     def _is_plain(self) -> bool:
-        header = set(self._rows.header)
+        header = set(self.rows.header)
         known = {name for names in PLAIN_COLUMNS for name in names.split(',')}
-        named = {each.key for columns in self._rows.roles.values() for each in columns}
+        named = {each.key for columns in self.rows.roles.values() for each in columns}
         return (
             bool(header & set(PLAIN_TIMES))
             and bool(header & known - {'x', 'y'})
@@ -456,14 +467,14 @@ class Guess:
         )
 
     def _plain(self) -> None:
-        header = self._rows.header
-        for names, name in PLAIN_COLUMNS.items():
-            columns = names.split(',')
+        header = self.rows.header
+        for names in PLAIN_COLUMNS:
+            name, columns = 'position' if ',' in names else names, names.split(',')
             if not all(column in header for column in columns):
                 continue
             unit = 'deg' if names.startswith('latitude') else ''
             found = columns_of(name, columns, [unit] * len(columns))
-            largest = self._rows.largest(self._rows.table.column(columns[0]))
+            largest = self.rows.largest(self._table.column(columns[0]))
             if name in ('heading', 'rudder') and largest > _TURN:
                 raise self._table.error(
                     f': {name!r} goes to {largest:g}, which is no angle in rad; a column of this '
@@ -475,7 +486,7 @@ class Guess:
     # columns by their usual names
 
     def _by_names(self) -> None:
-        self._time_s = self._rows.seconds(self.time)
+        self._time_s = self.rows.seconds(self.time)
         units_of = {'position': self._position, 'heading': self._heading}
         settled: set[str] = set()
         for name, likely in _USUAL:
@@ -500,18 +511,18 @@ class Guess:
             if other := next((unit for unit in units if unit in _NO_COORDINATES), ''):
                 raise _Unclear(f'{wanted.keys}: coordinates in {other} are not read')
             if self._time_s is not None:
-                self._track = track_speed(self._time_s, *self._rows.coordinates(places))
+                self._track = track_speed(self._time_s, *self.rows.coordinates(places))
             return ['deg', 'deg']
-        if units[0] != units[1] or units[0] not in _LENGTHS:
+        if units[0] != units[1] or units[0] not in LENGTH_UNITS:
             raise wanted.unclear()
         if self._time_s is not None and units[0] == 'm':
-            self._track = plane_speed(self._time_s, *map(self._rows.values, places))
+            self._track = plane_speed(self._time_s, *map(self.rows.values, places))
         return [*units]
 
     def _speed(self, wanted: _Wanted) -> list[str]:
         """Of a speed of one column, or of two components."""
         columns = wanted.columns
-        parts = [self._rows.values(each.place) for each in columns]
+        parts = [self.rows.values(each.place) for each in columns]
         values = np.hypot(*parts) if parts[1:] else parts[0]
         said = {each.unit for each in columns if each.unit} or {self._speed_unit} - {''}
         if len(said) > 1 or not said <= SPEED_UNITS.keys():
@@ -559,22 +570,22 @@ class Guess:
     def _unit(self, column: NamedColumn, likely: str) -> str:
         """Return the unit that is stated, given, or shown by the values; '' for none."""
         if column.unit:
-            return '' if likely == 'deg' and column.unit not in _ANGLES else column.unit
+            return '' if likely == 'deg' and column.unit not in ANGLE_UNITS else column.unit
         if likely in SPEED_UNITS:
             return self._speed_unit
-        return 'deg' if likely == 'deg' and self._rows.largest(column.place) > _TURN else ''
+        return 'deg' if likely == 'deg' and self.rows.largest(column.place) > _TURN else ''
 
     def _nothing(self) -> ImportDataError:
         """Say that nothing that moves is known, and what to type."""
         why = '; '.join(self.unclear) or (
-            f'its columns are {", ".join(map(repr, self._rows.header))}, and none has a '
+            f'its columns are {", ".join(map(repr, self.rows.header))}, and none has a '
             'usual name of a speed or a position; say which it is, for instance --map '
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
         )
         return self._table.error(f' gives no speed and no position in a unit that is known: {why}')
 
 
-def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
+def placed(rows: FirstRows, mapped: InputColumns) -> InputColumns:
     """
     Return given columns, those of a position without a unit in the unit that its columns say.
 
@@ -585,8 +596,8 @@ def placed(table: LogTable, mapped: InputColumns) -> InputColumns:
     """
     if mapped.stated or mapped.channel.kind is not Channel.POSITION:
         return mapped
-    rows, places = FirstRows(table, _FEW_ROWS), [table.column(name) for name in mapped.names]
-    said = [role_and_unit(*table.about(place)) for place in places]
+    places = rows.table.columns(mapped.names)
+    said = [role_and_unit(*rows.table.about(place)) for place in places]
     roles, units = [role for role, _ in said], {unit for _, unit in said if unit}
     units = units or ({'deg'} if roles == ['lat', 'lon'] else set())
     text = f'{mapped.name}={",".join(mapped.names)}'

@@ -12,13 +12,13 @@ columns are listed and not used. With --map these columns alone are taken.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError
@@ -36,28 +36,24 @@ from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
     Bad,
     BadCell,
-    CellReader,
     combined,
-    coordinate_readers,
-    has_decimal_commas,
-    row_clock,
+    usable,
     zone_of,
 )
 from shipdrag_ros.sources.formats.csv.columns import (
     SPEED_UNITS,
-    InputColumns,
     parse_time,
     role_and_unit,
 )
 from shipdrag_ros.sources.formats.csv.guess import Guess
-from shipdrag_ros.sources.formats.csv.table import LogTable, TableRows, are_numbers
+from shipdrag_ros.sources.formats.csv.table import LogTable, TableRows
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     ImportResult,
     Log,
-    Refused,
+    Tally,
     Understood,
-    reject,
+    out_of_order,
     rejected_words,
 )
 
@@ -108,7 +104,6 @@ class TableResult(ImportResult):
 
 
 _FEW = 10
-_SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
 
 
@@ -147,7 +142,7 @@ def read_csv(
     }
     log.attachments[ATTACHMENT] = strict_yaml.dump(about)
     for rows in table.rows(progress):
-        log.write_samples(record.take(rows))
+        record.take(rows)
     return record.result(log)
 
 
@@ -157,86 +152,37 @@ class _RowSamples:
     def __init__(self, table: LogTable, found: Guess, options: Mapping[str, Any]) -> None:
         self._table, self._found = table, found
         channels = [each for mapped in found.inputs for each in mapped.by_channel()]
-        places = [[*map(table.column, each.names)] for each in channels]
-        time = () if found.time is None else found.time.names
-        self._time_places = [*map(table.column, time)]
+        places = [table.columns(each.names) for each in channels]
+        self._time_places = table.columns(() if found.time is None else found.time.names)
         self._where = [(table.column(name), text) for name, text in options.get('where', ())]
-        sample = table.first_rows(_SAMPLE_ROWS)
-        self._clock = row_clock(
-            found.time, options.get('rate'), sample.joined(self._time_places), table
-        )
-        self._inputs = [*zip(channels, places, _readers(channels, places, sample), strict=True)]
-        self._too_fast: Counter[Channel] = Counter()
-        self._rows = self._left_out = self._backward = self._repeated = 0
-        self._first_ns: int | None = None
-        self._newest_ns = self._arrived_ns = -1
-        self._set_back_ns = 0  # by which a clock was set back so far
-        self._written: Counter[str] = Counter()
-        self._rejected: Refused = {}
+        self._clock = found.rows.clock(found.time, options.get('rate'))
+        self._inputs = [*zip(channels, places, map(found.rows.readers, channels), strict=True)]
+        self._left_out = 0
+        self._tally = Tally()
         self._seen: dict[str, None] = {}  # a set that keeps the order
+        # times (n,), values (n, m, 2) and whether one is known (n, m), of rows some at a time
+        nothing = np.empty(0, np.int64), np.zeros((0, len(channels), 2))
+        self._read = [(*nothing, np.ones((0, len(channels)), np.bool_))]
 
-    def take(self, rows: TableRows) -> Block:
-        """Return the samples of some rows, a row after the other."""
+    def take(self, rows: TableRows) -> None:
+        """Read some rows."""
         times, rows = self._timed(self._chosen(rows))
         n, m = len(rows), len(self._inputs)
-        if not n:
-            return Block.empty()
-        if self._first_ns is None:
-            self._first_ns = int(times[0])
-        before = np.maximum.accumulate(np.r_[self._newest_ns, times])
-        self._backward += int(np.sum(times < before[:-1]))
-        self._repeated += int(np.sum(times == before[:-1]))
-        self._newest_ns = int(before[-1])
-        arrived = self._arrived(times)
         value, known = np.zeros((n, m, 2)), np.ones((n, m), np.bool_)
         for k, (columns, places, readers) in enumerate(self._inputs):
             bad: Bad = {}
-            values = [
-                read.all(rows.columns[place], bad) * factor
-                for read, place, factor in zip(readers, places, columns.factors, strict=True)
-            ]
-            self._reject(columns.channel.input, rows, bad)
-            known[list(bad), k] = False
+            with np.errstate(over='ignore'):  # what is beyond any number is judged as infinite
+                values = [
+                    read.all(rows.columns[place], bad) * factor
+                    for read, place, factor in zip(readers, places, columns.factors, strict=True)
+                ]
+            known[:, k] = self._usable(columns.channel.input, rows, bad)
             value[:, k, 0], value[:, k, 1] = combined(columns, values)
-            if columns.channel.kind in _SPEEDS:
-                fast = np.abs(value[known[:, k], k, 0]) > ABSURD_SPEED_M_S
-                self._too_fast[columns.channel] += int(np.sum(fast))
-            self._written[columns.channel.input] += n - len(bad)
-        row, which = np.nonzero(known)
-        channel = np.array([columns.channel for columns, _, _ in self._inputs], np.uint8)
-        return Block(
-            channel[which],
-            times[row],
-            arrived[row],
-            value[row, which],
-            np.full((len(row), 2), np.nan),
-        )
-
-    def _arrived(self, times: Int64) -> Int64:
-        """
-        Return arrivals that never go back, so that a replay sees the rows in their order.
-
-        Where a clock was set back they go on with it: what follows has a time in the record.
-        """
-        first = 0
-        arrived: Int64 = np.empty(0, np.int64)
-        while True:
-            clock = times[first:] + self._set_back_ns
-            later: Int64 = np.maximum.accumulate(np.r_[self._arrived_ns, clock])[1:]
-            behind = clock < later - BACKWARD_JUMP_NS
-            behind &= np.diff(clock, prepend=clock[0]) > 0
-            agree = np.flatnonzero(np.convolve(behind, np.ones(SET_BACK), 'valid') == SET_BACK)
-            at = int(agree[0]) - 1 if len(agree) else len(clock)
-            arrived = np.r_[arrived, later[:at]]
-            self._arrived_ns = int(arrived[-1]) if len(arrived) else self._arrived_ns
-            if at == len(clock):
-                return arrived
-            first += at
-            self._set_back_ns = self._arrived_ns - int(times[first])
+        self._read.append((times, value, known))
 
     def _chosen(self, rows: TableRows) -> TableRows:
         """Leave out rows without the texts that were asked for."""
-        self._rows += len(rows)
+        self._tally.records += len(rows)
         for place, text in self._where:
             cells = rows.texts(place)
             kept = np.array([cell == text for cell in cells], np.bool_)
@@ -255,33 +201,52 @@ class _RowSamples:
         bad: Bad = {}
         times = self._clock.times(cells, bad)
         for place in np.flatnonzero(~fits).tolist():
-            bad[place] = BadCell(f'more than {len(rows.columns)} columns')
-            bad[place].cell = rows.beyond[rows.lines[place]]
-        self._reject('time', rows, bad)
-        fits[list(bad)] = False
-        return times[fits], rows[fits]
+            beyond = rows.beyond[rows.lines[place]]
+            bad[place] = BadCell(f'more than {len(rows.columns)} columns', beyond)
+        good = self._usable('time', rows, bad)
+        return times[good], rows[good]
+
+    def _usable(self, name: str, rows: TableRows, bad: Bad) -> NDArray[np.bool_]:
+        """Count the cells that cannot be used; return (n,) whether one can."""
+        for place, why in sorted(bad.items()):
+            self._tally.reject(name, why.reason, why.cell, rows.lines[place])
+        return usable(len(rows), bad)
 
     def result(self, log: Log) -> TableResult:
-        """Sum up; ImportDataError if there is nothing."""
-        table = self._table
-        if self._first_ns is None or not +self._written:
-            raise table.error(f' gave no sample from {self._rows} row(s); {self._why_not()}')
+        """Write the samples into a log and sum up; ImportDataError if there are none."""
+        table, tally = self._table, self._tally
+        times, value, known = map(np.concatenate, zip(*self._read, strict=True))
+        if not known.any():
+            raise table.error(f' gave no sample from {tally.records} row(s); {self._why_not()}')
+        row, which = np.nonzero(known)
+        channel = np.array([columns.channel for columns, _, _ in self._inputs], np.uint8)
+        unknown = np.full((len(row), 2), np.nan)
+        arrived = _arrived(times)[row]
+        log.take(Block(channel[which], times[row], arrived, value[row, which], unknown))
+        written: Counter[str] = Counter()
+        too_fast: dict[Channel, int] = {}
+        for k, (columns, _, _) in enumerate(self._inputs):
+            written[columns.channel.input] += int(np.sum(known[:, k]))
+            if columns.channel.kind in _SPEEDS:
+                fast = known[:, k] & (np.abs(value[:, k, 0]) > ABSURD_SPEED_M_S)
+                too_fast[columns.channel] = int(np.sum(fast))
+        backward, repeated = out_of_order(times)
         used = {place for _, places, _ in self._inputs for place in places}
         used.update(self._time_places)
         return TableResult(
-            rows=self._rows,
+            rows=tally.records,
             left_out=self._left_out,
-            written=dict(+self._written),
-            rejected=self._rejected,
-            start_ns=self._first_ns,
-            end_ns=self._newest_ns,
+            written=dict(+written),
+            rejected=tally.rejected,
+            start_ns=int(times[0]),
+            end_ns=int(times.max()),
             base_ns=self._clock.base_ns,
-            backward=self._backward,
-            repeated=self._repeated,
+            backward=backward,
+            repeated=repeated,
             delimiter=table.delimiter,
             header=table.header is not None,
             understood=self._understood(log),
-            notes=tuple(self._notes()),
+            notes=tuple(self._notes(written, too_fast)),
             not_used=tuple(
                 name for place, name in enumerate(table.header or ()) if place not in used
             ),
@@ -300,7 +265,7 @@ class _RowSamples:
             if columns.channel in log.first
         )
 
-    def _notes(self) -> Iterator[str]:
+    def _notes(self, written: Mapping[str, int], too_fast: Mapping[Channel, int]) -> Iterator[str]:
         yield from self._found.notes
         if self._table.titles:
             yield f'{len(self._table.titles)} line(s) above the table were left out.'
@@ -310,17 +275,19 @@ class _RowSamples:
                 'marks; a mark that is not closed does that.'
             )
         yield from self._clock.notes
-        for channel, count in (+self._too_fast).items():
-            yield (
-                f'{channel.input}: {count} of {self._written[channel.input]} values are above '
-                f'{ABSURD_SPEED_M_S:g} m/s, faster than any displacement ship; is the unit right?'
-            )
+        for channel, count in too_fast.items():
+            if count:
+                yield (
+                    f'{channel.input}: {count} of {written[channel.input]} values are above '
+                    f'{ABSURD_SPEED_M_S:g} m/s, faster than any displacement ship; is the unit '
+                    'right?'
+                )
         yield from (f'Not used: {each}' for each in self._found.unclear)
 
     def _why_not(self) -> str:
-        if self._left_out == self._rows and self._seen:
+        if self._left_out == self._tally.records and self._seen:
             return f'--where chooses none of them: the column holds {", ".join(self._seen)}'
-        reasons = rejected_words(self._rejected)
+        reasons = rejected_words(self._tally.rejected)
         if not reasons:
             return 'give a table with a line a sample'
         return (
@@ -328,23 +295,31 @@ class _RowSamples:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, rows: TableRows, bad: Bad) -> None:
-        for place, why in sorted(bad.items()):
-            reject(self._rejected, name, why.reason, rows.lines[place], why.cell)
 
+def _arrived(times: Int64) -> Int64:
+    """
+    Return arrivals (n,) that never go back, so that a replay sees the rows in their order.
 
-def _readers(
-    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: TableRows
-) -> list[list[CellReader]]:
-    """Return what reads the cells of each column, as they are written in the first rows."""
-    texts = (cells for cells in sample.columns if not are_numbers(cells))
-    comma = has_decimal_commas(chain.from_iterable(texts))
-    return [
-        coordinate_readers(*map(sample.texts, here))
-        if columns.channel.kind is Channel.POSITION_GEODETIC
-        else [CellReader(comma=comma)] * len(here)
-        for columns, here in zip(inputs, places, strict=True)
-    ]
+    Where a clock was set back they go on with it: what follows has a time in the record.
+    """
+    arrived: Int64 = np.maximum.accumulate(times)
+    if not np.any(times < arrived - BACKWARD_JUMP_NS):
+        return arrived
+    newest_ns = last_ns = int(times[0])
+    set_back_ns = behind = 0
+    for place, time_ns in enumerate(times.tolist()):
+        clock_ns = time_ns + set_back_ns
+        goes_on = last_ns < time_ns and clock_ns < newest_ns - BACKWARD_JUMP_NS
+        behind, last_ns = behind + 1 if goes_on else 0, time_ns
+        newest_ns = max(newest_ns, clock_ns)
+        arrived[place] = newest_ns
+        if behind == SET_BACK:  # the clock was set before the first of these
+            since = slice(place - SET_BACK, place + 1)
+            before_ns = int(arrived[place - SET_BACK - 1])
+            set_back_ns = before_ns - int(times[since][0])
+            arrived[since] = times[since] + set_back_ns
+            newest_ns, behind = int(arrived[place]), 0
+    return arrived
 
 
 def _score(head: Head) -> float:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import gzip
 import re
@@ -11,11 +10,10 @@ import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import BufferedReader, TextIOWrapper
 from itertools import islice, zip_longest
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +23,7 @@ from shipdrag_ros.errors import DataError, ImportDataError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.sources.formats.csv.columns import OTHER_UNITS, UNITS, role_and_unit
-from shipdrag_ros.sources.opened import check_unpacked, opened
+from shipdrag_ros.sources.opened import lines_of
 
 DELIMITERS = ',;\t|'
 BLANKS = ' '
@@ -176,12 +174,11 @@ class LogTable:
         blank = DELIMITERS + ' \r\n'
         found = []
         try:
-            with opened(self.path) as (raw, file), _decoded(file) as text:
-                for number, line in enumerate(self._lines(raw, text), start=1):
-                    if line.strip(blank).strip():
-                        found.append((number, line))
-                    if len(found) >= _SAMPLE_LINES or number > 10_000:
-                        break
+            for number, line in enumerate(self._lines(), start=1):
+                if line.strip(blank).strip():
+                    found.append((number, line))
+                if len(found) >= _SAMPLE_LINES or number > 10_000:
+                    break
         except OSError as error:
             why = error.strerror or error
             raise self.error(f' cannot be read: {why}; give a CSV file') from error
@@ -235,6 +232,12 @@ class LogTable:
             hint = 'and no comma, semicolon or tab that would separate columns'
         raise self.error(f' has no column {name!r}; it has {listed}, {hint}')
 
+    def columns(self, names: Iterable[str]) -> list[int]:
+        """
+        Return the places of columns given by names or numbers.
+        """
+        return [self.column(name) for name in names]
+
     def about(self, place: int) -> tuple[str, str]:
         """
         Return the name of a column and the unit in the line below it; '' where none is there.
@@ -253,16 +256,12 @@ class LogTable:
         most
             Rows at a time.
         """
-        total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)
         self.joined_lines = 0
-        with opened(self.path) as (raw, file), _decoded(file) as text:
-            lines = islice(self._lines(raw, text), self._skip, None)
-            rows = islice(self._rows(lines, self.delimiter, self._skip), above, None)
-            while some := list(islice(rows, most)):
-                if progress is not None:
-                    progress(raw.tell(), total)
-                yield self._by_column(some)
+        lines = islice(self._lines(progress), self._skip, None)
+        rows = islice(self._rows(lines, self.delimiter, self._skip), above, None)
+        while some := list(islice(rows, most)):
+            yield self._by_column(some)
 
     def first_rows(self, most: int) -> TableRows:
         """
@@ -302,32 +301,20 @@ class LogTable:
             number = above + reader.line_num
             raise self.error(f' line {number} is no row of a table: {error}') from error
 
-    def _lines(self, raw: IO[bytes], text: TextIOWrapper) -> Iterator[str]:
-        """Yield lines of a sane length, of a packed file that unpacks to a sane size."""
-        number, size, how_far = 0, 0, ''
+    def _lines(self, progress: PartDone | None = None) -> Iterator[str]:
+        """Yield lines of a sane length."""
+        number = 0
         try:
-            file = cast(BufferedReader, text.buffer)
-            if file.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-                raise self.error(' is in UTF-16; save it as UTF-8')
-            how_far = ' after line {}'
-            while line := text.readline(_LINE):
+            # a name that is not UTF-8 may still be given by its number
+            for line in lines_of(self.path, _LINE, newline='', progress=progress):
                 number += 1
-                size += len(line)
                 if len(line) == _LINE:
                     why = f'it is longer than {_LINE} characters'
                     raise self.error(f' line {number} is no row of a table: {why}')
-                if file is not raw:
-                    check_unpacked(self.path, size, raw.tell())
                 yield line
         except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            where = how_far.format(number)
+            where = f' after line {number}' if number else ''
             raise self.error(f' cannot be unpacked{where}: {error}') from error
-
-
-def _decoded(file: IO[bytes]) -> TextIOWrapper:
-    # a name that is not UTF-8 may still be given by its number
-    reader = cast(BufferedReader, file)
-    return TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='')
 
 
 def _first_row(rows: Sequence[Sequence[str]]) -> int | None:
@@ -387,9 +374,6 @@ class Numbers:
 
     names: tuple[str, ...]
     values: Float64
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.names
 
     def column(self, name: str) -> Float64:
         """

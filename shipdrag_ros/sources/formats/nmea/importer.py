@@ -17,7 +17,8 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, date
-from fractions import Fraction
+from decimal import Decimal
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar
 
@@ -31,32 +32,30 @@ from shipdrag_ros.nmea.sentences import (
     READERS,
     START,
     TIMED,
+    USED,
     SentenceReader,
     checksum_of,
-    days_of,
 )
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import SECOND_NS, Channel
+from shipdrag_ros.samples import INPUTS, SECOND_NS, Channel
 from shipdrag_ros.sources import format
 from shipdrag_ros.sources.formats.nmea.record import (
     ROLLOVER_DAYS,
     SentenceClock,
     TakenSentences,
-    rollover_days,
 )
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
     ImportResult,
     Log,
-    Rejected,
+    Tally,
     iso_ns,
     most_of,
     rejected_words,
 )
 from shipdrag_ros.sources.opened import BROKEN, Lines, opened
 
-_UTF_16 = (b'\xff\xfe', b'\xfe\xff')
 _UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below
 # every byte is a character, so that checksums are those of the bytes
 _ENCODING = 'latin-1'
@@ -64,7 +63,7 @@ _LONGEST = 4096  # a sentence has 82 characters; some with a prefix have more
 _TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
 _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
-_EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
+_EPOCH = re.compile(r'\[?((?:\d{9,10}|\d{13})(?:\.\d+)?)\]?[\s,;:]*')
 _DATED = re.compile(r'(?:\w{1,40}\s+)?\[?(\d{4}-[^\]]{1,60}?)\]?[\s,;:]*')
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
 
@@ -86,13 +85,13 @@ class NmeaLog:
     ----------
     lines
         All that stands in it, from its last reading.
-    rejected
-        Lines without a sentence by reason.
+    tally
+        Of lines without a sentence, and of sentences without a value.
     """
 
     def __init__(self, path: Path, progress: PartDone | None = None) -> None:
         self.lines = Lines(path, encoding=_ENCODING, longest=_LONGEST, progress=progress)
-        self.rejected: dict[str, Rejected] = {}
+        self.tally = Tally()
 
     def texts(self) -> Iterator[tuple[int, str, int | None]]:
         """
@@ -105,42 +104,31 @@ class NmeaLog:
             elif line:
                 yield from self._of_line(lines.number, line.removeprefix(_UTF_8_MARK))
         for number in lines.too_long:
-            self.reject(f'longer than {_LONGEST} characters', number, '')
+            self.tally.reject('line', f'longer than {_LONGEST} characters', '', number)
 
     def lines_of(self, places: Collection[int]) -> dict[int, tuple[int, str]]:
         """
         Return line and text of what stands at some places among the texts.
         """
-        left, found = set(places), {}
-        texts = NmeaLog(self.lines.path).texts() if left else iter(())
-        for place, (line, text, _) in enumerate(texts):
-            if place in left:
-                found[place] = line, text
-                left.remove(place)
-                if not left:
-                    break
-        return found
+        texts = islice(NmeaLog(self.lines.path).texts(), max(places, default=-1) + 1)
+        return {
+            place: (line, text) for place, (line, text, _) in enumerate(texts) if place in places
+        }
 
     def _of_line(self, number: int, line: str) -> Iterator[tuple[int, str, int | None]]:
         # a lost line end leaves two sentences in a line
         prefix, *texts = START.split(line)
         if not texts:
-            self.reject('no sentence', number, line)
+            self.tally.reject('line', 'no sentence', line, number)
             return
         prefix = prefix.strip()
         try:
             receive_ns = _receive_ns(prefix) if prefix else None
         except ValueError as error:
-            self.reject(str(error), number, prefix)
+            self.tally.reject('line', str(error), prefix, number)
             receive_ns = None
         for text in texts:
             yield number, text.strip(), receive_ns
-
-    def reject(self, reason: str, number: int, text: str) -> None:
-        """
-        Count what is no sentence.
-        """
-        self.rejected.setdefault(reason, Rejected()).add(number, text)
 
 
 def _receive_ns(prefix: str) -> int | None:
@@ -152,9 +140,9 @@ def _receive_ns(prefix: str) -> int | None:
         times = [found for content, _ in tags if (found := _TAG_TIME.search(content))]
         if not times:
             return None
-        receive_ns = _counted_ns(times[0][1], '')
+        receive_ns = _counted_ns(times[0][1])
     elif epoch := _EPOCH.fullmatch(prefix):
-        receive_ns = _counted_ns(epoch[1], epoch[2] or '')
+        receive_ns = _counted_ns(epoch[1])
     else:
         dated = _DATED.fullmatch(prefix)
         time_ns = None if dated is None else iso_ns(dated[1], UTC)
@@ -166,11 +154,9 @@ def _receive_ns(prefix: str) -> int | None:
     return receive_ns
 
 
-def _counted_ns(digits: str, fraction: str) -> int:
-    count = int(digits)
-    unit_ns = 1_000_000 if count >= _MILLISECONDS_FROM else SECOND_NS
-    part_ns = round(Fraction(f'0{fraction}') * unit_ns) if fraction else 0
-    return count * unit_ns + part_ns
+def _counted_ns(text: str) -> int:
+    count = Decimal(text)
+    return round(count * (1_000_000 if count >= _MILLISECONDS_FROM else SECOND_NS))
 
 
 LOG_ATTACHMENT = 'log.nmea'
@@ -282,29 +268,30 @@ def read_nmea(job: format.Job, log: Log) -> NmeaResult:
     different place or scale are never mixed.
     """
     source, head = job.source, format.head_of(job.source)
-    if head.raw.startswith(_UTF_16):
-        raise ImportDataError(f'{str(source)!r} is in UTF-16; save it as UTF-8')
     day, transducer_m = job.options.get('date'), job.options.get('transducer')
     bare = job.options.get('no_checksum')
     if bare is None:
         bare = _without_checksums(head)
     text = NmeaLog(source, job.progress)
     reader = SentenceReader(transducer_m, checksum=not bare)
-    taken = TakenSentences()
+    clock = SentenceClock(day)
+    taken = TakenSentences(clock, text.tally)
     for place, (line, each, receive_ns) in enumerate(text.texts()):
         sentence = reader.read(each)
         if isinstance(sentence, str):
-            text.reject(sentence, line, each)
+            text.tally.reject('line', sentence, each, line)
         else:
             taken.take(place, line, each, sentence, receive_ns)
-    clock = _clock(text, taken, day)
+    _refuse_undated(text, taken, clock, day)
     whole = _whole(source)
     if whole is not None:
         log.attachments[LOG_ATTACHMENT] = whole
-    block = taken.samples(clock)
-    rejected = taken.rejected(text.lines_of)
-    if text.rejected:
-        rejected['line'] = text.rejected
+    block = taken.samples(text.lines_of)
+    rejected = {
+        name: text.tally.rejected[name]
+        for name in (*INPUTS, 'time', 'line')
+        if name in text.tally.rejected
+    }
     if not len(block):
         why = '; '.join(rejected_words(rejected)) or f'give a log with any of {", ".join(READERS)}'
         raise ImportDataError(
@@ -320,8 +307,8 @@ def read_nmea(job: format.Job, log: Log) -> NmeaResult:
         unknown_talkers=dict(unknown),
         dates_put_right=clock.dates_put_right,
         magnetic_heading=heading is not None and heading.detail == MAGNETIC,
-        shift_days=clock.shift_days,
-        days_early=_days_early(taken),
+        shift_days=clock.shift_days or 0,
+        days_early=_days_early(clock),
         log_attached=whole is not None,
         damage=text.lines.damage,
         checksums=not bare,
@@ -343,33 +330,33 @@ def _whole(path: Path) -> str | None:
             return None
 
 
-def _clock(log: NmeaLog, taken: TakenSentences, day: date | None) -> SentenceClock:
-    """Return the clock at the start of the log; ImportDataError where nothing states it."""
-    name, first = repr(str(log.lines.path)), taken.first
+def _refuse_undated(
+    log: NmeaLog, taken: TakenSentences, clock: SentenceClock, day: date | None
+) -> None:
+    """Refuse a log of which nothing states the date, or another than is given."""
+    name, first = repr(str(log.lines.path)), clock.first
     if not taken.count:
+        of_lines = log.tally.rejected.get('line', {})
         reasons = ', '.join(
             f'{reason} {rejected.count} times, {rejected.first[0]}'
-            for reason, rejected in log.rejected.items()
+            for reason, rejected in of_lines.items()
         )
-        bare = 'without checksum' in log.rejected
+        bare = 'without checksum' in of_lines
         hint = '; for sentences without give --no-checksum' if bare else ''
         raise ImportDataError(
             f'{name} holds no sentence of NMEA 0183 in {log.lines.number} line(s): '
             f'{reasons or "all are blank"}{hint}; for a table give --map and --time'
         )
-    if first is not None and first.day is not None:
-        shift_days = 0 if day is None else rollover_days(first.day, day)
-        if shift_days is None:
-            own = date.fromordinal(date(1970, 1, 1).toordinal() + first.day)
-            raise ImportDataError(
-                f'--date {day}: {name} begins on {own}, which is no whole number of '
-                '1024 weeks away; leave --date out'
-            )
-        return SentenceClock((first.day + shift_days) * DAY_NS + first.of_day_ns, shift_days)
-    if day is not None:
-        return SentenceClock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
-    if taken.received:
-        return SentenceClock(None)
+    if first is not None and first.day is not None and clock.shift_days is None:
+        own = date.fromordinal(date(1970, 1, 1).toordinal() + first.day)
+        raise ImportDataError(
+            f'--date {day}: {name} begins on {own}, which is no whole number of '
+            '1024 weeks away; leave --date out'
+        )
+    if clock.start_ns is not None and not 0 <= clock.start_ns < LIMIT_NS:
+        raise ImportDataError(f'--date {day}: no possible date; messages have dates to 2038')
+    if clock.start_ns is not None or taken.received:
+        return
     if taken.timed:
         raise ImportDataError(
             f'{name} has times of day, but no date (no RMC or ZDA with a fix and a date); '
@@ -381,9 +368,9 @@ def _clock(log: NmeaLog, taken: TakenSentences, day: date | None) -> SentenceClo
     )
 
 
-def _days_early(taken: TakenSentences) -> int:
+def _days_early(clock: SentenceClock) -> int:
     """Return the days that the receiver is before the receipt where these are whole cycles."""
-    first, received_ns = taken.first, taken.first_received_ns
+    first, received_ns = clock.first, clock.first_received_ns
     if first is None or first.day is None or received_ns is None:
         return 0
     days = round(received_ns / DAY_NS) - first.day
@@ -396,7 +383,7 @@ def _of_no_use(taken: TakenSentences) -> tuple[Counter[str], Counter[str]]:
     not_used: Counter[str] = Counter()
     unknown: Counter[str] = Counter()
     for (talker, kind), count in taken.addresses.items():
-        if kind not in READERS and kind not in TIMED and talker not in READERS:
+        if (kind or talker) not in USED:
             not_used[talker + kind] += count
         if kind and talker not in NMEA_TALKERS:
             unknown[talker] += count

@@ -2,9 +2,10 @@
 """
 Sentences of NMEA 0183 to samples with a time, in their order.
 
-One pass takes what the sentences hold; then it is known who sends what, and on which
-day. A sample whose sentence states no time has that of the last one that did; where an
-input speaks several times before the next, its samples are spread evenly until then.
+One pass takes what the sentences hold, their times counted from the first midnight;
+then it is known who sends what, and which day that was. A sample whose sentence states
+no time has that of the last one that did; where an input speaks several times before
+the next, its samples are spread evenly until then.
 """
 
 from __future__ import annotations
@@ -22,12 +23,11 @@ from shipdrag_ros.nmea.sentences import (
     DAY_NS,
     NoValue,
     Sentence,
-    SentenceSource,
     SentenceTime,
     days_of,
 )
-from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
-from shipdrag_ros.sources.log import Refused, Rejected
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Int64, UInt8
+from shipdrag_ros.sources.log import LIMIT_NS, Tally
 from shipdrag_ros.sources.stream import SourcedValues
 
 GAP_NS = 10 * SECOND_NS
@@ -50,79 +50,89 @@ def rollover_days(day: int, true: date) -> int | None:
 
 class SentenceClock:
     """
-    Follows the time through a log.
+    Follows the time through a log, whose days count from that of its first time.
 
     Parameters
     ----------
-    near_ns
-        A time at most half a day from the first one [ns since the epoch]; None
-        if nothing states it but the receipt of the lines.
-    shift_days
-        Added to every date of the log.
+    given
+        Date of the first time, where it is given.
 
     Attributes
     ----------
+    first, first_received_ns
+        The first time with a date that its source calls valid, and when it was received.
     shift_days
-        As given.
+        To be added to every date of the log, whole cycles of the GPS week; None where the
+        date that is given is no such number of days away.
     dates_put_right
         Number of times whose date was a day off at midnight.
     now_ns
-        The present time [ns since the epoch]; None before the first.
+        The present time [ns]; None before the first.
+    start_ns
+        When the days of the log began [ns since the epoch]; None while nothing states it.
     """
 
-    def __init__(self, near_ns: int | None, shift_days: int = 0) -> None:
-        self._near_ns = near_ns
-        self.shift_days = shift_days
+    def __init__(self, given: date | None) -> None:
+        self.first: SentenceTime | None = None
+        self.first_received_ns: int | None = None
+        self.shift_days: int | None = 0
         self.dates_put_right = 0
         self.now_ns: int | None = None
+        self.start_ns = None if given is None else days_of(given) * DAY_NS
+        self._given = given
 
     def resolve(self, moment: SentenceTime, receive_ns: int | None) -> int:
         """
-        Return the time of a sentence [ns since the epoch].
-
-        One without a date has that nearest to the last time, or to that of
-        its receipt before the first.
+        Return the time of a sentence [ns]; one without a date has that nearest to the last.
 
         Raises
         ------
         NoValue
-            If nothing states the date, or a time without a fix does not go on
-            from the last one.
+            If a time without a fix does not go on from the last one.
         """
-        if moment.day is None:
-            time_ns = self._nearest(moment.of_day_ns, receive_ns)
-        else:
-            time_ns = (moment.day + self.shift_days) * DAY_NS + moment.of_day_ns
-            if self.now_ns is not None and abs(abs(time_ns - self.now_ns) - DAY_NS) < GAP_NS:
+        now_ns, of_day_ns, day = self.now_ns, moment.of_day_ns, moment.day
+        days = 0 if now_ns is None else round((now_ns - of_day_ns) / DAY_NS)
+        time_ns = near_ns = days * DAY_NS + of_day_ns
+        if self.first is None and day is not None and moment.trusted:
+            self.first, self.first_received_ns = moment, receive_ns
+            if self._given is not None:
+                self.shift_days = rollover_days(day, self._given)
+            self.start_ns = (day + (self.shift_days or 0) - days) * DAY_NS
+        elif self.first is not None and self.start_ns is not None and day is not None:
+            time_ns = (day + (self.shift_days or 0)) * DAY_NS + of_day_ns - self.start_ns
+            if now_ns is not None and abs(abs(time_ns - now_ns) - DAY_NS) < GAP_NS:
                 # some receivers change the date a sentence too late or too early
-                time_ns = self._nearest(moment.of_day_ns, receive_ns)
+                time_ns = near_ns
                 self.dates_put_right += 1
-        if not moment.trusted and (
-            self.now_ns is None or not 0 <= time_ns - self.now_ns <= GAP_NS
-        ):
+        if not moment.trusted and (now_ns is None or not 0 <= time_ns - now_ns <= GAP_NS):
             # before its first fix a receiver shows any date
             raise NoValue('without a fix, and not going on from the last')
+        # a little earlier: sentences of one fix, or of two receivers, out of order
+        if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:
+            self.now_ns = time_ns
+        if self.start_ns is None and receive_ns is not None:
+            self.start_ns = round((receive_ns - time_ns) / DAY_NS) * DAY_NS
         return time_ns
-
-    def _nearest(self, of_day_ns: int, receive_ns: int | None) -> int:
-        known = (self.now_ns, self._near_ns, receive_ns)
-        near_ns = next((time_ns for time_ns in known if time_ns is not None), None)
-        if near_ns is None:
-            raise NoValue('no date')
-        day = round((near_ns - of_day_ns) / DAY_NS)
-        return day * DAY_NS + of_day_ns
 
 
 TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]
 
-_NONE = -1  # no time of receipt, no date
+_NONE = -1  # no time of receipt
 _GAP, _BEFORE = 'in a gap of the time', 'before the first time'
+_BEYOND = 'no possible date'
 _SHOWN = 3  # rejected sentences of a reason whose text is shown
 
 
 class TakenSentences:
     """
     What the sentences of a log hold.
+
+    Parameters
+    ----------
+    clock
+        At the start of the log. What it cannot tell the time of is rejected.
+    tally
+        Where to.
 
     Attributes
     ----------
@@ -132,23 +142,19 @@ class TakenSentences:
         Number of sentences by talker and kind.
     received
         Whether any has a time of receipt.
-    first, first_received_ns
-        The first time with a date that its source calls valid, and when it was received.
+    timed
+        Whether any states a time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: SentenceClock, tally: Tally) -> None:
         self.addresses: Counter[tuple[str, str]] = Counter()
-        self.received = False
-        self.first: SentenceTime | None = None
-        self.first_received_ns: int | None = None
-        self.values: SourcedValues[SentenceSource] = SourcedValues()
+        self.received = self.timed = False
+        self.values = SourcedValues()
+        self._clock = clock
+        self._tally = tally
         self._received = array('q')  # of the values
-        self._reasons: dict[tuple[str, str], int] = {}
-        self._times = array('q')  # six of each sentence that states one, or should
-        self._rejected = array('q'), array('i')  # places and reasons by number
-        self._without_time = array('q')
-        self._texts: dict[int, tuple[int, str]] = {}
-        self._addresses: dict[str, int] = {}
+        self._stated = array('q')  # place and time of the sentences that state one
+        self._steps = array('q')  # place, time and receipt of those that moved the clock
 
     def take(
         self, place: int, line: int, text: str, sentence: Sentence, receive_ns: int | None
@@ -164,123 +170,65 @@ class TakenSentences:
             Where it stands.
         sentence, receive_ns
         """
-        before = len(self._rejected[0])
         talker, kind, moment, values, refused = sentence
         self.addresses[talker, kind] += 1
         received = _NONE
         if receive_ns is not None:
             received, self.received = receive_ns, True
         if moment is not None:
-            self._take_time(place, sentence, received)
+            before_ns = self._clock.now_ns
+            try:
+                if isinstance(moment, NoValue):
+                    raise moment
+                self.timed = True
+                time_ns = self._clock.resolve(moment, receive_ns)
+            except NoValue as why:  # of such a sentence its time alone is said
+                self._tally.reject('time', f'{talker}{kind}: {why}', text, line)
+                return
+            self._stated.extend((place, time_ns))
+            if self._clock.now_ns != before_ns:
+                self._steps.extend((place, time_ns, received))
         for channel, reason in refused:
-            self._reject(channel.input, f'{talker}{kind}: {reason}', place)
+            self._tally.reject(channel.input, f'{talker}{kind}: {reason}', text, line)
         for channel, source, a, b in values:
             self.values.add(channel, source, place, a, b)
             self._received.append(received)
-        if len(self._rejected[0]) > before and len(self._texts) < _SHOWN * len(self._reasons):
-            self._texts[place] = line, text
-
-    def _take_time(self, place: int, sentence: Sentence, received: int) -> None:
-        moment = sentence.time
-        if isinstance(moment, NoValue):
-            self._without_time.append(place)
-            self._reject('time', f'{sentence.talker}{sentence.kind}: {moment}', place)
-            return
-        assert moment is not None
-        if self.first is None and moment.trusted and moment.day is not None:
-            self.first, self.first_received_ns = moment, None if received == _NONE else received
-        known, address = self._addresses, sentence.talker + sentence.kind
-        day = _NONE if moment.day is None else moment.day
-        number = known.setdefault(address, len(known))
-        self._times.extend((place, received, moment.of_day_ns, day, moment.trusted, number))
-
-    def _reject(self, name: str, reason: str, place: int) -> None:
-        places, reasons = self._rejected
-        places.append(place)
-        reasons.append(self._reasons.setdefault((name, reason), len(self._reasons)))
-
-    @property
-    def timed(self) -> bool:
-        """Whether any states a time."""
-        return bool(self._times)
 
     @property
     def count(self) -> int:
         """Number of sentences."""
         return self.addresses.total()
 
-    def samples(self, clock: SentenceClock) -> Block:
+    def samples(self, texts: TextsAt) -> Block:
         """
         Return the samples of the chosen sources, in the order of their sentences.
-
-        Parameters
-        ----------
-        clock
-            At the start of the log. What it cannot tell the time of is rejected.
-        """
-        moments = self._resolve(clock)
-        which, code = self.values.taken()
-        place = np.array(self.values.at)
-        timed = ~np.isin(place[which], self._without_time)
-        which, code = which[timed], code[timed]
-        place, received = place[which], np.array(self._received)[which]
-        stamps, reason = moments.stamps(place, code, received)
-        for why in (_BEFORE, _GAP):
-            for where, number in zip(place[reason == why], code[reason == why], strict=True):
-                self._reject(Channel(number).input, why, int(where))
-        good = reason == ''
-        return self.values.block(which[good], code[good], stamps[good])
-
-    def _resolve(self, clock: SentenceClock) -> _Moments:
-        """Follow the clock through the sentences that state a time."""
-        stated, steps = array('q'), array('q')
-        addresses = list(self._addresses)
-        for place, received, of_day_ns, day, trusted, address in zip(*6 * [iter(self._times)]):
-            moment = SentenceTime(of_day_ns, None if day == _NONE else day, bool(trusted))
-            receive_ns = None if received == _NONE else received
-            try:
-                time_ns = clock.resolve(moment, receive_ns)
-            except NoValue as reason:
-                self._without_time.append(place)
-                self._reject('time', f'{addresses[address]}: {reason}', place)
-                continue
-            now_ns = clock.now_ns
-            # a little earlier: sentences of one fix, or of two receivers, out of order
-            if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:
-                clock.now_ns = time_ns
-                steps.extend((place, time_ns, received))
-            stated.extend((place, time_ns))
-        return _Moments(*_columns(stated, 2), *_columns(steps, 3))
-
-    def rejected(self, texts: TextsAt) -> Refused:
-        """
-        Return what was rejected, by input or 'time', and reason.
 
         Parameters
         ----------
         texts
             Gives line and text of the sentences at some places.
         """
-        places, reasons = (np.array(each) for each in self._rejected)
-        lost = np.isin(places, self._without_time)  # of these their time alone is said
-        shown: dict[tuple[str, str], list[int]] = {}
-        counts: dict[tuple[str, str], int] = {}
-        for key, number in self._reasons.items():
-            of_reason = places[(reasons == number) & ((key[0] == 'time') | ~lost)]
-            if len(of_reason):
-                counts[key] = len(of_reason)
-                shown[key] = np.sort(of_reason)[:_SHOWN].tolist()
-        wanted = {place for some in shown.values() for place in some}
-        found = {**self._texts, **texts(wanted - self._texts.keys())}
-        made: Refused = {}
-        for name in (*INPUTS, 'time'):
-            for (of, reason), first in shown.items():
-                if of == name:
-                    rejected = made.setdefault(name, {}).setdefault(reason, Rejected())
-                    for place in first:
-                        rejected.add(*found[place])
-                    rejected.count = counts[of, reason]
-        return made
+        stated, steps = _columns(self._stated, 2), _columns(self._steps, 3)
+        stated[1] += self._clock.start_ns or 0
+        steps[1] += self._clock.start_ns or 0
+        which, code = self.values.taken()
+        place = np.array(self.values.at)[which]
+        stamps, reason = _Moments(*stated, *steps).stamps(
+            place, code, np.array(self._received)[which]
+        )
+        reason[(reason == '') & ((stamps < 0) | (stamps >= LIMIT_NS))] = _BEYOND
+        lost = [
+            (why, channel, place[(reason == why) & (code == channel)].tolist())
+            for why in (_BEFORE, _GAP, _BEYOND)
+            for channel in np.unique(code[reason == why])
+        ]
+        shown = texts({each for *_, places in lost for each in places[:_SHOWN]})
+        for why, channel, places in lost:
+            for each in places:
+                line, text = shown.get(each, (0, ''))
+                self._tally.reject(Channel(channel).input, why, text, line)
+        good = reason == ''
+        return self.values.block(which[good], code[good], stamps[good])
 
 
 def _columns(values: array[int], width: int) -> Int64:
