@@ -318,6 +318,17 @@ class Monitor:
         window = self._cut(start_ns, ended.end_ns, start_ns - before_ns)
         return replace(window, told_ns=ended.told_ns)
 
+    def steady_window(self) -> Window | None:
+        """
+        Cut the steady record up to now; None while she is not steady.
+        """
+        steady_s = self.progress.steady_s
+        if self.state is not State.STEADY or not steady_s:
+            return None
+        now_ns = int(self._memory.guard.last_ns[self._watch.source])
+        first_ns = now_ns - round(steady_s * SECOND_NS)
+        return self._cut(first_ns, now_ns, first_ns)
+
     @property
     def _watch(self) -> np.record:
         watch: np.record = self._memory.watch[0]

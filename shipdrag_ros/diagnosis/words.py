@@ -131,17 +131,25 @@ def would_be_named(found: DiagnosisResult) -> str:
     """
     if not found.limits:
         return ''
-    shown = sorted(
+    if not (sizes := shown(found)):
+        return ' No single effect of any size would have been named by these runs.'
+    return f' These runs would have named, nine times in ten{sizes}.'
+
+
+def shown(found: DiagnosisResult) -> str:
+    """
+    List the effects that show best, and from what size on; '' where none would be named.
+    """
+    known = sorted(
         (_effort(least, each), name, _from(least, find(name).parameters[0], each))
         for name, each in found.limits.items()
         if (least := each.would_be_named) is not None
-    )
-    if not shown:
-        return ' No single effect of any size would have been named by these runs.'
-    sizes = ', '.join(f'{names_text([name])} {edge}' for _, name, edge in shown[:_MOST_LIMITS])
-    several = any(len(find(name).parameters) > 1 for _, name, _ in shown[:_MOST_LIMITS])
-    usual = ', other parameters as usual' if several else ''
-    return f' These runs would have named, nine times in ten{usual}: {sizes}.'
+    )[:_MOST_LIMITS]
+    if not known:
+        return ''
+    several = any(len(find(name).parameters) > 1 for _, name, _ in known)
+    sizes = ', '.join(f'{names_text([name])} {edge}' for _, name, edge in known)
+    return f'{", other parameters as usual" if several else ""}: {sizes}'
 
 
 def _from(least: float, quantity: Parameter, limit: Limit) -> str:

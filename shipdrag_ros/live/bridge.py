@@ -154,6 +154,7 @@ class Bridge:
         self._ahead = Ahead()
         self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
         self._found: PagePart | None = None  # the last diagnosis
+        self._would_show = ''  # by the next coastdown
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
         self._noted: EventKind | None = None
         self._unread: set[str] = set()
@@ -199,12 +200,14 @@ class Bridge:
         if self._heard_s is not None:
             self._heard_s = now_s
 
-    def show_verdict(self, state: str, sentence: str) -> None:
+    def show_verdict(self, state: str, sentence: str, ahead: str = '') -> None:
         """
         Show how far the diagnosis is, and why there is none; `done`: the last one is shown.
 
-        Until its document is there, its sentence is shown alone.
+        Until its document is there, its sentence is shown alone. `ahead`: what the next coastdown
+        would show.
         """
+        self._would_show = ahead
         rest: dict[str, list[Any]] = {'sizes': [], 'probabilities': [], 'decide': []}
         self._verdict = {'state': state, 'sentence': sentence, **rest}
 
@@ -283,7 +286,9 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found.values:
-            self.show_verdict(found.values.get('state', ''), found.message)
+            self.show_verdict(
+                found.values.get('state', ''), found.message, found.values.get(topics.AHEAD, '')
+            )
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':
@@ -362,7 +367,10 @@ class Bridge:
             'track': self._ahead.track,
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
-            'verdict': self._found if self._done else self._verdict,
+            'verdict': {
+                **self._verdict_now,
+                'ahead': self._would_show if self._coast_ns is None else '',
+            },
             'past': [past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
@@ -374,8 +382,9 @@ class Bridge:
         return self._ahead.if_stopped(self.ship, value, self.past, self._now_s)
 
     @property
-    def _done(self) -> bool:
-        return self._found is not None and self._verdict['state'] == 'done'
+    def _verdict_now(self) -> PagePart:
+        done = self._found if self._verdict['state'] == 'done' else None
+        return {**(done or self._verdict), 'ahead': '' if self._coast_ns else self._would_show}
 
     def _situation(self, now_s: float) -> Situation:
         state = self._health.of('state')

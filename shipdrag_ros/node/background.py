@@ -26,11 +26,13 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.coastdown.warming import warm
 from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.messages.topics import READY_S
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
@@ -158,8 +160,9 @@ class DiagnosisStatus:
         return f'{said[0].upper()}{said[1:]}. {_GOES_ON}' if said else ''
 
 
-_Task = tuple[Window, Ship, Parameters]
-"""What a process is given."""
+_Task = tuple[Window, Ship, Parameters, bool]
+"""What a process is given, and whether the coastdown is still ahead."""
+AHEAD_EVERY_S = 1800.0  # of steady sailing: what a coastdown would show is said anew
 
 
 class Diagnosing:
@@ -177,6 +180,8 @@ class Diagnosing:
     ----------
     status
         Of the last coastdown.
+    ahead
+        What a coastdown from here would show, a sentence; '' before it is known.
     """
 
     def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:
@@ -186,6 +191,8 @@ class Diagnosing:
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
+        self._look_again_s = 0.0
+        self.ahead = ''
         self.status = DiagnosisStatus(DiagnosisState.NONE_YET)
         if not enabled:
             self.status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
@@ -204,8 +211,29 @@ class Diagnosing:
             self.status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
             return
         self.status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
-        task = window, self._ship, self._parameters
+        task = window, self._ship, self._parameters, False
         self._queue.submit(self._diagnose, task, self.status)
+
+    def look_ahead(self, monitor: Monitor) -> None:
+        """
+        Find out what a coastdown would show, now and then in steady sailing; returns at once.
+        """
+        if not self._possible or self._closed or monotonic() < self._look_again_s:
+            return
+        if monitor.progress.steady_s < min(READY_S, self._parameters.steady_s):
+            return
+        window = monitor.steady_window()
+        if window is not None:
+            self._look_again_s = monotonic() + AHEAD_EVERY_S
+            self._queue.submit(self._look, (window, self._ship, self._parameters, True))
+
+    def _look(self, task: _Task) -> None:
+        """Wait for a process, in a thread."""
+        try:
+            answer = self._answer(task)
+        except Exception as error:  # as in `_diagnose`
+            answer = {'reason': str(error) or type(error).__name__}
+        self.ahead = answer.get('ahead') or f'What a coastdown would show: {answer["reason"]}'
 
     def close(self) -> None:
         """
@@ -260,15 +288,21 @@ class Diagnosing:
 def main() -> None:
     """
     Diagnose what comes from stdin, and write the document, or why there is none, to stdout.
+
+    Of a coastdown that is ahead: the sentence that says what it would show.
     """
     os.nice(_NICE)
     from shipdrag_ros.diagnosis import CoastRun, diagnose
+    from shipdrag_ros.diagnosis.ahead import look_ahead
     from shipdrag_ros.diagnosis.document import document
 
-    window, ship, parameters = pickle.load(sys.stdin.buffer)
+    window, ship, parameters, ahead = pickle.load(sys.stdin.buffer)
     run = CoastRun('the coastdown', window)
     try:
-        answer = document(diagnose([run], ship, parameters), ship)
+        if ahead:
+            answer = {'ahead': look_ahead(window, ship, parameters).sentence}
+        else:
+            answer = document(diagnose([run], ship, parameters), ship)
     except ShipdragError as error:
         answer = {'state': DiagnosisState.IMPOSSIBLE.value, 'reason': str(error)}
     sys.stdout.write(json_text(answer))

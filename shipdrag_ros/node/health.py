@@ -21,7 +21,7 @@ from shipdrag_ros.display import printable
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import conditions
 from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.messages.topics import ERROR, OF_CONDITIONS, OK, STALE, WARN, Status
+from shipdrag_ros.messages.topics import AHEAD, ERROR, OF_CONDITIONS, OK, STALE, WARN, Status
 from shipdrag_ros.node.background import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import ALL_MOTION
@@ -603,11 +603,19 @@ def estimate_status(estimate: Estimate | None, why_none: str) -> Status:
     return Status.of('estimate', level, text, values)
 
 
-def diagnosis_status(status: DiagnosisStatus) -> Status:
+def diagnosis_status(status: DiagnosisStatus, ahead: str = '') -> Status:
     """
     Say what is missing in the model by the last coastdown, or why that cannot be said.
+
+    Parameters
+    ----------
+    status
+    ahead
+        What the next one would show; '' where that is not known.
     """
     values: dict[str, object] = {'state': status.state.value}
+    if ahead:
+        values[AHEAD] = ahead
     if status.coastdown is not None:
         values['start of the coastdown [ns]'] = status.coastdown.start_ns
         values['end of the coastdown [ns]'] = status.coastdown.end_ns

@@ -380,7 +380,9 @@ class CoastdownNode(LifecycleNode):
             self._announcer.silence(states, standing.candidates)
         if self._diagnosing is not None:
             found = self._diagnosing.status
-            statuses.append(diagnosis_status(found))
+            if session is not None and self._compiling is not None and self._compiling.done():
+                self._diagnosing.look_ahead(session.monitor)
+            statuses.append(diagnosis_status(found, self._diagnosing.ahead))
             if found is not self._diagnosed:
                 self._diagnosed = found
                 self._publish_diagnosis(found, now_ns)

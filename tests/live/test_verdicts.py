@@ -14,7 +14,15 @@ from shipdrag_ros.diagnosis.result import Advice, Candidate, DiagnosisResult, Ef
 from shipdrag_ros.display import json_text
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.live.bridge import Bridge, verdict_part
-from shipdrag_ros.messages.topics import OK, WARN, Health, NodeMessage, Status, diagnosis_message
+from shipdrag_ros.messages.topics import (
+    AHEAD,
+    OK,
+    WARN,
+    Health,
+    NodeMessage,
+    Status,
+    diagnosis_message,
+)
 from shipdrag_ros.node.background import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.health import diagnosis_status
 from shipdrag_ros.parameter import Parameter
@@ -46,12 +54,14 @@ def heard(text: str) -> NodeMessage:
     return NodeMessage('diagnosis', diagnosis_message(text, 0).payload)
 
 
-def told(state: str, sentence: str) -> Health:
-    states = {'lifecycle': 'active', 'monitor': 'steady'}
+def told(state: str, sentence: str, monitor: str = 'steady', **more: str) -> Health:
+    states = {'lifecycle': 'active', 'monitor': monitor}
+    if monitor == 'coastdown':
+        states['coastdown since [ns]'] = '5000000000'
     return Health(
         (
-            Status.of('state', 0, 'steady', states),
-            Status.of('diagnosis', 1, sentence, {'state': state}),
+            Status.of('state', 0, monitor, states),
+            Status.of('diagnosis', 1, sentence, {'state': state, **more}),
         )
     )
 
@@ -69,7 +79,8 @@ def test_a_set_has_the_size_that_each_would_have_and_no_options() -> None:
 
 def bare(state: str, sentence: str) -> dict[str, Any]:
     """Return the part without a document."""
-    return {'state': state, 'sentence': sentence, 'sizes': [], 'probabilities': [], 'decide': []}
+    rest: dict[str, Any] = {'sizes': [], 'probabilities': [], 'decide': [], 'ahead': ''}
+    return {'state': state, 'sentence': sentence, **rest}
 
 
 def test_the_page_shows_the_document_of_the_topic_once_the_node_is_done() -> None:
@@ -78,7 +89,17 @@ def test_the_page_shows_the_document_of_the_topic_once_the_node_is_done() -> Non
     bridge.hear(told('running', 'running'), 0.0)
     assert bridge.parts(0.0)['verdict'] == bare('running', 'running')
     bridge.hear(told('done', 'Missing is one of these'), 0.0)
-    assert bridge.parts(0.0)['verdict'] == verdict_part(document(FOUND, None))
+    assert bridge.parts(0.0)['verdict'] == {**verdict_part(document(FOUND, None)), 'ahead': ''}
+
+
+def test_before_the_stop_the_page_says_what_a_coastdown_would_show() -> None:
+    bridge = Bridge()
+    would = 'A coastdown from 8.2 m/s, 20 min long, would name current from 0.1 m/s.'
+    for state in ('none yet', 'done'):
+        bridge.hear(told(state, state, **{AHEAD: would}), 0.0)
+        assert bridge.parts(0.0)['verdict']['ahead'] == would
+    bridge.hear(told('done', 'done', 'coastdown', **{AHEAD: would}), 0.0)
+    assert bridge.parts(0.0)['verdict']['ahead'] == ''
 
 
 @pytest.mark.parametrize(

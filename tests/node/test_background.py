@@ -22,6 +22,7 @@ from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import types
+from shipdrag_ros.messages.topics import AHEAD
 from shipdrag_ros.node import background as compiling_module
 from shipdrag_ros.node.background import (
     COMPILER,
@@ -31,6 +32,7 @@ from shipdrag_ros.node.background import (
     DiagnosisStatus,
     leave_if_compiling,
 )
+from shipdrag_ros.node.health import diagnosis_status
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import Block, Channel
@@ -144,6 +146,34 @@ def test_node_names_what_is_missing_as_the_verb_does(start_node, peer, diagnosti
     assert answer == expected
     (kept,) = rows(bag, TOPIC)
     assert types.deserialize('std_msgs/msg/String', kept.payload).data == told.data
+
+
+def test_what_a_coastdown_would_show_is_said_in_steady_sailing(monkeypatch) -> None:
+    monitor = Monitor(SHIP, PARAMETERS)
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    block = record()
+    since_s = (block.receive_ns - block.receive_ns[0]) * 1e-9
+    monitor.update(block[since_s < 500.0])
+    diagnosing.look_ahead(monitor)
+    assert diagnosing._queue._work_queue.empty()  # not steady for long enough
+    monitor.update(block[(since_s >= 500.0) & (since_s < 650.0)])
+    diagnosing.look_ahead(monitor)
+    end = time.monotonic() + WITHIN_S
+    while not diagnosing.ahead:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    diagnosing.close()
+    assert diagnosing.ahead.startswith('A coastdown from 8.2 m/s, ')
+    shown = values(diagnosis_status(diagnosing.status, diagnosing.ahead))
+    assert shown[AHEAD] == diagnosing.ahead
+    monkeypatch.setattr(sys, 'executable', '/bin/false')
+    failing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    failing.look_ahead(monitor)
+    while not failing.ahead:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    failing.close()
+    assert failing.ahead == 'What a coastdown would show: exit 1: '
 
 
 def test_too_little_steady_record_is_told() -> None:

@@ -248,6 +248,7 @@ function showVerdict(part) {
   } else {
     shown.push(make('p', WAITING[part.state] ?? `No diagnosis: ${part.sentence}`, { class: 'quiet' }));
   }
+  if (part.ahead) shown.push(make('p', part.ahead, { class: 'quiet' }));
   el('verdict').replaceChildren(...shown);
 }
 

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a coastdown from here would show, said before the engine is stopped.
+
+It is simulated with the ship of the file, from the present speed and with the present instruments,
+and diagnosed as one that was made: from what size on would each effect be named.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.diagnosis import words
+from shipdrag_ros.diagnosis.diagnose import diagnose
+from shipdrag_ros.diagnosis.observation import CoastRun
+from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.inference import priors as usual
+from shipdrag_ros.inference.rows import MAD_TO_SD
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.law import usual_baseline
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation.scenario import GaussMarkov
+from shipdrag_ros.simulation.sensors import STANDARD_SD
+
+_NOW_S = 120.0  # whose speed is that of now
+_LEAST = 12  # readings of an instrument, to show its scatter
+_SLOWINGS = 3.0  # of m u / R: to a quarter of the speed, by quadratic drag
+_SECOND_NS = 1_000_000_000
+
+
+class Ahead(NamedTuple):
+    """
+    What a coastdown from here would show.
+
+    Attributes
+    ----------
+    speed_m_s
+        Through water, from which it would begin.
+    duration_s
+        How long it would last.
+    found
+        The diagnosis of one in which nothing is missing; its `limits` count.
+    """
+
+    speed_m_s: float
+    duration_s: float
+    found: DiagnosisResult
+
+    @property
+    def sentence(self) -> str:
+        """What it would show, in words."""
+        shown = words.shown(self.found)
+        begun = (
+            f'A coastdown from {self.speed_m_s:.3g} m/s, {self.duration_s / 60.0:.0f} min long, '
+            'would'
+        )
+        named = f'name, nine times in ten{shown}' if shown else 'name no effect of any size'
+        limit = self.found.limits.get('fouling')
+        of_clean = ''
+        if limit is not None:
+            of_clean = (
+                f'; if the hull is clean, rule out fouling above {100.0 * limit.value:.0f} %'
+            )
+        return f'{begun} {named}{of_clean}.'
+
+
+def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> Ahead:
+    """
+    Say what a coastdown would show that begins where a steady record ends.
+
+    Parameters
+    ----------
+    lead
+        Steady sailing up to now.
+    ship
+        Her file; without a baseline a usual hull slows down.
+    parameters
+        As for a diagnosis.
+
+    Raises
+    ------
+    DiagnosisError
+        If no instrument tells the speed of now, or the ship file cannot be simulated.
+
+    Notes
+    -----
+    The instruments have their own rates and scatter; slow disturbances are the medians of the
+    prior of the noise, the air is still and the water deep unless a depth is read.
+    """
+    speed_m_s = _speed(lead)
+    hull = usual_baseline(ship)
+    force = float(hull.resistance_n(speed_m_s)) / hull.mass_kg
+    inertia = 1.0 + float(hull.n_r(speed_m_s))
+    slowing_s = inertia * speed_m_s / force
+    lead_s = (lead.end_ns - lead.start_ns) / _SECOND_NS
+    calm = min(speed_m_s / usual.WATER_SPEED.mean, 1.0)
+    gust_s = usual.GUST_TIME.mean / math.sqrt(2.0 / slowing_s)
+    depth = lead.depth.value
+    truth = simulate(
+        hull,
+        Scenario(
+            speed_m_s=speed_m_s,
+            lead_in_s=lead_s,
+            duration_s=min(_SLOWINGS * slowing_s, parameters.window_s),
+            depth_m=float(np.median(depth)) if len(depth) else Scenario.depth_m,
+            water_speed=GaussMarkov(calm * usual.WATER.mean, usual.WATER_TIME.mean),
+            gust_force=GaussMarkov(usual.GUST.mean * force * hull.mass_kg, gust_s),
+        ),
+    )
+    block = sense(truth, _sensors(lead, speed_m_s), seed=1)
+    slow = truth.speed_through_water_m_s < hull.speed(parameters.froude_min)
+    ended = truth.time_s[np.argmax(slow)] if slow.any() else truth.time_s[-1]
+    begun_ns = START_NS + round(lead_s * _SECOND_NS)
+    end_ns = START_NS + round(float(ended - truth.time_s[0]) * _SECOND_NS)
+    window = Window.from_block(block, begun_ns, end_ns, before_ns=START_NS)
+    run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
+    found = diagnose([run], ship, parameters, advise=False)
+    return Ahead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
+
+
+def _speed(lead: Window) -> float:
+    """Return the speed of now [m/s]."""
+    since_ns = lead.end_ns - round(_NOW_S * _SECOND_NS)
+    for series in lead.each('speed_through_water', 'speed_over_ground'):
+        now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
+        if len(now) >= _LEAST:
+            return float(np.median(now.value))
+    for series in lead.each('position'):
+        now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
+        if len(now) >= _LEAST:
+            half = len(now) // 2
+            early, late = now[:half], now[half:]
+            way = late.value.mean(axis=0) - early.value.mean(axis=0)
+            time_s = (late.time_ns.mean() - early.time_ns.mean()) / _SECOND_NS
+            return float(np.hypot(*way) / time_s)
+    raise DiagnosisError(
+        'no input has told the speed for two minutes: what a coastdown would show is not known'
+    )
+
+
+def _sensors(lead: Window, speed_m_s: float) -> list[Sensor]:
+    """Return the instruments that are heard, with their rates and their scatter."""
+    found = []
+    for channel in STANDARD_SD:
+        series = lead.series(channel.input)
+        if len(series) < _LEAST:
+            continue
+        span_s = (series.time_ns[-1] - series.time_ns[0]) / _SECOND_NS
+        sd, slow = _scatter(series.value), None
+        if channel.kind.input == 'speed_through_water':
+            size = max(usual.LOG.mean * sd, usual.LOG_LEAST.mean * speed_m_s)
+            slow = GaussMarkov(size, usual.LOG_TIME.mean)
+        elif channel.kind.input == 'position':
+            slow = GaussMarkov(usual.PLACE.mean * speed_m_s, usual.PLACE_TIME.mean)
+        rate_hz = (len(series) - 1) / span_s
+        found.append(Sensor(channel=channel, rate_hz=rate_hz, sd=sd, coloured=slow))
+    return found
+
+
+def _scatter(value: Float64) -> float:
+    """Return the sd of white noise, by second differences of the worse column."""
+    columns = np.atleast_2d(value.T)
+    away = np.abs(np.diff(columns, 2, axis=1))
+    return float(MAD_TO_SD * np.median(away, axis=1).max() / math.sqrt(6.0))

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a coastdown would show is said before it, by the instruments as they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shipdrag_ros.diagnosis import diagnose
+from shipdrag_ros.diagnosis.ahead import Ahead, look_ahead
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
+from tests.runs import CARGO as SHIP
+from tests.runs import coasted
+
+
+def lead_of(**options: object) -> Window:
+    before = coasted(speed_m_s=8.0, lead_in_s=1800.0, **options).window.before  # type: ignore[arg-type]
+    assert before is not None
+    return before
+
+
+def least(found: Ahead, name: str) -> float:
+    size = found.found.limits[name].would_be_named
+    assert size is not None
+    return size
+
+
+def test_sizes_said_before_are_those_found_after() -> None:
+    """
+    Of two runs (seeds 1 and 2) of the same ship; they have no slow disturbances, which are usual.
+    """
+    ahead = look_ahead(lead_of(), SHIP, Parameters())
+    assert ahead.speed_m_s == pytest.approx(8.0, rel=0.01)
+    for seed in (1, 2):
+        run = coasted(speed_m_s=8.0, lead_in_s=1800.0, coast_s=ahead.duration_s, seed=seed)
+        after = diagnose([run], SHIP, Parameters(), advise=False)
+        for name in ('current', 'log_scale', 'log_offset', 'log_lag', 'locked_propeller'):
+            found = after.limits[name].would_be_named
+            assert found is not None, name
+            assert 0.7 < least(ahead, name) / found < 1.8, name
+    assert ahead.sentence.startswith('A coastdown from 8 m/s, ')
+    assert 'would name, nine times in ten' in ahead.sentence
+    assert 'if the hull is clean, rule out fouling above' in ahead.sentence
+
+
+def test_worse_and_fewer_instruments_show_less() -> None:
+    good, noisy = (look_ahead(lead_of(noise=noise), SHIP, Parameters()) for noise in (1.0, 6.0))
+    assert least(noisy, 'log_lag') > 1.3 * least(good, 'log_lag')
+    log = look_ahead(lead_of(inputs=('speed_through_water',)), SHIP, Parameters())
+    assert 'radar_scale' in good.found.limits
+    assert 'radar_scale' not in log.found.limits
+    assert log.found.limits['current'].value > 3.0 * good.found.limits['current'].value
+
+
+def test_positions_alone_tell_the_speed() -> None:
+    ahead = look_ahead(lead_of(inputs=('position',)), SHIP, Parameters())
+    assert ahead.speed_m_s == pytest.approx(8.0, rel=0.02)
+
+
+def test_without_a_speed_nothing_is_foretold() -> None:
+    lead = lead_of()
+    lead = replace(
+        lead, speed_through_water=lead.speed_through_water[:5], position=lead.position[:5]
+    )
+    with pytest.raises(DiagnosisError, match='no input has told the speed'):
+        look_ahead(lead, SHIP, Parameters())
