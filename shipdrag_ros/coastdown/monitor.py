@@ -325,7 +325,7 @@ class Monitor:
         steady_s = self.progress.steady_s
         if self.state is not State.STEADY or not steady_s:
             return None
-        now_ns = int(self._memory.guard.last_ns[self._watch.source])
+        now_ns = int(self._memory.guard.last_ns[self._watch.seen_source])
         first_ns = now_ns - round(steady_s * SECOND_NS)
         return self._cut(first_ns, now_ns, first_ns)
 

@@ -36,7 +36,7 @@ _SLOWINGS = 3.0  # of m u / R: to a quarter of the speed, by quadratic drag
 _SECOND_NS = 1_000_000_000
 
 
-class Ahead(NamedTuple):
+class CoastAhead(NamedTuple):
     """
     What a coastdown from here would show.
 
@@ -72,7 +72,7 @@ class Ahead(NamedTuple):
         return f'{begun} {named}{of_clean}.'
 
 
-def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> Ahead:
+def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     """
     Say what a coastdown would show that begins where a steady record ends.
 
@@ -123,7 +123,7 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> Ahead:
     window = Window.from_block(block, begun_ns, end_ns, before_ns=START_NS)
     run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
     found = diagnose([run], ship, parameters, advise=False)
-    return Ahead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
+    return CoastAhead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
 
 
 def _speed(lead: Window) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from shipdrag_ros.diagnosis import diagnose
-from shipdrag_ros.diagnosis.ahead import Ahead, look_ahead
+from shipdrag_ros.diagnosis.ahead import CoastAhead, look_ahead
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -22,7 +22,7 @@ def lead_of(**options: object) -> Window:
     return before
 
 
-def least(found: Ahead, name: str) -> float:
+def least(found: CoastAhead, name: str) -> float:
     size = found.found.limits[name].would_be_named
     assert size is not None
     return size

@@ -164,8 +164,8 @@ def test_what_a_coastdown_would_show_is_said_in_steady_sailing(monkeypatch) -> N
         time.sleep(0.05)
     diagnosing.close()
     assert diagnosing.ahead.startswith('A coastdown from 8.2 m/s, ')
-    shown = values(diagnosis_status(diagnosing.status, diagnosing.ahead))
-    assert shown[AHEAD] == diagnosing.ahead
+    status = diagnosis_status(diagnosing.status, diagnosing.ahead)
+    assert status.values[AHEAD] == diagnosing.ahead
     monkeypatch.setattr(sys, 'executable', '/bin/false')
     failing = Diagnosing(SHIP, PARAMETERS, enabled=True)
     failing.look_ahead(monitor)
