@@ -38,7 +38,7 @@ _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 # A step of 0.1 knots, the resolution of many logs, is never an outlier; and 2 % are not worth it.
 _FLOOR_M_S = 0.06
 _FLOOR_PART = 0.02
-_COARSEST_M_S = 0.26  # half a knot
+_DEAD_M_S = 0.7  # below it the wheel of a log may stand still, or a display show 0
 _BAD = 2.0  # times the sd by the median that noise may have by the quartile
 _FLOOR_M = 0.5
 _FIRST_M = 500.0  # that the first fixes may be apart, besides what any ship can go
@@ -272,8 +272,8 @@ def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
         if value[(count - 1 - i) % KEPT, 0] != 0.0:
             _insert(scratch, known, abs(value[(count - 1 - i) % KEPT, 0]))
             known += 1
-    # zeros of a log that drops out are no readings; those of a coarse one at rest are
-    drops = known >= MIDDLE and scratch[known // 2] > _COARSEST_M_S
+    # zeros are no readings where the others stay far from them
+    drops = known >= MIDDLE and scratch[0] > _DEAD_M_S
     known, other = 0, np.nan
     for i in range(kept):
         one = value[(count - 1 - i) % KEPT, 0]
