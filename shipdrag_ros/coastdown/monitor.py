@@ -9,6 +9,7 @@ before the last `history_ns` of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -34,9 +35,10 @@ from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
-from shipdrag_ros.coastdown.regimes.watch import LEAD_S, Dated, RegimeFilter
+from shipdrag_ros.coastdown.regimes.watch import LATE_S, LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
+from shipdrag_ros.coastdown.shafts import ShaftWatch
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
@@ -44,7 +46,7 @@ from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.estimation.estimators import WindowEstimator, shielded
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Reason
+from shipdrag_ros.samples import SECOND_NS, Block, Reason
 from shipdrag_ros.ship import Ship
 
 _SILENT = (EndedBy.DATA_STOP, EndedBy.SILENCE)
@@ -113,6 +115,7 @@ class Monitor:
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._craft = Craft(ship.length_m, self._tuning.speed_min)
         self._vouching = Vouching(self._craft)
+        self._shafts = ShaftWatch(parameters.frozen_s)
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None  # while awake
         self._silent = False  # it goes on unread, as the glide of which the readings ceased may
@@ -179,7 +182,7 @@ class Monitor:
         bins = self._memory.bins
         heading = heading_doubt(bins, self._parameters.heading_convention)
         found = self._vouching.texts
-        shafts = self._shafts_doubted
+        shafts = self._shafts.text
         return (
             found
             | ({'heading': heading} if heading else {})
@@ -190,7 +193,8 @@ class Monitor:
         """
         Say which inputs contradicted another at any time.
         """
-        return self._vouching.ever
+        shafts = {'shaft': self._shafts.ever} if self._shafts.ever else {}
+        return self._vouching.ever | shafts
 
     def left_out(self) -> dict[str, str]:
         """
@@ -264,6 +268,7 @@ class Monitor:
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._ended_by = None
         self._vouching = Vouching(self._craft)
+        self._shafts = ShaftWatch(self._parameters.frozen_s)
         return [*events, Reset(receive_ns, reason)]
 
     def engine_stopped(self, receive_ns: int) -> str:
@@ -348,6 +353,8 @@ class Monitor:
             forget_speeds(bins, source)
             self._memory.steadiness.forget(source)
         watch.look = (number // LOOK_S + 1) * LOOK_S
+        lie = math.nan if self._regimes is None or self._silent else self._regimes.shafts_lie
+        self._shafts.look(bins, number - LATE_S, lie)
         newly = (self._vouching.until > number) & (watch.doubted <= number)
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
@@ -368,7 +375,8 @@ class Monitor:
         """Let the regimes take the record, from some minutes before a second on."""
         self._watch.source = source
         width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
-        bins = self._vouching.sound(self._memory.bins)
+        self._shafts.look(self._memory.bins, number, math.nan)
+        bins = self._shafts.sound(self._vouching.sound(self._memory.bins))
         self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
@@ -384,6 +392,8 @@ class Monitor:
         """Let the regimes take all bins that are whole by a second, and decide after each."""
         events: list[Event] = []
         bins = self._vouching.sound(self._memory.bins)
+        if self._regimes is not None and not self._regimes.hears_shafts:
+            bins = self._shafts.sound(bins)
         while (regimes := self._regimes) is not None and regimes.advance(bins, until):
             events += self._decide(regimes, number)
         return events
@@ -581,17 +591,6 @@ class Monitor:
         gliding = self._regimes.gliding > 0.5
         return self._running.update(stamp_ns, self._estimator, gliding=gliding)
 
-    @property
-    def _shafts_doubted(self) -> str:
-        """What is said of shafts that probably say nothing true; '' where they are believed."""
-        chance = 0.0 if self._regimes is None else self._regimes.shafts_lie
-        if not chance > 0.5:
-            return ''
-        return (
-            f'the motion is not that of a ship whose shafts turn as they say (probability '
-            f'{chance:.2f}): they are not used; check the sensor'
-        )
-
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
         """Cut a window, with the record from `first_ns` on before it."""
         kept = since(
@@ -601,9 +600,9 @@ class Monitor:
             capacity=CAPACITY,
         )
         kept = self._vouching.kept(kept)
-        shafts = self._shafts_doubted
+        shafts = self._shafts.doubt
         if shafts:
-            kept = kept[~np.isin(kept.channel, (*SHAFTS, *PITCHES))]
+            kept = kept[~np.isin(kept.channel, self._shafts.unused)]
         window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )

@@ -38,6 +38,8 @@ _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 # A step of 0.1 knots, the resolution of many logs, is never an outlier; and 2 % are not worth it.
 _FLOOR_M_S = 0.06
 _FLOOR_PART = 0.02
+_DEAD_M_S = 0.7  # below it the wheel of a log may stand still, or a display show 0
+_BAD = 2.0  # times the sd by the median that noise may have by the quartile
 _FLOOR_M = 0.5
 _FIRST_M = 500.0  # that the first fixes may be apart, besides what any ship can go
 
@@ -265,12 +267,26 @@ def learn_gate(past: Past, channel: int) -> None:
 @compiled(uncounted=True)
 def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
     scratch, value = past.scratch, past.value[channel]
-    for i in range(kept - 1):
-        one, other = (count - 1 - i) % KEPT, (count - 2 - i) % KEPT
-        _insert(scratch, i, abs(value[one, 0] - value[other, 0]))
-    known = kept - 1
-    # the quartile too: more than half of the readings of a coarse log repeat
-    sd = max(scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE)
+    known = 0
+    for i in range(kept):
+        if value[(count - 1 - i) % KEPT, 0] != 0.0:
+            _insert(scratch, known, abs(value[(count - 1 - i) % KEPT, 0]))
+            known += 1
+    # zeros are no readings where the others stay far from them
+    drops = known >= MIDDLE and scratch[0] > _DEAD_M_S
+    known, other = 0, np.nan
+    for i in range(kept):
+        one = value[(count - 1 - i) % KEPT, 0]
+        if one == 0.0 and drops:
+            continue
+        if not np.isnan(other):
+            _insert(scratch, known, abs(one - other))
+            known += 1
+        other = one
+    sd, wider = scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE
+    # the quartile too: more than half of the readings of a coarse log repeat; but where it is
+    # far more, bad readings are in it
+    sd = max(sd, min(wider, _BAD * sd) if sd > 0.0 else wider)
     near = abs(median(past, channel, count, 0, 0.0))
     past.gate[channel] = max(_FLOOR_M_S + _FLOOR_PART * near, SD * sd)
 

@@ -34,6 +34,7 @@ StretchSpan = tuple[int, int]
 _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
+_USED_TO_FIND = 0.9  # the same where no coastdown was found
 _RESETS_SHOWN = 3
 _FOLLOWED_NS = 3600 * SECOND_NS  # after a gap
 _OF_MOTION = [channel for channel in Channel if channel.input in ALL_MOTION]
@@ -231,7 +232,7 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
     return (
         *result.run.warnings,
         *(f'{name}: {text}' for name, text in result.contradictions.items()),
-        *_inputs(result.inputs),
+        *_inputs(result.inputs, _USED_ENOUGH if result.coastdowns else _USED_TO_FIND),
         *_resets(result.events),
         *_unexplained(result.events),
         *_not_found_again(result),
@@ -275,13 +276,13 @@ def _unexplained(events: Sequence[Event]) -> Iterator[str]:
             )
 
 
-def _inputs(inputs: Mapping[str, InputCounts]) -> Iterator[str]:
+def _inputs(inputs: Mapping[str, InputCounts], enough: float) -> Iterator[str]:
     for name, counts in inputs.items():
         rejected = dict(counts.rejected)
         if surplus := rejected.pop(_SURPLUS, 0):
             yield f'{name}: {surplus} readings left out: {_CAUSE[_SURPLUS]}'
         readings = max(counts.messages, counts.used + sum(rejected.values()))
-        if counts.used >= _USED_ENOUGH * readings or not rejected:
+        if counts.used >= enough * readings or not rejected:
             continue
         reason, number = max(rejected.items(), key=lambda item: item[1])
         what = 'messages' if readings == counts.messages else 'readings'

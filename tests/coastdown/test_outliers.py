@@ -157,6 +157,33 @@ def test_zeros_are_never_let_in(quantum) -> None:
     assert set(found[322:400]) == {Reason.FROZEN}
 
 
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('share', [0.1, 0.3, 0.5])
+def test_zeros_from_the_first_reading_on_are_no_noise_of_the_log(share, seed) -> None:
+    rng = np.random.default_rng(seed)
+    value = 8.0 + 0.05 * rng.standard_normal(600)
+    zero = rng.random(600) < share
+    value[zero] = 0.0
+    found = rejected(LOG, np.arange(600.0), value)
+    assert set(np.flatnonzero(zero)) - set(found) <= set(range(100))
+    assert set(found) <= set(np.flatnonzero(zero)) | set(range(100))
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_spikes_from_the_first_reading_on_are_no_noise_of_the_log(seed) -> None:
+    rng = np.random.default_rng(seed)
+    value = 8.0 + 0.05 * rng.standard_normal(600)
+    spike = rng.random(600) < 0.2
+    value[spike] = rng.uniform(10.0, 20.0, int(spike.sum()))
+    found = rejected(LOG, np.arange(600.0), value)
+    assert set(found) ^ set(np.flatnonzero(spike)) <= set(range(40))
+
+
+def test_a_coarse_log_of_a_ship_at_rest_may_read_zero() -> None:
+    value = np.where(np.random.default_rng(12).random(600) < 0.4, 0.0, 0.1)
+    assert len(rejected(LOG, np.arange(600.0), value)) < 5
+
+
 def test_a_log_that_sticks_is_frozen_at_once_unless_it_repeats_by_nature() -> None:
     value = 8.0 + 0.05 * np.random.default_rng(5).standard_normal(300)
     value[100:160] = value[100]

@@ -72,9 +72,15 @@ def test_a_coastdown_without_estimate_gives_its_reason(coastdown, ship):
 SURPLUS = Unreadable.SURPLUS_JOINT.value
 
 
-def told(inputs: dict[str, InputCounts], *events: Event) -> tuple[str, ...]:
+def told(
+    inputs: dict[str, InputCounts], *events: Event, coastdowns: tuple[str, ...] = ('one',)
+) -> tuple[str, ...]:
     result = SimpleNamespace(
-        run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events, contradictions={}
+        run=SimpleNamespace(warnings=('torn',)),
+        inputs=inputs,
+        events=events,
+        coastdowns=coastdowns,
+        contradictions={},
     )
     return words.run_warnings(result)  # type: ignore[arg-type]
 
@@ -86,6 +92,13 @@ def test_a_sound_run_keeps_the_warnings_of_its_bag_alone() -> None:
 def test_the_most_frequent_reason_is_named_below_half() -> None:
     counts = {'position': InputCounts(100, 49, {'late': 11, 'future': 40})}
     assert told(counts)[1].startswith('position: 51 of 100 messages not used; 40 future: stamped')
+
+
+def test_a_tenth_that_is_bad_is_named_where_no_coastdown_is_found() -> None:
+    counts = {'position': InputCounts(100, 89, {'outlier': 11})}
+    assert told(counts) == ('torn',)
+    (_, found) = told(counts, coastdowns=())
+    assert found.startswith('position: 11 of 100 messages not used; 11 outlier: impossible')
 
 
 def test_joints_that_are_left_out_are_told_though_most_are_used() -> None:

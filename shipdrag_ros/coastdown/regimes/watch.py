@@ -38,7 +38,7 @@ from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
 LEAD_S = 900  # of record before what woke it
-_LATE = 2  # seconds that other inputs may be behind
+LATE_S = 2  # seconds that other inputs may be behind
 _ASLEEP_S = 300.0  # of even power after which it sleeps again
 _FULL_S = 6 * 3600.0  # of record that it remembers
 _ASKED_EVERY = 60  # bins
@@ -173,7 +173,7 @@ class RegimeFilter:
         Take the next bin that is whole by second `number`; False where none is.
         """
         last = (self._next + 1) * self._width - 1
-        if last > number - _LATE:
+        if last > number - LATE_S:
             return False
         observe(bins, last, self._width, self._setting.step_s, self._bank.said)
         step(self._bank, self._setting)
@@ -234,8 +234,15 @@ class RegimeFilter:
         return float(out[P_RUN_DOWN] + out[P_GLIDING])
 
     @property
+    def hears_shafts(self) -> bool:
+        """Whether any shaft was read when it was woken."""
+        return self._setting.shafts > 0
+
+    @property
     def shafts_lie(self) -> float:
-        """Probability that the shafts say nothing true."""
+        """Probability that the shafts say nothing true; NaN where none is heard."""
+        if not self.hears_shafts:
+            return math.nan
         all_ = self._bank.histories
         row = all_.row[: int(all_.used[0])]
         return float(np.exp(row['weight'][row['liar'] == s.THE_SHAFTS]).sum())
