@@ -68,7 +68,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(start: Any, view: Any, t
     file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
     node = start('shipdrag_ros.node.main', '--ros-args', '--params-file', file)
     node.wait_for('ready to estimate')
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=420.0, duration_s=420.0)
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=440.0, duration_s=420.0)
     block = sense(simulate(Ship.load(SHIP), scenario), standard_sensors(), seed=1)
     said: list[str] = []
 
@@ -80,9 +80,10 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(start: Any, view: Any, t
     with Rehearsal(lambda _: None) as rehearsal:
         rehearsal.wait_for_node(block, alive=lambda: None, timeout_s=240.0)
         # a node that compiles is silent for some seconds: steady sailing is waited for
-        stop_ns = int(block.stamp_ns[0]) + 410 * 10**9
+        stop_ns = int(block.stamp_ns[0]) + 430 * 10**9
         rehearsal.player.play(block[block.stamp_ns < stop_ns], speed=140.0, progress=note)
         viewer.wait_for('#headline', 'STEADY')
+        viewer.wait_for('#verdict', 'A coastdown from 8.2 m/s')  # before the stop
         note(0.0)
         slowly_ns = int(block.stamp_ns[-1]) - 15 * 10**9
         glide = block[(block.stamp_ns >= stop_ns) & (block.stamp_ns < slowly_ns)]
