@@ -24,7 +24,7 @@ from shipdrag_ros.inference import priors as usual
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.law import usual_baseline
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
 from shipdrag_ros.simulation.scenario import GaussMarkov
@@ -88,7 +88,9 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     Raises
     ------
     DiagnosisError
-        If no instrument tells the speed of now, or the ship file cannot be simulated.
+        If no instrument tells the speed of now, or it is not above that of `froude_min`.
+    SimulationError
+        If the ship file cannot be simulated.
 
     Notes
     -----
@@ -97,6 +99,12 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     """
     speed_m_s = _speed(lead)
     hull = usual_baseline(ship)
+    low_m_s = float(hull.speed(parameters.froude_min))
+    if not speed_m_s > low_m_s:
+        raise DiagnosisError(
+            f'nothing would be read, as {speed_m_s:.3g} m/s is not above {low_m_s:.3g} m/s, which '
+            'is that of froude_min'
+        )
     force = float(hull.resistance_n(speed_m_s)) / hull.mass_kg
     inertia = 1.0 + float(hull.n_r(speed_m_s))
     slowing_s = inertia * speed_m_s / force
@@ -116,13 +124,14 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
         ),
     )
     block = sense(truth, _sensors(lead, speed_m_s), seed=1)
-    slow = truth.speed_through_water_m_s < hull.speed(parameters.froude_min)
+    slow = truth.speed_through_water_m_s < low_m_s
     ended = truth.time_s[np.argmax(slow)] if slow.any() else truth.time_s[-1]
     begun_ns = START_NS + round(lead_s * _SECOND_NS)
     end_ns = START_NS + round(float(ended - truth.time_s[0]) * _SECOND_NS)
     window = Window.from_block(block, begun_ns, end_ns, before_ns=START_NS)
     run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
-    found = diagnose([run], ship, parameters, advise=False)
+    as_simulated = replace(parameters, heading_convention='rep103')
+    found = diagnose([run], ship, as_simulated, advise=False)
     return CoastAhead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
 
 
@@ -154,7 +163,8 @@ def _sensors(lead: Window, speed_m_s: float) -> list[Sensor]:
         if len(series) < _LEAST:
             continue
         span_s = (series.time_ns[-1] - series.time_ns[0]) / _SECOND_NS
-        sd, slow = _scatter(series.value), None
+        turns = channel.kind is Channel.HEADING
+        sd, slow = _scatter(np.unwrap(series.value) if turns else series.value), None
         if channel.kind.input == 'speed_through_water':
             size = max(usual.LOG.mean * sd, usual.LOG_LEAST.mean * speed_m_s)
             slow = GaussMarkov(size, usual.LOG_TIME.mean)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -67,3 +68,22 @@ def test_without_a_speed_nothing_is_foretold() -> None:
     )
     with pytest.raises(DiagnosisError, match='no input has told the speed'):
         look_ahead(lead, SHIP, Parameters())
+
+
+@pytest.mark.parametrize('convention', ['rep103', 'compass'])
+def test_no_heading_and_no_convention_of_it_shows_less(convention: str) -> None:
+    """To the west the yaw jumps by a turn, from reading to reading."""
+    east, west = (
+        look_ahead(lead_of(heading_rad=heading), SHIP, parameters)
+        for heading, parameters in (
+            (0.0, Parameters()),
+            (math.pi, Parameters(heading_convention=convention)),
+        )
+    )
+    for name, limit in east.found.limits.items():
+        assert west.found.limits[name].value == pytest.approx(limit.value, rel=0.2), name
+
+
+def test_too_slow_for_any_reading_is_said() -> None:
+    with pytest.raises(DiagnosisError, match='which is that of froude_min'):
+        look_ahead(coasted(speed_m_s=0.5).window.before, SHIP, Parameters())  # type: ignore[arg-type]
