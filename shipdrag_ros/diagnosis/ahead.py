@@ -30,7 +30,7 @@ from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.sensors import STANDARD_SD
 
-_NOW_S = 120.0  # whose speed is that of now
+_NOW_S = 120.0  # that are now
 _LEAST = 12  # readings of an instrument, to show its scatter
 _SLOWINGS = 3.0  # of m u / R: to a quarter of the speed, by quadratic drag
 _SECOND_NS = 1_000_000_000
@@ -135,9 +135,14 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     return CoastAhead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
 
 
+def _since_ns(lead: Window) -> int:
+    """Return since when it is now [ns]."""
+    return lead.end_ns - round(_NOW_S * _SECOND_NS)
+
+
 def _speed(lead: Window) -> float:
     """Return the speed of now [m/s]."""
-    since_ns = lead.end_ns - round(_NOW_S * _SECOND_NS)
+    since_ns = _since_ns(lead)
     for series in lead.each('speed_through_water', 'speed_over_ground'):
         now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
         if len(now) >= _LEAST:
@@ -151,16 +156,16 @@ def _speed(lead: Window) -> float:
             time_s = (late.time_ns.mean() - early.time_ns.mean()) / _SECOND_NS
             return float(np.hypot(*way) / time_s)
     raise DiagnosisError(
-        'no input has told the speed for two minutes: what a coastdown would show is not known'
+        f'no input has told the speed {_LEAST} times in the last {_NOW_S / 60.0:.0f} minutes'
     )
 
 
 def _sensors(lead: Window, speed_m_s: float) -> list[Sensor]:
-    """Return the instruments that are heard, with their rates and their scatter."""
+    """Return the instruments that are heard now, with their rates and their scatter."""
     found = []
     for channel in STANDARD_SD:
         series = lead.series(channel.input)
-        if len(series) < _LEAST:
+        if len(series) < _LEAST or series.time_ns[-1] < _since_ns(lead):
             continue
         span_s = (series.time_ns[-1] - series.time_ns[0]) / _SECOND_NS
         turns = channel.kind is Channel.HEADING

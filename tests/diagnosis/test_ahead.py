@@ -56,6 +56,12 @@ def test_worse_and_fewer_instruments_show_less() -> None:
     assert log.found.limits['current'].value > 3.0 * good.found.limits['current'].value
 
 
+def test_an_instrument_that_has_ceased_shows_nothing() -> None:
+    lead = lead_of()
+    ceased = replace(lead, speed_through_water=lead.speed_through_water[:900])
+    assert 'log_scale' not in look_ahead(ceased, SHIP, Parameters()).found.limits
+
+
 def test_positions_alone_tell_the_speed() -> None:
     ahead = look_ahead(lead_of(inputs=('position',)), SHIP, Parameters())
     assert ahead.speed_m_s == pytest.approx(8.0, rel=0.02)
@@ -66,7 +72,7 @@ def test_without_a_speed_nothing_is_foretold() -> None:
     lead = replace(
         lead, speed_through_water=lead.speed_through_water[:5], position=lead.position[:5]
     )
-    with pytest.raises(DiagnosisError, match='no input has told the speed'):
+    with pytest.raises(DiagnosisError, match='no input has told the speed 12 times in the last 2'):
         look_ahead(lead, SHIP, Parameters())
 
 
