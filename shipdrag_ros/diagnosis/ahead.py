@@ -23,10 +23,11 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference import priors as usual
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.law import usual_baseline
+from shipdrag_ros.posterior.weather import with_usual_shape
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation.effects import LIBRARY, parse
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.sensors import STANDARD_SD
 
@@ -95,10 +96,10 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     Notes
     -----
     The instruments have their own rates and scatter; slow disturbances are the medians of the
-    prior of the noise, the air is still and the water deep unless a depth is read.
+    prior of the noise, the air is still and the water as deep as it is read, or deep.
     """
     speed_m_s = _speed(lead)
-    hull = usual_baseline(ship)
+    hull = with_usual_shape(ship)
     low_m_s = float(hull.speed(parameters.froude_min))
     if not speed_m_s > low_m_s:
         raise DiagnosisError(
@@ -111,19 +112,24 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     lead_s = (lead.end_ns - lead.start_ns) / _SECOND_NS
     calm = min(speed_m_s / usual.WATER_SPEED.mean, 1.0)
     gust_s = usual.GUST_TIME.mean / math.sqrt(2.0 / slowing_s)
-    depth = lead.depth.value
+    sensors, depth_m, effects = _sensors(lead, speed_m_s), Scenario.depth_m, []
+    if any(each.channel is Channel.DEPTH for each in sensors):
+        possible = LIBRARY['shallow_water'].parameters_of(hull)[0]
+        depth_m = min(max(float(np.median(lead.depth.value)), possible.low), possible.high)
+        effects = [parse(f'shallow_water={depth_m}')]
     truth = simulate(
         hull,
         Scenario(
             speed_m_s=speed_m_s,
             lead_in_s=lead_s,
             duration_s=min(_SLOWINGS * slowing_s, parameters.window_s),
-            depth_m=float(np.median(depth)) if len(depth) else Scenario.depth_m,
+            depth_m=depth_m,
             water_speed=GaussMarkov(calm * usual.WATER.mean, usual.WATER_TIME.mean),
             gust_force=GaussMarkov(usual.GUST.mean * force * hull.mass_kg, gust_s),
         ),
+        effects=effects,
     )
-    block = sense(truth, _sensors(lead, speed_m_s), seed=1)
+    block = sense(truth, sensors, seed=1)
     slow = truth.speed_through_water_m_s < low_m_s
     ended = truth.time_s[np.argmax(slow)] if slow.any() else truth.time_s[-1]
     begun_ns = START_NS + round(lead_s * _SECOND_NS)

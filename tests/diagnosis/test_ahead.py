@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import diagnose
@@ -60,6 +61,15 @@ def test_an_instrument_that_has_ceased_shows_nothing() -> None:
     lead = lead_of()
     ceased = replace(lead, speed_through_water=lead.speed_through_water[:900])
     assert 'log_scale' not in look_ahead(ceased, SHIP, Parameters()).found.limits
+
+
+def test_in_shallow_water_that_is_sounded_nothing_else_is_missing() -> None:
+    lead = lead_of(inputs=('speed_through_water', 'position', 'heading', 'shaft', 'depth'))
+    low = replace(lead.depth, value=lead.depth.value - np.median(lead.depth.value) + 12.0)
+    found = look_ahead(replace(lead, depth=low), SHIP, Parameters()).found
+    assert found.candidates[0].names == ('shallow_water',)
+    under_keel = replace(low, value=low.value - 10.0)
+    assert look_ahead(replace(lead, depth=under_keel), SHIP, Parameters()).sentence
 
 
 def test_positions_alone_tell_the_speed() -> None:
