@@ -18,19 +18,21 @@ from shipdrag_ros.diagnosis import words
 from shipdrag_ros.diagnosis.diagnose import diagnose
 from shipdrag_ros.diagnosis.observation import CoastRun
 from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference import priors as usual
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.law import usual_baseline
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.posterior.weather import with_usual_shape
+from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation.effects import LIBRARY, parse
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.sensors import STANDARD_SD
 
-_NOW_S = 120.0  # whose speed is that of now
+_NOW_S = 120.0  # that are now
 _LEAST = 12  # readings of an instrument, to show its scatter
 _SLOWINGS = 3.0  # of m u / R: to a quarter of the speed, by quadratic drag
 _SECOND_NS = 1_000_000_000
@@ -42,6 +44,8 @@ class CoastAhead(NamedTuple):
 
     Attributes
     ----------
+    as_of_ns
+        When the steady record ended [ns since the epoch].
     speed_m_s
         Through water, from which it would begin.
     duration_s
@@ -50,6 +54,7 @@ class CoastAhead(NamedTuple):
         The diagnosis of one in which nothing is missing; its `limits` count.
     """
 
+    as_of_ns: int
     speed_m_s: float
     duration_s: float
     found: DiagnosisResult
@@ -69,7 +74,7 @@ class CoastAhead(NamedTuple):
             of_clean = (
                 f'; if the hull is clean, rule out fouling above {100.0 * limit.value:.0f} %'
             )
-        return f'{begun} {named}{of_clean}.'
+        return f'{begun} {named}{of_clean} (as of {utc(self.as_of_ns)}).'
 
 
 def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
@@ -88,47 +93,66 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     Raises
     ------
     DiagnosisError
-        If no instrument tells the speed of now, or the ship file cannot be simulated.
+        If no instrument tells the speed of now, or it is not above that of `froude_min`.
+    SimulationError
+        If the ship file cannot be simulated.
 
     Notes
     -----
     The instruments have their own rates and scatter; slow disturbances are the medians of the
-    prior of the noise, the air is still and the water deep unless a depth is read.
+    prior of the noise, the air is still and the water as deep as it is read, or deep.
     """
     speed_m_s = _speed(lead)
-    hull = usual_baseline(ship)
+    hull = with_usual_shape(ship)
+    low_m_s = float(hull.speed(parameters.froude_min))
+    if not speed_m_s > low_m_s:
+        raise DiagnosisError(
+            f'nothing would be read, as {speed_m_s:.3g} m/s is not above {low_m_s:.3g} m/s, which '
+            'is that of froude_min'
+        )
     force = float(hull.resistance_n(speed_m_s)) / hull.mass_kg
     inertia = 1.0 + float(hull.n_r(speed_m_s))
     slowing_s = inertia * speed_m_s / force
     lead_s = (lead.end_ns - lead.start_ns) / _SECOND_NS
     calm = min(speed_m_s / usual.WATER_SPEED.mean, 1.0)
     gust_s = usual.GUST_TIME.mean / math.sqrt(2.0 / slowing_s)
-    depth = lead.depth.value
+    sensors, depth_m, effects = _sensors(lead, speed_m_s), Scenario.depth_m, []
+    if any(each.channel is Channel.DEPTH for each in sensors):
+        possible = LIBRARY['shallow_water'].parameters_of(hull)[0]
+        depth_m = min(max(float(np.median(lead.depth.value)), possible.low), possible.high)
+        effects = [parse(f'shallow_water={depth_m}')]
     truth = simulate(
         hull,
         Scenario(
             speed_m_s=speed_m_s,
             lead_in_s=lead_s,
             duration_s=min(_SLOWINGS * slowing_s, parameters.window_s),
-            depth_m=float(np.median(depth)) if len(depth) else Scenario.depth_m,
+            depth_m=depth_m,
             water_speed=GaussMarkov(calm * usual.WATER.mean, usual.WATER_TIME.mean),
             gust_force=GaussMarkov(usual.GUST.mean * force * hull.mass_kg, gust_s),
         ),
+        effects=effects,
     )
-    block = sense(truth, _sensors(lead, speed_m_s), seed=1)
-    slow = truth.speed_through_water_m_s < hull.speed(parameters.froude_min)
+    block = sense(truth, sensors, seed=1)
+    slow = truth.speed_through_water_m_s < low_m_s
     ended = truth.time_s[np.argmax(slow)] if slow.any() else truth.time_s[-1]
     begun_ns = START_NS + round(lead_s * _SECOND_NS)
     end_ns = START_NS + round(float(ended - truth.time_s[0]) * _SECOND_NS)
     window = Window.from_block(block, begun_ns, end_ns, before_ns=START_NS)
     run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
-    found = diagnose([run], ship, parameters, advise=False)
-    return CoastAhead(speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
+    as_simulated = replace(parameters, heading_convention='rep103')
+    found = diagnose([run], ship, as_simulated, advise=False)
+    return CoastAhead(lead.end_ns, speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
+
+
+def _since_ns(lead: Window) -> int:
+    """Return since when it is now [ns]."""
+    return lead.end_ns - round(_NOW_S * _SECOND_NS)
 
 
 def _speed(lead: Window) -> float:
     """Return the speed of now [m/s]."""
-    since_ns = lead.end_ns - round(_NOW_S * _SECOND_NS)
+    since_ns = _since_ns(lead)
     for series in lead.each('speed_through_water', 'speed_over_ground'):
         now = series[int(np.searchsorted(series.time_ns, since_ns)) :]
         if len(now) >= _LEAST:
@@ -142,19 +166,20 @@ def _speed(lead: Window) -> float:
             time_s = (late.time_ns.mean() - early.time_ns.mean()) / _SECOND_NS
             return float(np.hypot(*way) / time_s)
     raise DiagnosisError(
-        'no input has told the speed for two minutes: what a coastdown would show is not known'
+        f'no input has told the speed {_LEAST} times in the last {_NOW_S / 60.0:.0f} minutes'
     )
 
 
 def _sensors(lead: Window, speed_m_s: float) -> list[Sensor]:
-    """Return the instruments that are heard, with their rates and their scatter."""
+    """Return the instruments that are heard now, with their rates and their scatter."""
     found = []
     for channel in STANDARD_SD:
         series = lead.series(channel.input)
-        if len(series) < _LEAST:
+        if len(series) < _LEAST or series.time_ns[-1] < _since_ns(lead):
             continue
         span_s = (series.time_ns[-1] - series.time_ns[0]) / _SECOND_NS
-        sd, slow = _scatter(series.value), None
+        turns = channel.kind is Channel.HEADING
+        sd, slow = _scatter(np.unwrap(series.value) if turns else series.value), None
         if channel.kind.input == 'speed_through_water':
             size = max(usual.LOG.mean * sd, usual.LOG_LEAST.mean * speed_m_s)
             slow = GaussMarkov(size, usual.LOG_TIME.mean)

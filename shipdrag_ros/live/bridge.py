@@ -367,10 +367,7 @@ class Bridge:
             'track': self._ahead.track,
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
-            'verdict': {
-                **self._verdict_now,
-                'ahead': self._would_show if self._coast_ns is None else '',
-            },
+            'verdict': self._verdict_now,
             'past': [past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
@@ -384,7 +381,8 @@ class Bridge:
     @property
     def _verdict_now(self) -> PagePart:
         done = self._found if self._verdict['state'] == 'done' else None
-        return {**(done or self._verdict), 'ahead': '' if self._coast_ns else self._would_show}
+        ahead = self._would_show if self._coast_ns is None else ''
+        return {**(done or self._verdict), 'ahead': ahead}
 
     def _situation(self, now_s: float) -> Situation:
         state = self._health.of('state')

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.ahead import CoastAhead, look_ahead
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -44,6 +47,7 @@ def test_sizes_said_before_are_those_found_after() -> None:
     assert ahead.sentence.startswith('A coastdown from 8 m/s, ')
     assert 'would name, nine times in ten' in ahead.sentence
     assert 'if the hull is clean, rule out fouling above' in ahead.sentence
+    assert ahead.sentence.endswith(f'(as of {utc(lead_of().end_ns)}).')
 
 
 def test_worse_and_fewer_instruments_show_less() -> None:
@@ -53,6 +57,21 @@ def test_worse_and_fewer_instruments_show_less() -> None:
     assert 'radar_scale' in good.found.limits
     assert 'radar_scale' not in log.found.limits
     assert log.found.limits['current'].value > 3.0 * good.found.limits['current'].value
+
+
+def test_an_instrument_that_has_ceased_shows_nothing() -> None:
+    lead = lead_of()
+    ceased = replace(lead, speed_through_water=lead.speed_through_water[:900])
+    assert 'log_scale' not in look_ahead(ceased, SHIP, Parameters()).found.limits
+
+
+def test_in_shallow_water_that_is_sounded_nothing_else_is_missing() -> None:
+    lead = lead_of(inputs=('speed_through_water', 'position', 'heading', 'shaft', 'depth'))
+    low = replace(lead.depth, value=lead.depth.value - np.median(lead.depth.value) + 12.0)
+    found = look_ahead(replace(lead, depth=low), SHIP, Parameters()).found
+    assert found.candidates[0].names == ('shallow_water',)
+    under_keel = replace(low, value=low.value - 10.0)
+    assert look_ahead(replace(lead, depth=under_keel), SHIP, Parameters()).sentence
 
 
 def test_positions_alone_tell_the_speed() -> None:
@@ -65,5 +84,24 @@ def test_without_a_speed_nothing_is_foretold() -> None:
     lead = replace(
         lead, speed_through_water=lead.speed_through_water[:5], position=lead.position[:5]
     )
-    with pytest.raises(DiagnosisError, match='no input has told the speed'):
+    with pytest.raises(DiagnosisError, match='no input has told the speed 12 times in the last 2'):
         look_ahead(lead, SHIP, Parameters())
+
+
+@pytest.mark.parametrize('convention', ['rep103', 'compass'])
+def test_no_heading_and_no_convention_of_it_shows_less(convention: str) -> None:
+    """To the west the yaw jumps by a turn, from reading to reading."""
+    east, west = (
+        look_ahead(lead_of(heading_rad=heading), SHIP, parameters)
+        for heading, parameters in (
+            (0.0, Parameters()),
+            (math.pi, Parameters(heading_convention=convention)),
+        )
+    )
+    for name, limit in east.found.limits.items():
+        assert west.found.limits[name].value == pytest.approx(limit.value, rel=0.2), name
+
+
+def test_too_slow_for_any_reading_is_said() -> None:
+    with pytest.raises(DiagnosisError, match='which is that of froude_min'):
+        look_ahead(coasted(speed_m_s=0.5).window.before, SHIP, Parameters())  # type: ignore[arg-type]

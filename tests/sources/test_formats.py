@@ -12,6 +12,7 @@ import sqlite3
 import struct
 import subprocess
 import sys
+import zlib
 from contextlib import closing
 from pathlib import Path
 
@@ -165,6 +166,19 @@ def test_a_serial_adapter_need_not_give_milliseconds(files: dict[str, Path], tmp
     found, whole = block_of(path, rate=10.0), block_of(plain)
     assert np.array_equal(found.channel, whole.channel)
     assert np.array_equal(found.value, whole.value)
+
+
+def test_a_packed_track_with_damaged_bytes_is_read_as_far_as_it_goes(tmp_path) -> None:
+    point = '<trkpt lat="50.0" lon="5.0"><time>2024-01-01T{:02d}:{:02d}:00Z</time></trkpt>'
+    points = ''.join(point.format(n // 60, n % 60) for n in range(1440))
+    packer = zlib.compressobj(wbits=31)
+    packed = packer.compress(f'<gpx><trk><trkseg>{points}'.encode())
+    path = tmp_path / 'track.gpx.gz'
+    path.write_bytes(packed + packer.flush(zlib.Z_FULL_FLUSH) + b'\x07')  # no kind of block
+    said: list[str] = []
+    (run,) = read_any([path], show=said.extend)
+    assert [each.topic for each in run.topics] == ['/position']
+    assert any('The file is damaged, ' in line for line in said)
 
 
 @pytest.mark.parametrize('length', '01234567')

@@ -17,7 +17,7 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Head, Job
 from shipdrag_ros.sources.log import Tally, iso_ns
-from shipdrag_ros.sources.opened import check_unpacked, opened
+from shipdrag_ros.sources.opened import BROKEN, check_unpacked, opened
 from shipdrag_ros.sources.stream import Origin, Reading, stream_format
 
 _CHUNK = 1 << 16
@@ -49,7 +49,7 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
                     parser.feed(chunk)
                 else:
                     parser.close()
-            except (ParseError, LookupError, ValueError, OSError, EOFError) as error:
+            except (ParseError, LookupError, ValueError, *BROKEN) as error:
                 tally.note(f'The file is damaged, {error}; this is what stands before.')
                 chunk = b''
             yield from points.found
