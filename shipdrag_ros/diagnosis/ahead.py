@@ -24,11 +24,11 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference import priors as usual
 from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.weather import with_usual_shape
+from shipdrag_ros.posterior.weather import measured_by, with_usual_shape
 from shipdrag_ros.samples import Channel, Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
-from shipdrag_ros.simulation.effects import LIBRARY, parse
+from shipdrag_ros.simulation.effects import find
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.sensors import STANDARD_SD
 
@@ -68,12 +68,12 @@ class CoastAhead(NamedTuple):
             'would'
         )
         named = f'name, nine times in ten{shown}' if shown else 'name no effect of any size'
-        limit = self.found.limits.get('fouling')
-        of_clean = ''
-        if limit is not None:
-            of_clean = (
-                f'; if the hull is clean, rule out fouling above {100.0 * limit.value:.0f} %'
-            )
+        clean = ', '.join(
+            f'{words.names_text([name])} above {limit.percent_of_r:.0f} % of r'
+            for name, limit in self.found.limits.items()
+            if 'hull_cleaned' in find(name).facts and not math.isnan(limit.percent_of_r)
+        )
+        of_clean = f'; if the hull is clean, rule out {clean}' if clean else ''
         return f'{begun} {named}{of_clean} (as of {utc(self.as_of_ns)}).'
 
 
@@ -118,9 +118,10 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     gust_s = usual.GUST_TIME.mean / math.sqrt(2.0 / slowing_s)
     sensors, depth_m, effects = _sensors(lead, speed_m_s), Scenario.depth_m, []
     if any(each.channel is Channel.DEPTH for each in sensors):
-        possible = LIBRARY['shallow_water'].parameters_of(hull)[0]
-        depth_m = min(max(float(np.median(lead.depth.value)), possible.low), possible.high)
-        effects = [parse(f'shallow_water={depth_m}')]
+        effect = measured_by('depth')
+        depth = effect.parameters_of(hull)[0]
+        depth_m = min(max(float(np.median(lead.depth.value)), depth.low), depth.high)
+        effects = [StatedEffect(effect.name, {depth.name: replace(depth, value=depth_m)})]
     truth = simulate(
         hull,
         Scenario(

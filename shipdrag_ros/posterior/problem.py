@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import chain, product
 from typing import NamedTuple
 
@@ -28,15 +28,22 @@ from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame
 from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.scenario import Scenario
 
 _STEPS = 80  # of the integration, longer as the ship slows down
 _SPREAD = 25.0  # of all over the time from which steps grow
 _STEPS_A_RUN_DOWN = 3.0
 _VAGUE_SPEED, _VAGUE_S = 0.3, 300.0  # of the steady speed, and of where she was
-_OF_LOG = {'log_scale': motion.SCALE, 'log_offset': motion.OFFSET, 'log_lag': motion.LAG}
-_OF_GROUND = {'radar_scale': motion.GROUND_SCALE}
+_SOME = 0.1  # of what an effect does, to find it by that
+_OF_LOG = {
+    Action(log_factor=_SOME): motion.SCALE,
+    Action(log_offset_m_s=_SOME): motion.OFFSET,
+    Action(log_lag_s=_SOME): motion.LAG,
+}
+_OF_GROUND = {Action(radar_factor=_SOME): motion.GROUND_SCALE}
 EXACT = 1e-8  # sd of what does not act, so that every prior is proper
 LEFT_OPEN = EXACT**-2.0 / 4.0  # precision of what acts is less
 
@@ -404,13 +411,25 @@ def _wrong(kinds: Iterable[int], geodetic: Iterable[int]) -> Iterator[_Option]:
     of_earth, effects = set(map(motion.own, geodetic)), dict[int, Effect]()
     for code in sorted(kinds):
         own = motion.own(code)
-        for name, place in (_OF_LOG if code % KIND_COUNT == LOG else _OF_GROUND).items():
-            if LIBRARY[name].in_geodetic or own not in of_earth:
-                effects[own + place] = LIBRARY[name]
+        for action, place in (_OF_LOG if code % KIND_COUNT == LOG else _OF_GROUND).items():
+            effect = _doing(action)
+            if effect.in_geodetic or own not in of_earth:
+                effects[own + place] = effect
     nothing = 1.0 / (1.0 + sum(each.odds for each in effects.values()))
     yield _Option(nothing)
     for place, effect in effects.items():
         yield _Option(nothing * effect.odds, ((place, *effect.parameters[0].prior.moments()),))
+
+
+@cache
+def _doing(action: Action) -> Effect:
+    """Return the effect of the library that does this and nothing else."""
+    frame = Frame(Ship.example(), Scenario(speed_m_s=1.0), 0.0)
+    return next(
+        each
+        for each in LIBRARY.values()
+        if len(each.parameters) == 1 and each.action(frame, _SOME) == action
+    )
 
 
 class _Hull(NamedTuple):

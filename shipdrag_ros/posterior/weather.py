@@ -114,8 +114,8 @@ class Weather:
     def reference(self, ship: Ship) -> Reference:
         """Return what is known, with what the ship file states."""
         return Reference(
-            _how(self.wind is not None, _denial(_of('wind_apparent'), ship)),
-            _how(self.depth_m is not None, _denial(_of('depth'), ship)),
+            _how(self.wind is not None, _denial(measured_by('wind_apparent'), ship)),
+            _how(self.depth_m is not None, _denial(measured_by('depth'), ship)),
             _how(False, max(_fact(ship, 'no_waves'), _fact(ship, 'calm'))),
         )
 
@@ -138,9 +138,11 @@ def _how(measured: bool, rate: float) -> Knowledge:
     return Knowledge.STATED if rate > 0.0 else Knowledge.UNKNOWN
 
 
-def _of(measured_by: str) -> Effect:
-    """Return the effect of the library that an input measures."""
-    return next(each for each in LIBRARY.values() if measured_by in each.struck_out_by)
+def measured_by(name: str) -> Effect:
+    """
+    Return the effect of the library that an input measures.
+    """
+    return next(each for each in LIBRARY.values() if name in each.struck_out_by)
 
 
 def _fact(ship: Ship, name: str) -> float:
@@ -207,7 +209,7 @@ def _air_per_mass(ship: Ship, z: Float64) -> Float64:
         assert isinstance(usual, Prior)
         area = np.array([usual.at(each) for each in z]) * ship.displaced_volume_m3 ** (2.0 / 3.0)
         return np.asarray(0.5 * AIR_DENSITY_KG_M3 * area / ship.mass_kg, np.float64)
-    more: Float64 = 1.0 + _of('wind_apparent').formula_sd * z
+    more: Float64 = 1.0 + measured_by('wind_apparent').formula_sd * z
     return more * float(ship.air_drag_n(1.0)) / ship.mass_kg
 
 
@@ -229,7 +231,7 @@ def _of_wind(measured: MeasuredWind | None, ship: Ship, speed: Float64) -> Influ
         ahead = ahead + turned * z[:, 3:] * cross
         abeam = (1.0 + gain * z[:, 1:2]) * cross - turned * z[:, 3:] * (speed + head)
         return _influence(WIND, [(1.0, weight, force(z[:, 0], ahead, abeam))])
-    effect = _of('wind_apparent')
+    effect = measured_by('wind_apparent')
     blows = _chance(priors.WINDY.mean, effect, ship)
     z, weight = _nodes(3, 5, 3)
     sheltered = priors.sheltered(float(speed[-1]) / ABOVE)
@@ -255,7 +257,7 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
         forces = forces * (1.0 + priors.DEPTH_FORMULA.sd * z[:, 1:])
         # the most probable reading is the middle one
         return _influence(DEPTH, [(1.0, weight, forces)], float(inertia[len(z) // 2]))
-    effect = _of('depth')
+    effect = measured_by('depth')
     shallow = _chance(effect.odds / (1.0 + effect.odds), effect, ship)
     z, weight = _nodes(5, 3)
     prior = effect.parameters_of(ship)[0].prior
@@ -289,7 +291,7 @@ def _shallow_table(ship: Ship, depths_m: tuple[float, ...]) -> tuple[Float64, Fl
     low, high = ship.baseline_range_m_s
     top = min(high, _FROUDE * float(ship.speed(1.0)))
     speed = np.linspace(max(low, 1e-3 * top), top, _TABLE)
-    effect = _of('depth')
+    effect = measured_by('depth')
     frame = Frame(ship, Scenario(speed_m_s=top, duration_s=1.0), 0.0)
     actions = [effect.action(frame, depth) for depth in depths_m]
     forces = np.array([each.resistance_n(speed) for each in actions]) / ship.mass_kg
