@@ -16,6 +16,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.past import CHANNELS, GEODETIC, NEVER
 from shipdrag_ros.compiled import compiled
@@ -280,6 +281,15 @@ def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Flo
     there = each[:, COUNT] != 0
     time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
     return time, each[there, SPEED] / PER_UNIT
+
+
+def unread(bins: Bins, which: NDArray[np.bool_] | list[int]) -> Bins:
+    """
+    Return bins in which some channels were never read.
+    """
+    closed, filling = bins.closed.copy(), bins.filling.copy()
+    closed[which] = filling[which] = NEVER
+    return bins._replace(closed=closed, filling=filling)
 
 
 def forget_speeds(bins: Bins, source: int) -> None:

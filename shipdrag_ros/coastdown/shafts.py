@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import COUNT, A, Bins, mean_turning
+from shipdrag_ros.coastdown.bins import COUNT, A, Bins, mean_turning, unread
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.vouching import LOOK_S
 from shipdrag_ros.display import utc
@@ -73,11 +73,7 @@ class ShaftWatch:
     def sound(self, bins: Bins) -> Bins:
         """Return bins in which the shafts that are not used were never read."""
         unused = list(self.unused)
-        if not unused:
-            return bins
-        closed, filling = bins.closed.copy(), bins.filling.copy()
-        closed[unused] = filling[unused] = NEVER
-        return bins._replace(closed=closed, filling=filling)
+        return unread(bins, unused) if unused else bins
 
     def look(self, bins: Bins, last: int, probability: float) -> None:
         """

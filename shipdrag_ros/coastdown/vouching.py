@@ -27,6 +27,7 @@ from shipdrag_ros.coastdown.bins import (
     SPEED,
     Bins,
     smoothing,
+    unread,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
 from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
@@ -405,11 +406,7 @@ class Vouching:
     def sound(self, bins: Bins) -> Bins:
         """Return bins in which the sources that are not used were never read."""
         doubted = self.until > self._now
-        if not doubted.any():
-            return bins
-        closed, filling = bins.closed.copy(), bins.filling.copy()
-        closed[doubted] = filling[doubted] = NEVER
-        return bins._replace(closed=closed, filling=filling)
+        return unread(bins, doubted) if doubted.any() else bins
 
     def kept(self, block: Block) -> Block:
         """Return a block without what sources read up to the second since which they are used."""

@@ -21,11 +21,11 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.record import weighted_white_sd
 from shipdrag_ros.inference import priors as usual
-from shipdrag_ros.inference.rows import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.weather import measured_by, with_usual_shape
-from shipdrag_ros.samples import Channel, Float64
+from shipdrag_ros.samples import SECOND_NS, Channel
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
 from shipdrag_ros.simulation.effects import find
@@ -35,7 +35,6 @@ from shipdrag_ros.simulation.sensors import STANDARD_SD
 _NOW_S = 120.0  # that are now
 _LEAST = 12  # readings of an instrument, to show its scatter
 _SLOWINGS = 3.0  # of m u / R: to a quarter of the speed, by quadratic drag
-_SECOND_NS = 1_000_000_000
 
 
 class CoastAhead(NamedTuple):
@@ -113,7 +112,7 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     force = float(hull.resistance_n(speed_m_s)) / hull.mass_kg
     inertia = 1.0 + float(hull.n_r(speed_m_s))
     slowing_s = inertia * speed_m_s / force
-    lead_s = (lead.end_ns - lead.start_ns) / _SECOND_NS
+    lead_s = (lead.end_ns - lead.start_ns) / SECOND_NS
     calm = min(speed_m_s / usual.WATER_SPEED.mean, 1.0)
     gust_s = usual.GUST_TIME.mean / math.sqrt(2.0 / slowing_s)
     sensors, depth_m, effects = _sensors(lead, speed_m_s), Scenario.depth_m, []
@@ -137,18 +136,18 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     block = sense(truth, sensors, seed=1)
     slow = truth.speed_through_water_m_s < low_m_s
     ended = truth.time_s[np.argmax(slow)] if slow.any() else truth.time_s[-1]
-    begun_ns = START_NS + round(lead_s * _SECOND_NS)
-    end_ns = START_NS + round(float(ended - truth.time_s[0]) * _SECOND_NS)
+    begun_ns = START_NS + round(lead_s * SECOND_NS)
+    end_ns = START_NS + round(float(ended - truth.time_s[0]) * SECOND_NS)
     window = Window.from_block(block, begun_ns, end_ns, before_ns=START_NS)
     run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
     as_simulated = replace(parameters, heading_convention='rep103')
     found = diagnose([run], ship, as_simulated, advise=False)
-    return CoastAhead(lead.end_ns, speed_m_s, (end_ns - begun_ns) / _SECOND_NS, found)
+    return CoastAhead(lead.end_ns, speed_m_s, (end_ns - begun_ns) / SECOND_NS, found)
 
 
 def _since_ns(lead: Window) -> int:
     """Return since when it is now [ns]."""
-    return lead.end_ns - round(_NOW_S * _SECOND_NS)
+    return lead.end_ns - round(_NOW_S * SECOND_NS)
 
 
 def _speed(lead: Window) -> float:
@@ -164,7 +163,7 @@ def _speed(lead: Window) -> float:
             half = len(now) // 2
             early, late = now[:half], now[half:]
             way = late.value.mean(axis=0) - early.value.mean(axis=0)
-            time_s = (late.time_ns.mean() - early.time_ns.mean()) / _SECOND_NS
+            time_s = (late.time_ns.mean() - early.time_ns.mean()) / SECOND_NS
             return float(np.hypot(*way) / time_s)
     raise DiagnosisError(
         f'no input has told the speed {_LEAST} times in the last {_NOW_S / 60.0:.0f} minutes'
@@ -178,21 +177,16 @@ def _sensors(lead: Window, speed_m_s: float) -> list[Sensor]:
         series = lead.series(channel.input)
         if len(series) < _LEAST or series.time_ns[-1] < _since_ns(lead):
             continue
-        span_s = (series.time_ns[-1] - series.time_ns[0]) / _SECOND_NS
-        turns = channel.kind is Channel.HEADING
-        sd, slow = _scatter(np.unwrap(series.value) if turns else series.value), None
-        if channel.kind.input == 'speed_through_water':
+        span_s = (series.time_ns[-1] - series.time_ns[0]) / SECOND_NS
+        value = np.unwrap(series.value) if channel.kind is Channel.HEADING else series.value
+        even = np.ones(len(value))
+        sd = max(weighted_white_sd(column, even) for column in np.atleast_2d(value.T))
+        slow = None
+        if channel.kind is Channel.SPEED_THROUGH_WATER:
             size = max(usual.LOG.mean * sd, usual.LOG_LEAST.mean * speed_m_s)
             slow = GaussMarkov(size, usual.LOG_TIME.mean)
-        elif channel.kind.input == 'position':
+        elif channel.kind is Channel.POSITION:
             slow = GaussMarkov(usual.PLACE.mean * speed_m_s, usual.PLACE_TIME.mean)
         rate_hz = (len(series) - 1) / span_s
         found.append(Sensor(channel=channel, rate_hz=rate_hz, sd=sd, coloured=slow))
     return found
-
-
-def _scatter(value: Float64) -> float:
-    """Return the sd of white noise, by second differences of the worse column."""
-    columns = np.atleast_2d(value.T)
-    away = np.abs(np.diff(columns, 2, axis=1))
-    return float(MAD_TO_SD * np.median(away, axis=1).max() / math.sqrt(6.0))

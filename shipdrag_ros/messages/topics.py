@@ -317,6 +317,7 @@ def output_message(topic: OutputTopic, message: object, stamp_ns: int, node: str
 
 OK, WARN, ERROR, STALE = range(4)
 AHEAD = 'a coastdown from here'
+"""Key of what the next coastdown would show."""
 OF_CONDITIONS = 'they are'
 """Key of the conditions that the figures of an estimate are of."""
 READY_S = 600.0  # of steady sailing from which the noise is known well enough

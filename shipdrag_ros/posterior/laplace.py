@@ -144,10 +144,10 @@ class NormalMixture(NamedTuple):
         within = np.tensordot(self.weight, self.covariance, 1)
         return mean, within + (self.weight * away.T) @ away
 
-    def of(self, columns: Float64) -> NormalMixture:
-        """Return those of what columns (p, v) make of the unknowns, each v by itself."""
+    def through(self, columns: Float64) -> tuple[Float64, Float64]:
+        """Return means and variances (m, v) of what columns (p, v) make of the unknowns."""
         variance = np.einsum('pv,mpq,qv->mv', columns, self.covariance, columns, optimize=True)
-        return NormalMixture(self.weight, self.mean @ columns, variance)
+        return self.mean @ columns, variance
 
 
 @dataclass(frozen=True)
@@ -271,11 +271,12 @@ def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Setting
     families, of_taught = (each.about(now, problem.free) for each in (problem.families, taught))
     products, log_det = whitened_products(table, problem.rows, white, problem.steady, settings)
     weight, *kept = mix(products, log_det, settings.weight, families, of_taught)
-    of_free, spread = NormalMixture(*kept).moments()
+    mixture = NormalMixture(*kept)
+    of_free, spread = mixture.moments()
     step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families.precision[0])
     step[problem.free] = of_free
     covariance[np.ix_(problem.free, problem.free)] = spread
-    return _Averaged(weight, NormalMixture(*kept), step, covariance)
+    return _Averaged(weight, mixture, step, covariance)
 
 
 def _of_force(problem: RunModel, found: _Averaged) -> NormalMixture:

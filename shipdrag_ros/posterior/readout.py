@@ -103,9 +103,9 @@ def _half_band(force: NormalMixture, columns: Float64) -> Float64:
     A mixture with a rare model far away has a large variance, which its band does not show.
     """
     at = np.unique(np.linspace(0, columns.shape[1] - 1, _BAND_AT).astype(int))
-    weight, mean, variance = force.of(columns[:, at])
-    size = np.sqrt(weight @ (variance + mean**2))
-    half = _quantile(weight, np.abs(mean) / size, np.sqrt(variance) / size)
+    mean, variance = force.through(columns[:, at])
+    size = np.sqrt(force.weight @ (variance + mean**2))
+    half = _quantile(force.weight, np.abs(mean) / size, np.sqrt(variance) / size)
     return np.interp(np.arange(columns.shape[1]), at, half / _NORMAL)
 
 

@@ -74,6 +74,17 @@ def test_in_shallow_water_that_is_sounded_nothing_else_is_missing() -> None:
     assert look_ahead(replace(lead, depth=under_keel), SHIP, Parameters()).sentence
 
 
+def test_a_coarse_display_shows_no_more_than_the_log_behind_it() -> None:
+    lead = lead_of(noise=0.4)
+    log = lead.speed_through_water
+    shown = replace(log, value=np.round(log.value / 0.1) * 0.1)
+    fine, coarse = (
+        look_ahead(replace(lead, speed_through_water=each), SHIP, Parameters())
+        for each in (log, shown)
+    )
+    assert least(coarse, 'log_lag') > 0.9 * least(fine, 'log_lag')
+
+
 def test_positions_alone_tell_the_speed() -> None:
     ahead = look_ahead(lead_of(inputs=('position',)), SHIP, Parameters())
     assert ahead.speed_m_s == pytest.approx(8.0, rel=0.02)
