@@ -22,6 +22,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -46,7 +47,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.bridge import Bridge
-from shipdrag_ros.live.headline import Tone
+from shipdrag_ros.live.headline import Headline, Tone
 from shipdrag_ros.live.source import PictureFeed
 
 SOURCE = {'label': 'shipdrag', 'type': 'shipdrag_ros'}
@@ -125,11 +126,11 @@ def signal_k_units() -> dict[str, Any]:
 
 
 def _values(values: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [{'path': path, 'value': value} for path, value in values.items() if _is_known(value)]
-
-
-def _is_known(value: object) -> bool:
-    return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+    return [
+        {'path': path, 'value': value}
+        for path, value in values.items()
+        if value is not None and not (isinstance(value, float) and not math.isfinite(value))
+    ]
 
 
 def _time(seconds: float) -> str:
@@ -201,12 +202,14 @@ class Guard:
         return PlainTextResponse('A token is needed: open the page and give it there.\n', 401)
 
     def _is_known(self, host: str) -> bool:
-        name = _name_of(f'//{host}')
         try:
+            name = urlsplit(f'//{host}').hostname or ''
+        except ValueError:  # half a bracket
+            return False
+        with suppress(ValueError):
             ipaddress.ip_address(name)
-        except ValueError:
-            return name in self._names or name.removesuffix('.local') in self._names
-        return True
+            return True
+        return name in self._names or name.removesuffix('.local') in self._names
 
     def _knows_token(self, headers: Headers) -> bool:
         assert self._token is not None
@@ -229,13 +232,6 @@ def same(given: str, expected: str) -> bool:
     Compare in constant time.
     """
     return hmac.compare_digest(given.encode(), expected.encode())
-
-
-def _name_of(address: str) -> str:
-    try:
-        return urlsplit(address).hostname or ''
-    except ValueError:  # half a bracket
-        return ''
 
 
 def _is_same_origin(headers: Headers) -> bool:
@@ -278,9 +274,8 @@ class Frames:
         self.dropped = 0
         self._history = history
         self._parts: dict[str, str] = {}
-        self._kept: deque[bytes] = deque(maxlen=KEPT)
-        self._whole: tuple[int, bytes] | None = None
-        self._first = 1  # a viewer who has not seen this frame needs the whole picture
+        self._kept: deque[bytes] = deque(maxlen=KEPT)  # without those before the last jump
+        self._whole = b''  # as it is, once it was asked for
         self._event = asyncio.Event()
 
     def add(self, parts: Mapping[str, Any], rows: list[Any], *, anew: bool = False) -> None:
@@ -304,11 +299,8 @@ class Frames:
         self.number += 1
         self._kept.append(self._frame('frame', changed, rows))
         if anew:
-            self._first = self.number + 1
             self._kept.clear()
-        elif len(self._kept) == KEPT:
-            self._first = max(self._first, self.number - KEPT + 1)
-        self._whole = None
+        self._whole = b''
         event, self._event = self._event, asyncio.Event()
         event.set()
 
@@ -321,20 +313,18 @@ class Frames:
         number
             None for a viewer who has seen nothing.
         """
-        if number is None or number + 1 < self._first or number > self.number:
-            if number is not None:
-                self.dropped += max(self.number - number, 0)
-            return self.number, self.whole()
-        missing = self.number - number
-        return self.number, b''.join(list(self._kept)[len(self._kept) - missing :])
+        kept, missing = len(self._kept), 0 if number is None else self.number - number
+        if number is not None and 0 <= missing <= kept:
+            return self.number, b''.join(islice(self._kept, kept - missing, None))
+        self.dropped += max(missing, 0)
+        return self.number, self.whole()
 
     def whole(self) -> bytes:
         """
         Return the whole picture, as a viewer who comes gets it.
         """
-        if self._whole is None or self._whole[0] != self.number:
-            self._whole = self.number, self._frame('whole', self._parts, self._history())
-        return self._whole[1]
+        self._whole = self._whole or self._frame('whole', self._parts, self._history())
+        return self._whole
 
     async def more(self, number: int) -> None:
         """
@@ -512,8 +502,8 @@ class LivePage:
         """Say on the page that it shows nothing, and why; once in the log."""
         why = f'{type(error).__name__}: {printable(str(error))}'
         action = f'Nothing here is of now ({why}). Start the page again, and report this.'
-        said = {'tone': Tone.BAD.value, 'text': 'THE PAGE HAS FAILED', 'action': action}
-        self.frames.add({'headline': said}, [], anew=False)
+        said = Headline(Tone.BAD, 'THE PAGE HAS FAILED', action)
+        self.frames.add({'headline': said._asdict()}, [])
         if why not in self._failures and len(self._failures) < _FAILURES:
             self._failures.add(why)
             about = {'message': 'the page cannot be made', 'exception': error}

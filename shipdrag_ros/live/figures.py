@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -112,7 +112,7 @@ class Ahead:
             self._paths.append(path)
             glide = next((each for each in self._coming if each.stamp_ns == path.stamp_ns), None)
             time_s = (self.forecast or {}).get('time_s', (None,))[0]
-        shown = _half_way(self._paths, coast_ns) if path is None else path
+        shown = path or _half_way(self._paths, coast_ns, self._paths[-1].stamp_ns)
         kept = [place for each in self._places.values() for place in each if place[1] >= coast_ns]
         if kept:
             end_ns = max(place[1] for place in kept)
@@ -130,7 +130,7 @@ class Ahead:
             self.forecast['withdrawn'] = known.get(ended_by, ended_by)
 
     def if_stopped(
-        self, ship: Ship | None, speed_m_s: float | None, past: Sequence[PastRun], now_s: int
+        self, ship: Ship | None, speed_m_s: float | None, run: PastRun | None, now_s: int
     ) -> PagePart:
         """
         Return the glide that would begin now, from the hull as last known, or why it is not said.
@@ -140,12 +140,11 @@ class Ahead:
         ship
         speed_m_s
             None where none is read now.
-        past
-            Coastdowns that ended.
+        run
+            The last coastdown that gave a curve.
         now_s
             The ship's time.
         """
-        run = next((each for each in reversed(past) if each.curve is not None), None)
         asked = (ship, speed_m_s is None, run, now_s // _STEP_S)
         if self._answer is None or asked != self._answered:
             self._answered, self._answer = asked, _if_stopped(ship, speed_m_s, run, now_s)
@@ -177,10 +176,13 @@ def _if_stopped(
     return {**part, 'rows': [], 'hull': hull.source}
 
 
-def _half_way(made: Sequence[ComingPath], coast_ns: int) -> ComingPath:
-    """Return the first that was made after the half of the time."""
-    half_ns = (coast_ns + made[-1].stamp_ns) // 2
-    return next(each for each in made if each.stamp_ns >= half_ns)
+_Foretold = TypeVar('_Foretold', ComingGlide, ComingPath)
+
+
+def _half_way(made: Sequence[_Foretold], start_ns: int, end_ns: int) -> _Foretold:
+    """Return the first that was made after the half of a time, or the last."""
+    half_ns = (start_ns + end_ns) // 2
+    return next((each for each in made if each.stamp_ns >= half_ns), made[-1])
 
 
 _CLEAN_POINTS = 60
@@ -293,8 +295,7 @@ def checked_part(made: Sequence[ComingGlide], last: Figure, start_ns: int) -> Pa
     """
     Return what was foretold half-way, beside what was: when she had her last speed.
     """
-    half_ns = (start_ns + last.stamp_ns) // 2
-    then = next((each for each in made if each.stamp_ns >= half_ns), made[-1])
+    then = _half_way(made, start_ns, last.stamp_ns)
     foretold_s, low_s, high_s = then.time_s(last.value)
     return {
         'speed_m_s': last.value,

@@ -12,6 +12,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,7 @@ WIND_M_S = 5.4  # true wind, Beaufort 3: above it air drag is no small correctio
 RUDDER_RAD = math.radians(5.0)  # a mean angle above it is steering, and slows the ship
 COURSE_RAD = 0.35  # the parameter `turn_rad` as it is set at first
 _RECENT_S = 60
+_CONTEXT = (Channel.RUDDER, Channel.HEADING, Channel.WIND_APPARENT, Channel.DEPTH, *SHAFTS)
 _GRAVITY_M_S2 = 9.81
 
 
@@ -39,8 +41,7 @@ class Held(StrEnum):
     SILENT = 'silent'
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """A line of the checklist."""
 
     name: str
@@ -55,14 +56,7 @@ class Recent:
 
     def __init__(self) -> None:
         self._seconds: dict[Channel, deque[tuple[int, float, float]]] = {
-            channel: deque()
-            for channel in (
-                Channel.RUDDER,
-                Channel.HEADING,
-                Channel.WIND_APPARENT,
-                Channel.DEPTH,
-                *SHAFTS,
-            )
+            channel: deque() for channel in _CONTEXT
         }
 
     def add(self, block: Block) -> None:
@@ -238,8 +232,7 @@ class Tone(StrEnum):
     BAD = 'bad'
 
 
-@dataclass(frozen=True)
-class Headline:
+class Headline(NamedTuple):
     """The state in large letters, and the next action."""
 
     tone: Tone

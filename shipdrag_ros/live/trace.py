@@ -8,7 +8,6 @@ Memory is bounded, whatever the rates of the sensors.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
@@ -32,28 +31,22 @@ _COLUMN_OF = {  # of a kind
 TraceRow = tuple[int, float | None, float | None, float | None, float | None]
 
 
-@dataclass
-class _Bin:
-    """Sums and counts over a second, of the first of the instruments that spoke in it."""
-
-    sums: list[float] = field(default_factory=lambda: [0.0] * len(COLUMNS))
-    counts: list[int] = field(default_factory=lambda: [0] * len(COLUMNS))
-    first: dict[int, int] = field(default_factory=dict)
+class _Bin(dict[int, tuple[int, float, int]]):
+    """Instrument, sum and count of each column over a second, of the first that spoke in it."""
 
     def add(self, column: int, total: float, count: int, instrument: int = 0) -> None:
-        first = self.first.setdefault(column, instrument)
+        first, before, times = self.get(column, (instrument, 0.0, 0))
         if instrument < first:
-            self.first[column], self.sums[column], self.counts[column] = instrument, 0.0, 0
+            before, times = 0.0, 0
         if instrument <= first:
-            self.sums[column] += total
-            self.counts[column] += count
+            self[column] = instrument, before + total, times + count
 
     def row(self, second: int) -> TraceRow:
-        means = [
-            float(f'{total / count:.5g}') if count else None
-            for total, count in zip(self.sums, self.counts)
-        ]
-        return (second, *means)  # type: ignore[return-value]
+        log, ground, estimate, shaft = (
+            float(f'{self[column][1] / self[column][2]:.5g}') if column in self else None
+            for column in range(len(COLUMNS))
+        )
+        return second, log, ground, estimate, shaft
 
 
 class Trace:

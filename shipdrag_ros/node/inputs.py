@@ -84,16 +84,11 @@ class Sequences:
         if number is None:
             return
         self.numbered = True
-        if not self._known:
-            self.look()
-        before = max((last for last in self._last if last < number), default=None)
-        if before is not None and number != before + 1:
+        if number - 1 not in self._last:
             self.look()  # a hole, or a publisher that nobody knew
-            if len(self._last) < len(self._known):
-                before = None
-            else:
-                before = max((last for last in self._last if last < number), default=None)
-        if before is not None:
+        new = number - 1 not in self._last and len(self._last) < len(self._known)
+        before = max((last for last in self._last if last < number), default=None)
+        if before is not None and not new:
             self.lost += number - before - 1
             self._last.remove(before)
         self._last.append(number)
@@ -124,23 +119,25 @@ class Mailbox:
     ----------
     topics
         Where they wait.
-    ahead
-        Whether to take what the executor has not come to. Not under simulated time: /clock
-        waits among its messages, and what overtakes it seems to come from the future.
     """
 
-    def __init__(self, topics: Sequence[InputTopic], *, ahead: bool) -> None:
+    def __init__(self, topics: Sequence[InputTopic]) -> None:
         self._topics = topics
-        self._ahead = ahead
         self._waiting: list[HeardMessage] = []
 
-    def take(self) -> list[HeardMessage]:
+    def take(self, *, ahead: bool) -> list[HeardMessage]:
         """
         Return what has come so far, or the older part of it where that is much.
+
+        Parameters
+        ----------
+        ahead
+            Whether to take what the executor has not come to. Not under simulated time: /clock
+            waits among its messages, and what overtakes it seems to come from the future.
         """
         until_ns = sys.maxsize
         for topic in self._topics:
-            taken = topic.take(MOST, ahead=self._ahead)
+            taken = topic.take(MOST, ahead=ahead)
             self._waiting += taken
             if len(taken) == MOST:  # there may be more, that the others must wait for
                 until_ns = min(until_ns, taken[-1].received_ns)

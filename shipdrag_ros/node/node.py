@@ -36,19 +36,9 @@ from shipdrag_ros.messages import (
     Source,
 )
 from shipdrag_ros.messages.topics import ERROR, Health, Status, diagnosis_message
+from shipdrag_ros.node import health
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
-from shipdrag_ros.node.health import (
-    InputFacts,
-    InputStates,
-    Standing,
-    candidates,
-    candidates_text,
-    diagnosis_status,
-    estimate_status,
-    recording_status,
-    state_status,
-)
 from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.recorder import Recorder
@@ -111,8 +101,8 @@ class CoastdownNode(LifecycleNode):
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
         self._nmea: NmeaFeed | None = None
-        self._input_states = InputStates()
-        self._mailbox = Mailbox((), ahead=False)
+        self._input_states = health.InputStates()
+        self._mailbox = Mailbox(())
         self._watching = Watching((), Parameters(), simulated=False)
         self._outputs: dict[str, Publisher] = {}
         self.shown: Callable[[Health], None] = lambda health: None
@@ -221,8 +211,8 @@ class CoastdownNode(LifecycleNode):
             )
             for name, accepted in TOPICS.items()
         ]
-        self._input_states = InputStates()
-        self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
+        self._input_states = health.InputStates()
+        self._mailbox = Mailbox(self._input_topics)
         self._nmea = NmeaFeed(self, settings, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
@@ -265,7 +255,7 @@ class CoastdownNode(LifecycleNode):
         self._session.note(EventKind.LIFECYCLE, 'active', self._now_ns())
         recording = self._recorder.status()
         self.get_logger().info(f'active; {recording.text}; {recording.kept}')
-        self._announcer.status(recording_status(recording))
+        self._announcer.status(health.recording_status(recording))
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
@@ -290,7 +280,7 @@ class CoastdownNode(LifecycleNode):
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._input_topics, self._outputs = [], {}
-        self._mailbox = Mailbox((), ahead=False)
+        self._mailbox = Mailbox(())
         self._ship = self._settings = self._recorder = None
         self._node_parameters.fixed = False
 
@@ -324,7 +314,7 @@ class CoastdownNode(LifecycleNode):
         """Take what has come on all topics, in its order; say whether that was anything."""
         if self._session is not None and self._session.full:
             return False  # each input keeps some more, and counts what it drops
-        taken = self._mailbox.take()
+        taken = self._mailbox.take(ahead=not self._simulated)
         for topic, type_name, data, received_ns in taken:
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
@@ -356,33 +346,35 @@ class CoastdownNode(LifecycleNode):
                 break
         now_ns = self._now_ns()
         session = self._session
-        health = {} if session is None else session.monitor.health()
+        judged = {} if session is None else session.monitor.health()
         if session is not None:
-            self._watching.tick(session, health, now_ns)
-            session.note_removed(now_ns, self.get_logger().warning)
+            self._watching.tick(session, judged, now_ns)
+            for part in session.recorder.removed():
+                self.get_logger().warning(part.text)
+                session.note(EventKind.FILES, part.text, now_ns)
         doubts = self._doubts()
         facts = [
-            topic.facts(health.get(topic.name), doubts.get(topic.name, ''))
+            topic.facts(judged.get(topic.name), doubts.get(topic.name, ''))
             for topic in self._shown_topics
         ]
         states = self._input_states.tick(facts, simulated=self._simulated)
         self._rebind(states, now_ns)
         standing = self._standing(states, now_ns)
-        statuses = [state_status(standing, states), *(state.status for state in states)]
+        statuses = [health.state_status(standing, states), *(state.status for state in states)]
         if self._nmea is not None:
             statuses += self._nmea.statuses()
         if self._recorder is not None:
-            statuses.append(recording_status(self._recorder.status()))
+            statuses.append(health.recording_status(self._recorder.status()))
             self._announcer.status(statuses[-1])
         if session is not None:
-            statuses.append(estimate_status(session.latest, session.why_none))
+            statuses.append(health.estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
         if self._diagnosing is not None:
             found = self._diagnosing.status
             if session is not None and self._compiling is not None and self._compiling.done():
                 self._diagnosing.look_ahead(session.monitor)
-            statuses.append(diagnosis_status(found, self._diagnosing.ahead))
+            statuses.append(health.diagnosis_status(found, self._diagnosing.ahead))
             if found is not self._diagnosed:
                 self._diagnosed = found
                 self._publish_diagnosis(found, now_ns)
@@ -415,7 +407,7 @@ class CoastdownNode(LifecycleNode):
         else:
             self._session.note_diagnosis(message, now_ns)
 
-    def _rebind(self, states: Sequence[InputFacts], now_ns: int) -> None:
+    def _rebind(self, states: Sequence[health.InputFacts], now_ns: int) -> None:
         """Give up a type that is no use where another is published; said and recorded."""
         if self._session is None or self._compiling_s is not None:
             return  # nothing was judged yet
@@ -443,7 +435,7 @@ class CoastdownNode(LifecycleNode):
         own = (self.get_name(), self.get_namespace())
         return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
 
-    def _standing(self, states: Sequence[InputFacts], now_ns: int) -> Standing:
+    def _standing(self, states: Sequence[health.InputFacts], now_ns: int) -> health.Standing:
         session, settings = self._session, self._settings
         hint = ''
         if not any(each.fresh for each in states if each.name in ALL_MOTION):
@@ -455,18 +447,16 @@ class CoastdownNode(LifecycleNode):
             ]
             taken = [topic.topic for topic in self._input_topics]
             by_nmea = '' if self._nmea is None else self._nmea.silence()
-            fitting = candidates_text(candidates(others, MOTION_INPUTS, taken=taken))
+            fitting = health.candidates(others, MOTION_INPUTS, taken=taken)
             hint = '; '.join(filter(None, [by_nmea, fitting]))
-        return Standing(
+        return health.Standing(
             self._state_machine.current_state[1],
-            None if session is None else session.monitor.state,
+            None if session is None else session.monitor,
             now_ns,
             self._simulated,
             candidates=hint,
-            progress=None if session is None else session.monitor.progress,
             compiling_s=self._compiling_s,
             waiting=0 if session is None else session.waiting,
             namesakes=self._namesakes(),
-            steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
             steady_needed_s=0.0 if settings is None else settings.parameters.slope_window_s,
         )

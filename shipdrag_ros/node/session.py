@@ -242,15 +242,6 @@ class Session:
         self.watch_clock(now_ns)
         self._note(kind, text)
 
-    def note_removed(self, now_ns: int, warn: Callable[[str], object]) -> None:
-        """
-        Publish, record and log which recordings were removed since the last time.
-        """
-        self.watch_clock(now_ns)
-        for part in self.recorder.removed():
-            warn(part.text)
-            self._note(EventKind.FILES, part.text)
-
     def note_diagnosis(self, message: OutputMessage, now_ns: int) -> None:
         """
         Publish and record what a coastdown says is missing in the model.

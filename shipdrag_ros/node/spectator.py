@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any, Self
 
@@ -92,15 +94,9 @@ class Spectator:
         self._marks = marks
         self._stopped: Any = None
         self._of_node: list[Any] = []
-        self._of_inputs: dict[str, tuple[str, str, Any]] = {}
+        self._of_inputs: dict[str, tuple[object, Any]] = {}
         self._last_s: dict[str, float] = {}
-        self._ros.create_subscription(
-            message_class(DIAGNOSTIC_ARRAY),
-            '/diagnostics',
-            self._on_diagnostics,
-            _RELIABLE,
-            raw=True,
-        )
+        self._subscribe(DIAGNOSTIC_ARRAY, '/diagnostics', self._on_diagnostics, _RELIABLE)
         self._ros.create_timer(LOOK_S, self._look)
         self._thread = threading.Thread(target=self._spin, name='spectator', daemon=True)
 
@@ -127,6 +123,9 @@ class Spectator:
             asked.cancel()
             return f'the node did not answer within {ANSWER_S:.0f} s: the stop may not be marked'
         return str(asked.result().message)
+
+    def _subscribe(self, kind: str, topic: str, hear: Callable[..., None], qos: QoSProfile) -> Any:
+        return self._ros.create_subscription(message_class(kind), topic, hear, qos, raw=True)
 
     def _spin(self) -> None:
         while self._context.ok():
@@ -168,12 +167,11 @@ class Spectator:
                 self._ros.destroy_client(self._stopped)
             self._stopped = self._ros.create_client(Trigger, f'{node}/engine_stopped')
         self._of_node = [
-            self._ros.create_subscription(
-                message_class(topic.type),
+            self._subscribe(
+                topic.type,
                 topic.under(node),
                 lambda payload, name=topic.name: self._hear(topics.NodeMessage(name, payload)),
                 LATCHED if topic.latched else _RELIABLE,
-                raw=True,
             )
             for topic in OUTPUT_TOPICS
         ]
@@ -209,20 +207,14 @@ class Spectator:
             accepted = TOPICS.get(status.input, ())
             if not topic or kind not in accepted or not is_installed(kind):
                 continue
-            known = self._of_inputs.get(status.input)
-            if known is not None:
-                if known[:2] == (topic, kind):
-                    continue
-                self._ros.destroy_subscription(known[2])
-            source = Source(status.input, kind)
-            subscription = self._ros.create_subscription(
-                message_class(kind),
-                topic,
-                lambda payload, source=source: self._on_reading(source, payload),
-                _READINGS,
-                raw=True,
-            )
-            self._of_inputs[status.input] = (topic, kind, subscription)
+            known, subscription = self._of_inputs.get(status.input, (None, None))
+            if known == (topic, kind):
+                continue
+            if subscription is not None:
+                self._ros.destroy_subscription(subscription)
+            hear = partial(self._on_reading, Source(status.input, kind))
+            subscription = self._subscribe(kind, topic, hear, _READINGS)
+            self._of_inputs[status.input] = (topic, kind), subscription
 
     def _on_reading(self, source: Source, payload: bytes) -> None:
         now_s = time.monotonic()
@@ -378,8 +370,7 @@ class Rehearsal:
     def __init__(self, heard: Callable[[LiveEstimate], None]) -> None:
         self.estimates = 0
         self._heard = heard
-        self._speeds: dict[int, float] = {}
-        self._resistances: dict[int, tuple[float, float]] = {}
+        self._figures: defaultdict[int, dict[str, Any]] = defaultdict(dict)
         self._context = rclpy.Context()
         # Ctrl-C stays what it is in Python; the caller has a process to end
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
@@ -389,13 +380,9 @@ class Rehearsal:
         self.player = Player(self._node, self._executor)
         self._ready = False
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
-        for topic, callback in (
-            (topics.SPEED, self._hear_speed),
-            (topics.RESISTANCE, self._hear_resistance),
-        ):
-            self._node.create_subscription(
-                message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
-            )
+        for topic in (topics.SPEED, topics.RESISTANCE):
+            kind, hear = message_class(topic.type), partial(self._hear_figure, topic.name)
+            self._node.create_subscription(kind, topic.under(DEFAULT_NODE), hear, 1000)
 
     def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
         """
@@ -446,19 +433,13 @@ class Rehearsal:
             values = health.of('state').values
             self._ready = values['lifecycle'] == 'active' and 'compiling [s]' not in values
 
-    def _hear_speed(self, message: Any) -> None:
-        self._speeds[stamp_ns(message)] = message.twist.twist.linear.x
-        self._join(stamp_ns(message))
-
-    def _hear_resistance(self, message: Any) -> None:
-        variance = message.accel.covariance[0]
-        self._resistances[stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
-        self._join(stamp_ns(message))
-
-    def _join(self, stamp_ns: int) -> None:
+    def _hear_figure(self, name: str, message: Any) -> None:
         """Report a moment once both of its figures are there, whichever came first."""
-        if stamp_ns not in self._speeds or stamp_ns not in self._resistances:
-            return
-        resistance, sigma = self._resistances.pop(stamp_ns)
-        self.estimates += 1
-        self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))
+        at_ns = stamp_ns(message)
+        self._figures[at_ns][name] = message
+        if len(self._figures[at_ns]) == 2:
+            both = self._figures.pop(at_ns)
+            speed, r = both[topics.SPEED.name].twist, both[topics.RESISTANCE.name].accel
+            self.estimates += 1
+            figures = speed.twist.linear.x, r.accel.linear.x, r.covariance[0] ** 0.5
+            self._heard(LiveEstimate(at_ns, *figures))

@@ -13,6 +13,7 @@ a network that stalls makes lags longer for a while, and none shorter.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -89,18 +90,13 @@ class SensorClock:
         if least_lag_s is None:
             return 0.0
         self._least_s.append(least_lag_s)
-        lags = list(self._least_s)
+        lags, step_s = list(self._least_s), 0.0
         if len(lags) > 2 * _LATEST:
-            forward_s = min(lags[:-_LATEST]) - max(lags[-_LATEST:])
-            if forward_s >= STEP_S:
-                return self._begin_anew(forward_s)
-        if len(lags) == 2 * LOOKS:
-            back_s = min(lags[LOOKS:]) - min(lags[:LOOKS])
-            if back_s >= STEP_S:
-                return self._begin_anew(-back_s)
-        return 0.0
-
-    def _begin_anew(self, step_s: float) -> float:
+            step_s = max(min(lags[:-_LATEST]) - max(lags[-_LATEST:]), 0.0)
+        if step_s < STEP_S and len(lags) == 2 * LOOKS:
+            step_s = min(min(lags[:LOOKS]) - min(lags[LOOKS:]), 0.0)
+        if abs(step_s) < STEP_S:
+            return 0.0
         self._least_s.clear()
         return step_s
 
@@ -139,7 +135,7 @@ class Watching:
         self._used = 0
         self._heard = (0.0, 0)  # steady time [s] and time of the node [ns]
         self._accepted = (0.0, 0)
-        self._tick_s: float | None = None
+        self._tick_s = -math.inf
         self._stepped: dict[str, tuple[float, str]] = {}
 
     def tick(self, session: Session, health: Mapping[str, InputHealth], now_ns: int) -> None:
@@ -168,8 +164,7 @@ class Watching:
         Look whether the clock of this computer was set; before a message is taken, too.
         """
         moment = None if self._simulated else both_ns()
-        step_s = 0.0 if moment is None else self._own.step_s(*moment)
-        if not step_s:
+        if moment is None or not (step_s := self._own.step_s(*moment)):
             return
         self._clocks = {topic.name: SensorClock() for topic in self._topics}
         if step_s * 1e9 > -BACKWARD_JUMP_NS:  # further back, the arrivals show it
@@ -206,12 +201,11 @@ class Watching:
     def _watch_silence(
         self, session: Session, health: Mapping[str, InputHealth], now_ns: int
     ) -> None:
-        steady_s, now = time.monotonic(), (time.monotonic(), now_ns)
+        steady_s, _ = now = time.monotonic(), now_ns
         ages = [topic.age_s for topic in self._topics if topic.name in ALL_MOTION]
         used = sum(health[name].used for name in ALL_MOTION if name in health)
-        away = self._tick_s is None or steady_s > self._tick_s + AWAY_S
-        last_s = 0.0 if self._tick_s is None else steady_s - self._tick_s
-        self._tick_s = steady_s
+        last_s, self._tick_s = steady_s - self._tick_s, steady_s
+        away = last_s > AWAY_S
         if away or any(age is not None and age <= last_s for age in ages):
             self._heard = now
         if away or used != self._used:
