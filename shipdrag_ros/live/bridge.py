@@ -17,9 +17,8 @@ from typing import Any
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import figures, headline, outputs
-from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, topics, types
-from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SHAFTS, Channel, kind_of
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SECOND_NS, SHAFTS, Channel, kind_of
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -110,7 +109,7 @@ class Bridge:
 
     def __init__(self, ship: Ship | None = None, *, bag: str = '') -> None:
         self._bag = bag
-        self.trace = Trace()
+        self.trace = figures.Trace()
         self.past: list[outputs.PastRun] = []
         self.ship = ship
         self._heard_s: float | None = None
@@ -209,7 +208,7 @@ class Bridge:
     @property
     def now_ns(self) -> int:
         """The ship's time: the latest stamp, 0 before the first [ns]."""
-        return self.trace.newest_s * 1_000_000_000
+        return self.trace.newest_s * SECOND_NS
 
     def speed(self, now_s: float) -> SpeedNow | None:
         """
@@ -341,7 +340,7 @@ class Bridge:
             'checks': self._checks(now, now_s),
             'verdict': self._verdict_now,
             'past': [figures.past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
-            'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
+            'notes': [[stamp // SECOND_NS, text] for stamp, text in self._notes],
         }
 
     def _if_stopped(self, now_s: float) -> figures.PagePart:
@@ -436,7 +435,7 @@ class Bridge:
         if curve is not None:
             shown['usual'] = figures.at_usual_speed(curve, self.ship)
             if last is not None:
-                shown['usual']['run_s'] = last.start_ns // 1_000_000_000  # not of now
+                shown['usual']['run_s'] = last.start_ns // SECOND_NS  # not of now
         return shown
 
     def _inputs(self, silent_s: float) -> _AnyPart:

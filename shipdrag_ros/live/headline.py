@@ -20,7 +20,7 @@ from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
 from shipdrag_ros.messages.topics import READY_S
-from shipdrag_ros.samples import SHAFTS, Block, Channel
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Block, Channel
 from shipdrag_ros.ship import Ship
 
 WIND_M_S = 5.4  # true wind, Beaufort 3: above it air drag is no small correction
@@ -65,7 +65,7 @@ class Recent:
         """
         for channel, kept in self._seconds.items():
             for row in np.flatnonzero(block.channel == channel).tolist():
-                second = int(block.stamp_ns[row]) // 1_000_000_000
+                second = int(block.stamp_ns[row]) // SECOND_NS
                 first, other = block.value[row].tolist()
                 if not (math.isfinite(first) and math.isfinite(other)):
                     continue
@@ -211,15 +211,15 @@ ENDED_S = 600.0  # a run that has ended is the headline for so long
 SILENT_S = 5.0  # the node speaks every second
 
 _ENDED = {
-    EndedBy.SPEED: 'COASTDOWN COMPLETE',
-    EndedBy.TURN: 'TURNED: this run ends here',
-    EndedBy.ENGINE: 'ENGINE AHEAD: this run ends here',
-    EndedBy.BRAKE: 'BRAKED: this run ends here',
-    EndedBy.ASTERN: 'ASTERN: this run ends here',
-    EndedBy.DATA_STOP: 'SPEED LOST: this run ends here',
-    EndedBy.SILENCE: 'ALL INPUTS SILENT: this run ends here',
-    EndedBy.RESET: 'RESET: this run is lost',
-    EndedBy.RECORD_END: 'RECORD ENDS: this run ends here',
+    EndedBy.SPEED.value: 'COASTDOWN COMPLETE',
+    EndedBy.TURN.value: 'TURNED: this run ends here',
+    EndedBy.ENGINE.value: 'ENGINE AHEAD: this run ends here',
+    EndedBy.BRAKE.value: 'BRAKED: this run ends here',
+    EndedBy.ASTERN.value: 'ASTERN: this run ends here',
+    EndedBy.DATA_STOP.value: 'SPEED LOST: this run ends here',
+    EndedBy.SILENCE.value: 'ALL INPUTS SILENT: this run ends here',
+    EndedBy.RESET.value: 'RESET: this run is lost',
+    EndedBy.RECORD_END.value: 'RECORD ENDS: this run ends here',
 }
 
 
@@ -387,10 +387,7 @@ def _coasting(now: Situation) -> Headline:
 
 
 def _ended(now: Situation, ended: Ended) -> Headline:
-    try:
-        text = _ENDED[EndedBy(ended.by)]
-    except (KeyError, ValueError):
-        text = f'RUN ENDED: {ended.by}'
+    text = _ENDED.get(ended.by, f'RUN ENDED: {ended.by}')
     if ended.band is None:
         why = ended.why_not or 'no estimate was possible'
         return Headline(Tone.BAD, 'RUN NOT USABLE', f'{_sentence(why)} {_then(now)}')

@@ -281,17 +281,13 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
     readings = recent.readings
     if not facts.active or not readings:
         return
-    share = recent.used / readings
+    share, motion = recent.used / readings, facts.name in ALL_MOTION
     if share >= USED_MIN:
-        if (
-            facts.name in ALL_MOTION
-            and facts.seconds > 0.5 * RECENT_S
-            and recent.used < RATE_MIN_HZ * facts.seconds
-        ):
+        enough = recent.used >= RATE_MIN_HZ * facts.seconds
+        if motion and facts.seconds > 0.5 * RECENT_S and not enough:
             rate = math.floor(100.0 * recent.used / facts.seconds) / 100.0  # never rounded to 0.2
             yield Finding(WARN, f'{rate:g} Hz is too slow, at least 0.2 Hz is needed')
         return
-    motion = facts.name in ALL_MOTION
     grave = share < MOTION_USED_MIN if motion else not recent.used
     reasons = sorted(recent.rejected.items(), key=lambda item: -item[1])
     why = ', '.join(f'{times} {reason.replace("_", " ")}' for reason, times in reasons)

@@ -39,9 +39,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.health import Counts, InputFacts
-from shipdrag_ros.samples import FURTHER
-
-Publishers = Callable[[], frozenset[str]]
+from shipdrag_ros.samples import FURTHER, SECOND_NS
 
 
 class Sequences:
@@ -70,7 +68,7 @@ class Sequences:
     What was sent before the first message heard is not lost: nobody listened.
     """
 
-    def __init__(self, publishers: Publishers) -> None:
+    def __init__(self, publishers: Callable[[], frozenset[str]]) -> None:
         self.lost = 0
         self.numbered = False
         self._publishers = publishers
@@ -153,7 +151,6 @@ DEPTH = 5000
 LONGEST_BYTES = 65536  # no instrument sends a message as long; thousands may have to wait
 TRIES = 5
 SHARE_HZ = 1000  # of one input, as of one source of NMEA; a flood takes no time from the others
-_SECOND_NS = 1_000_000_000
 _OFFSETS = 32  # readings whose clock offset is kept
 # who joins late still gets the last message
 LATCHED = QoSProfile(
@@ -163,8 +160,6 @@ LATCHED = QoSProfile(
 )
 PATIENCE_S = 10.0  # a type that is subscribed has so long to show that it is sound
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
-
-Arrived = Callable[[], object]
 
 
 def message_class(type_name: str) -> Any:
@@ -256,7 +251,7 @@ class InputTopic:
         *,
         accepted: tuple[str, ...],
         fixed: str,
-        arrived: Arrived,
+        arrived: Callable[[], object],
         simulated: bool,
     ) -> None:
         self._node = node
@@ -499,11 +494,8 @@ class InputTopic:
 
     def _subscribe(self, type_name: str, *, reliable: bool) -> None:
         again = self._subscription is not None
-        waiting: list[HeardMessage] = []
-        if again:
-            waiting = self.take(DEPTH)  # would go with the subscription
-            self.close()
-            self._taken = waiting + self._taken
+        self._taken = self.take(DEPTH) + self._taken  # they would go with the subscription
+        self.close()
         qos = QoSProfile(
             history=HistoryPolicy.KEEP_LAST,
             depth=DEPTH,
@@ -561,7 +553,7 @@ class InputTopic:
         """Count a message in its second of arrival, and say whether that holds too many."""
         if self._share is None or not received_ns:
             return False
-        second = received_ns // _SECOND_NS
+        second = received_ns // SECOND_NS
         if second != self._share[0]:
             self._share = [second, 0]
         self._share[1] += 1

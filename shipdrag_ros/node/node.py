@@ -49,9 +49,8 @@ from shipdrag_ros.node.requests import (
     limit_services,
     refuse_illegal,
 )
-from shipdrag_ros.node.session import Session
+from shipdrag_ros.node.session import Session, Watching
 from shipdrag_ros.node.settings import NodeSettings
-from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
@@ -61,6 +60,7 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 TURNS = 25  # of the mailbox before a tick, after a pause
+_RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
 
 
@@ -296,11 +296,7 @@ class CoastdownNode(LifecycleNode):
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        qos = (
-            LATCHED
-            if topic.latched
-            else QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-        )
+        qos = LATCHED if topic.latched else _RELIABLE
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:

@@ -150,10 +150,8 @@ class Spectator:
             and topics.RESISTANCE_CURVE.type in kinds
             and self._ros.count_publishers(topic)
         )
-        if self._wanted:
-            chosen = self._wanted
-        else:
-            chosen = self.node if self.node in found or not found else found[0]
+        kept = self.node if self.node in found or not found else found[0]
+        chosen = self._wanted or kept
         self.others = tuple(name for name in found if name != chosen)
         if chosen and chosen != self.node:
             self._follow(chosen)
