@@ -87,8 +87,6 @@ def signal_k_deltas(bridge: Bridge, now_s: float) -> list[dict[str, Any]]:
         return []
     parts = bridge.parts(now_s)
     figures, said = parts['figures'], parts['headline']
-    assert isinstance(figures, dict)
-    assert isinstance(said, dict)
     values: dict[str, Any] = {'navigation.speedThroughWater': figures['speed_m_s']}
     ship, r = bridge.ship, bridge.resistance
     if r is not None:
@@ -371,12 +369,12 @@ class FleetPages:
     """
 
     def __init__(self, page: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        from shipdrag_ros.trend.page import page_name  # pictures take long to import
+        from shipdrag_ros.trend.page import coastdown_page, page_name  # slow to import
 
         self.page = page
         self._rows = {page_name(row): row for row in rows}
         self._drawing = threading.Lock()
-        self._made = lru_cache(_KEPT)(self._make)
+        self._made = lru_cache(_KEPT)(lambda name: coastdown_page(self._rows[name], fleet=FLEET))
 
     def coastdown(self, name: str) -> str | None:
         """
@@ -386,11 +384,6 @@ class FleetPages:
             return None
         with self._drawing:
             return self._made(name)
-
-    def _make(self, name: str) -> str:
-        from shipdrag_ros.trend.page import coastdown_page
-
-        return coastdown_page(self._rows[name], fleet=FLEET)
 
 
 class LivePage:
@@ -471,10 +464,12 @@ class LivePage:
         jumped = self._source.advance(now_s)
         bridge = self._source.bridge
         rows = bridge.trace.closed()
-        parts: dict[str, Any] = dict(bridge.parts(now_s))
-        parts['player'] = self._source.player()
-        parts['started'] = self._started
-        parts['clock'] = {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())}
+        parts = {
+            **bridge.parts(now_s),
+            'player': self._source.player(),
+            'started': self._started,
+            'clock': {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())},
+        }
         self.frames.add(parts, [list(row) for row in rows], anew=jumped)
 
     @asynccontextmanager

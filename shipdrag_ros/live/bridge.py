@@ -76,8 +76,6 @@ _CHECKED = {
     'Shaft': 'shaft',
 }
 
-_AnyPart = figures.PagePart | list[Any] | None
-
 
 @dataclass(frozen=True)
 class SpeedNow:
@@ -317,7 +315,7 @@ class Bridge:
     def _now_s(self) -> int:
         return self.trace.newest_s
 
-    def parts(self, now_s: float) -> dict[str, _AnyPart]:
+    def parts(self, now_s: float) -> dict[str, Any]:
         """
         Return every part of the page but the traces.
 
@@ -415,7 +413,7 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self, now_s: float) -> _AnyPart:
+    def _figures(self, now_s: float) -> figures.PagePart:
         speed = self.speed(now_s)
         shown: dict[str, Any] = {'speed_m_s': None}
         if speed is not None:
@@ -438,7 +436,7 @@ class Bridge:
                 shown['usual']['run_s'] = last.start_ns // SECOND_NS  # not of now
         return shown
 
-    def _inputs(self, silent_s: float) -> _AnyPart:
+    def _inputs(self, silent_s: float) -> list[figures.PagePart]:
         silent = silent_s > headline.SILENT_S  # what the node said last is no health of now
         since_s = silent_s if silent else 0.0
         others = ('nmea ', 'recording')  # a sentence that is not used shows in no input
@@ -447,9 +445,9 @@ class Bridge:
         for status in (*self._health.inputs, *besides):
             age_s = status.number('age')
             rejected = {
-                key.removeprefix('rejected '): int(status.number(key) or 0)
+                key.removeprefix('rejected '): int(count)
                 for key in status.values
-                if key.startswith('rejected ')
+                if key.startswith('rejected ') and (count := status.number(key))
             }
             rows.append(
                 {
@@ -460,12 +458,12 @@ class Bridge:
                     else status.message,
                     'rate_hz': None if silent else status.number('rate'),
                     'age_s': None if age_s is None else age_s + since_s,
-                    'rejected': {name: count for name, count in rejected.items() if count},
+                    'rejected': rejected,
                 }
             )
         return rows
 
-    def _checks(self, now: headline.Situation, now_s: float) -> _AnyPart:
+    def _checks(self, now: headline.Situation, now_s: float) -> list[figures.PagePart]:
         speed = self.speed(now_s)
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None

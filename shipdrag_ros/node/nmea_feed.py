@@ -118,7 +118,7 @@ class NmeaFeed:
         self._transducer_m = transducer_m if transducer_m >= 0.0 else None
         self.renew()
         self._unused = 0
-        self._problems: dict[str, str] = {}
+        self._problems: dict[Address, str] = {}
         self._published: dict[Source, Publisher] = {}
         self._live = LiveNmea(
             parse_addresses(settings.nmea),
@@ -220,21 +220,18 @@ class NmeaFeed:
         """
         Say how each source is doing; a change of the line is logged too.
         """
-        counts = self._live.counts()
-        self._log_changes(counts)
-        return [self._status(str(address), of_one) for address, of_one in counts.items()]
-
-    def _log_changes(self, counts: Mapping[Address, SourceCounts]) -> None:
-        for address, count in counts.items():
-            before = self._problems.get(str(address), 'not opened yet')
-            if count.problem != before:
+        said = []
+        for address, counts in self._live.counts().items():
+            if counts.problem != self._problems.get(address, 'not opened yet'):
                 log = self._node.get_logger()
-                if count.problem:
+                if counts.problem:
                     self._interpreter.lose(str(address))
-                    log.warning(f'NMEA {address}: {count.problem}')
+                    log.warning(f'NMEA {address}: {counts.problem}')
                 else:
                     log.info(f'NMEA {address}: open')
-                self._problems[str(address)] = count.problem
+                self._problems[address] = counts.problem
+            said.append(self._status(str(address), counts))
+        return said
 
     def _wake(self) -> None:
         with suppress(rclpy_implementation.InvalidHandle):  # the node goes while a line comes

@@ -109,7 +109,7 @@ class CoastdownNode(LifecycleNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
-        self._first = self.create_timer(FIRST_S, self._publish_first, clock=steady)
+        self._first = self.create_timer(FIRST_S, self._publish_diagnostics, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
         add_services(self, lambda: self._session)
         change, warn = self._service_change_state, self.get_logger().warning
@@ -148,8 +148,7 @@ class CoastdownNode(LifecycleNode):
         """
         if self._diagnosing is not None:
             self._diagnosing.close()  # the coastdown that ends now will not be diagnosed
-        self._deactivate('the process ends')
-        self._end_what_runs_beside()
+        self._release('the process ends')
         self.destroy_node()
 
     # lifecycle
@@ -265,16 +264,13 @@ class CoastdownNode(LifecycleNode):
             left = f'; {session.waiting} messages are for a replay' if session.waiting else ''
             self.get_logger().info(f'{why}; {session.recorder.status().text}{left}')
 
-    def _end_what_runs_beside(self) -> None:
+    def _release(self, why: str = 'released') -> None:
+        self._deactivate(why)
         if self._diagnosing is not None:
             self._diagnosing.close()
         if self._nmea is not None:
             self._nmea.close()
         self._diagnosing = self._nmea = None
-
-    def _release(self) -> None:
-        self._deactivate('released')
-        self._end_what_runs_beside()
         for topic in self._input_topics:
             topic.close()
         for publisher in self._outputs.values():
@@ -337,6 +333,7 @@ class CoastdownNode(LifecycleNode):
     # health
 
     def _publish_diagnostics(self) -> None:
+        self._first.cancel()
         for _ in range(TURNS):  # what came before this tick is timed before it
             if self._simulated or not self._hear():
                 break
@@ -348,7 +345,10 @@ class CoastdownNode(LifecycleNode):
             for part in session.recorder.removed():
                 self.get_logger().warning(part.text)
                 session.note(EventKind.FILES, part.text, now_ns)
-        doubts = self._doubts()
+        # what is odd besides what became of readings, which nobody has judged while code compiles
+        doubts = {}
+        if session is not None and self._compiling_s is None:
+            doubts = session.monitor.doubts() | self._watching.doubts()
         facts = [
             topic.facts(judged.get(topic.name), doubts.get(topic.name, ''))
             for topic in self._shown_topics
@@ -417,23 +417,9 @@ class CoastdownNode(LifecycleNode):
     def _shown_topics(self) -> list[InputTopic]:
         return [topic for topic in self._input_topics if topic.is_shown]
 
-    def _publish_first(self) -> None:
-        self.destroy_timer(self._first)
-        self._publish_diagnostics()
-
-    def _doubts(self) -> dict[str, str]:
-        """Say what is odd about inputs besides what became of their readings."""
-        if self._session is None or self._compiling_s is not None:
-            return {}
-        return self._session.monitor.doubts() | self._watching.doubts()
-
-    def _namesakes(self) -> int:
-        own = (self.get_name(), self.get_namespace())
-        return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
-
     def _standing(self, states: Sequence[health.InputFacts], now_ns: int) -> health.Standing:
         session, settings = self._session, self._settings
-        hint = ''
+        hint, own = '', (self.get_name(), self.get_namespace())
         if not any(each.fresh for each in states if each.name in ALL_MOTION):
             name = self.get_fully_qualified_name()
             others = [
@@ -453,6 +439,6 @@ class CoastdownNode(LifecycleNode):
             candidates=hint,
             compiling_s=self._compiling_s,
             waiting=0 if session is None else session.waiting,
-            namesakes=self._namesakes(),
+            namesakes=max(self.get_node_names_and_namespaces().count(own) - 1, 0),
             steady_needed_s=0.0 if settings is None else settings.parameters.slope_window_s,
         )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import pairwise
 from time import monotonic
 from types import SimpleNamespace
@@ -120,8 +121,6 @@ _LIMITS = {
     'SetParametersAtomically': CHANGES,
 }
 INACTIVE = 'the node is not active'
-
-SessionAction = Callable[[Session], tuple[bool, str]]
 
 
 class RateLimit:
@@ -254,37 +253,27 @@ def add_services(node: Node, session: Callable[[], Session | None]) -> None:
         Returns that of the activation, None while there is none.
     """
 
-    def start_recording(active: Session) -> tuple[bool, str]:
-        active.recorder.start()
-        return _recording(active)
+    def answer(asked: str, request: Any, response: Any) -> Any:
+        active, now_ns = session(), int(node.get_clock().now().nanoseconds)
+        if active is None:
+            response.success, response.message = False, INACTIVE
+        elif asked == 'engine_stopped':
+            response.success, response.message = active.engine_stopped(now_ns)
+        elif asked == 'reset':
+            active.reset('asked for', now_ns)
+            response.success, response.message = True, 'all memory is dropped'
+        else:
+            if asked == 'start_recording':
+                active.recorder.start()
+            else:
+                active.recorder.stop()
+            status = active.recorder.status()
+            response.success = status.state is not RecordingState.FAILED
+            response.message = status.text
+        return response
 
-    def stop_recording(active: Session) -> tuple[bool, str]:
-        active.recorder.stop()
-        return _recording(active)
-
-    def engine_stopped(active: Session) -> tuple[bool, str]:
-        return active.engine_stopped(int(node.get_clock().now().nanoseconds))
-
-    def reset(active: Session) -> tuple[bool, str]:
-        active.reset('asked for', int(node.get_clock().now().nanoseconds))
-        return True, 'all memory is dropped'
-
-    def answered(action: SessionAction) -> Callable[[Any, Any], Any]:
-        def answer(request: Any, response: Any) -> Any:
-            active = session()
-            found = (False, INACTIVE) if active is None else action(active)
-            response.success, response.message = found
-            return response
-
-        return answer
-
-    for action in (start_recording, stop_recording, engine_stopped, reset):
-        node.create_service(Trigger, f'~/{action.__name__}', answered(action))
-
-
-def _recording(active: Session) -> tuple[bool, str]:
-    status = active.recorder.status()
-    return status.state is not RecordingState.FAILED, status.text
+    for name in ('start_recording', 'stop_recording', 'engine_stopped', 'reset'):
+        node.create_service(Trigger, f'~/{name}', partial(answer, name))
 
 
 ROS_OWN = ('use_sim_time', 'start_type_description_service')  # declared by rclpy itself
@@ -334,19 +323,16 @@ class NodeParameters:
     def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
         ours = {*KEYS, 'use_sim_time'}
         changed = {change.name: change.value for change in changes if change.name in ours}
-        if not changed:
-            return SetParametersResult(successful=True)
-        if self.fixed:
-            return SetParametersResult(
-                successful=False,
-                reason=f'{", ".join(changed)}: read-only while configured; clean up first',
-            )
-        changed.pop('use_sim_time', None)
-        try:
-            NodeSettings.from_mapping({**self._values(), **changed}, subject=SUBJECT)
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason='; '.join(error.problems))
-        return SetParametersResult(successful=True)
+        reason = ''
+        if changed and self.fixed:
+            reason = f'{", ".join(changed)}: read-only while configured; clean up first'
+        elif changed:
+            changed.pop('use_sim_time', None)
+            try:
+                NodeSettings.from_mapping({**self._values(), **changed}, subject=SUBJECT)
+            except ParameterError as error:
+                reason = '; '.join(error.problems)
+        return SetParametersResult(successful=not reason, reason=reason)
 
 
 def _descriptor(name: str) -> ParameterDescriptor:

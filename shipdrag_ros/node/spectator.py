@@ -116,13 +116,10 @@ class Spectator:
         client = self._stopped
         if client is None or not client.service_is_ready():
             return 'no node is there to be told: the stop was not marked'
-        done = threading.Event()
-        asked = client.call_async(Trigger.Request())
-        asked.add_done_callback(lambda _: done.set())
-        if not done.wait(ANSWER_S):
-            asked.cancel()
+        answer = client.call(Trigger.Request(), timeout_sec=ANSWER_S)
+        if answer is None:
             return f'the node did not answer within {ANSWER_S:.0f} s: the stop may not be marked'
-        return str(asked.result().message)
+        return str(answer.message)
 
     def _subscribe(self, kind: str, topic: str, hear: Callable[..., None], qos: QoSProfile) -> Any:
         return self._ros.create_subscription(message_class(kind), topic, hear, qos, raw=True)
