@@ -133,7 +133,7 @@ def _values(values: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _time(seconds: float) -> str:
     moment = datetime.fromtimestamp(seconds, UTC)
-    return moment.strftime('%Y-%m-%dT%H:%M:%S.') + f'{moment.microsecond // 1000:03d}Z'
+    return moment.isoformat(timespec='milliseconds').replace('+00:00', 'Z')
 
 
 COOKIE = 'shipdrag'
@@ -141,6 +141,7 @@ _HEADERS = {
     'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; "
     "img-src 'self' data:; connect-src 'self'; form-action 'self'; base-uri 'none'; "
     "frame-ancestors 'none'",
+    'Cache-Control': 'no-store',
     'X-Content-Type-Options': 'nosniff',
     'X-Frame-Options': 'DENY',
     'Referrer-Policy': 'no-referrer',
@@ -178,7 +179,6 @@ class Guard:
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
-                headers.setdefault('Cache-Control', 'no-store')
             await send(message)
 
         app: ASGIApp = self._app if refused is None else refused

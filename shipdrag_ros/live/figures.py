@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from itertools import islice
+from itertools import islice, repeat
 from typing import Any, TypeVar
 
 import numpy as np
@@ -162,13 +162,8 @@ def _if_stopped(
         return {'why': 'no speed is read'}
     try:
         if run is not None and run.curve is not None:
-            curve = run.curve
-            hull = HullNow.of_run(
-                curve.speed_m_s,
-                curve.resistance_m_s2,
-                curve.sigma_m_s2,
-                f'the coastdown of {utc(run.start_ns)}',
-            )
+            curve, of = run.curve, f'the coastdown of {utc(run.start_ns)}'
+            hull = HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, of)
         else:
             hull = HullNow.of_file(ship)
         found = if_stopped(hull, ship, speed_m_s, now_s * SECOND_NS)
@@ -460,12 +455,8 @@ class Trace:
             seconds, place, counts = np.unique(second, return_inverse=True, return_counts=True)
             totals = np.bincount(place, weights=value[known], minlength=len(seconds))
             instrument = 0 if column == _SHAFT else code
-            sums += [
-                (second, column, total, count, instrument)
-                for second, total, count in zip(
-                    seconds.tolist(), totals.tolist(), counts.tolist(), strict=True
-                )
-            ]
+            kept = (seconds.tolist(), repeat(column), totals.tolist(), counts.tolist())
+            sums += zip(*kept, repeat(instrument))
         for each in sorted(sums):  # by time, all inputs abreast
             self._bin(*each)
 
@@ -524,10 +515,8 @@ class Trace:
 
     def _start_over(self) -> None:
         """The time of all went back: a clock was set, or a record is played again."""
-        self._open.clear()
-        self._fine.clear()
-        self._coarse.clear()
-        self._thinning.clear()
+        for kept in (self._open, self._fine, self._coarse, self._thinning):
+            kept.clear()
         self.restarted = True
 
     def _keep(self, row: TraceRow) -> None:

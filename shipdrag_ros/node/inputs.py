@@ -26,7 +26,6 @@ from rclpy.event_handler import (
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
     qos_policy_name_from_kind,
@@ -153,11 +152,7 @@ TRIES = 5
 SHARE_HZ = 1000  # of one input, as of one source of NMEA; a flood takes no time from the others
 _OFFSETS = 32  # readings whose clock offset is kept
 # who joins late still gets the last message
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATIENCE_S = 10.0  # a type that is subscribed has so long to show that it is sound
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
 
@@ -496,20 +491,15 @@ class InputTopic:
         again = self._subscription is not None
         self._taken = self.take(DEPTH) + self._taken  # they would go with the subscription
         self.close()
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=DEPTH,
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.VOLATILE,
-        )
+        offered = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=DEPTH, reliability=offered)
         try:
             self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
         except UnsupportedEventTypeError:  # not every middleware says so
             self._subscription = self._create(type_name, qos)
-        changed = again and self.type != type_name
-        self.type, self.reliable = type_name, reliable
-        if changed or not again:
+        if self.type != type_name:
             self._since_s, self._last_s = time.monotonic(), None
+        self.type, self.reliable = type_name, reliable
         self.incompatible_qos = None
         how = 'reliably' if reliable else 'as best effort, as it is sent'
         what = 'now ' if again else ''

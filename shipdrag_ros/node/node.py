@@ -19,7 +19,7 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -60,7 +60,6 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 TURNS = 25  # of the mailbox before a tick, after a pause
-_RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
 
 
@@ -292,7 +291,7 @@ class CoastdownNode(LifecycleNode):
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        qos = LATCHED if topic.latched else _RELIABLE
+        qos = LATCHED if topic.latched else QoSProfile(depth=10)
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:

@@ -37,17 +37,6 @@ from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, about, sections
 
 LONGEST = 1000  # names or parameters of a request
-# whose requests begin with a sequence
-COUNTED = frozenset(
-    {
-        'DescribeParameters',
-        'GetParameters',
-        'GetParameterTypes',
-        'ListParameters',
-        'SetParameters',
-        'SetParametersAtomically',
-    }
-)
 _Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
 _api = ctypes.pythonapi
 _api.PyCapsule_GetPointer.restype = ctypes.c_void_p
@@ -58,16 +47,6 @@ _api.PyCapsule_New.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p
 
 class TooLong:
     """Stands for a request that was not unpacked."""
-
-
-class _Sequence(ctypes.Structure):
-    """How C holds a sequence."""
-
-    _fields_ = (
-        ('data', ctypes.c_void_p),
-        ('size', ctypes.c_size_t),
-        ('capacity', ctypes.c_size_t),
-    )
 
 
 def unpack_no_giants(service: Service) -> None:
@@ -81,28 +60,26 @@ def unpack_no_giants(service: Service) -> None:
     Parameters
     ----------
     service
-        Of one of the kinds in `COUNTED`; others stay as they are.
+        One whose requests do not begin with a sequence stays as it is.
     """
     kind: Any = service.srv_type
     support: Any = type(kind.Request)
-    if kind.__name__ not in COUNTED or support._CONVERT_TO_PY is None:
+    first = next(iter(kind.Request.get_fields_and_field_types().values()), '')
+    if not first.startswith('sequence<') or support._CONVERT_TO_PY is None:
         return
     unpack = _Convert(_api.PyCapsule_GetPointer(support._CONVERT_TO_PY, None))
 
     def convert(message: int) -> Any:
-        few = _Sequence.from_address(message).size <= LONGEST
-        return unpack(message) if few else TooLong()
+        # C holds a sequence as its address, its size and its capacity
+        size = ctypes.c_size_t.from_address(message + ctypes.sizeof(ctypes.c_void_p)).value
+        return unpack(message) if size <= LONGEST else TooLong()
 
     called = _Convert(convert)
 
-    class Counted(type):
+    class Counted(support):
         """The type of a request, as rclpy looks for what to do with it."""
 
-        _CREATE_ROS_MESSAGE = support._CREATE_ROS_MESSAGE
-        _CONVERT_FROM_PY = support._CONVERT_FROM_PY
         _CONVERT_TO_PY = _api.PyCapsule_New(ctypes.cast(called, ctypes.c_void_p), None, None)
-        _TYPE_SUPPORT = support._TYPE_SUPPORT
-        _DESTROY_ROS_MESSAGE = support._DESTROY_ROS_MESSAGE
         keeps = called  # as long as it can be called
 
     request = Counted('Request', (), {})

@@ -51,8 +51,19 @@ LOOK_S = 1.0
 SAID_S = 10.0  # a message that cannot be shown is said so often at most
 ANSWER_S = 5.0  # that a mark waits for the node
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
-_RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+_RELIABLE = QoSProfile(depth=100)
 _READINGS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def _beside(name: str) -> tuple[rclpy.Context, Node, SingleThreadedExecutor]:
+    """Make a node on a context of its own, with what spins it."""
+    context = rclpy.Context()
+    # the caller has a process to end; Ctrl-C stays what it is there
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(name, context=context, start_parameter_services=False)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    return context, node, executor
 
 
 class Spectator:
@@ -83,14 +94,7 @@ class Spectator:
         self.others: tuple[str, ...] = ()
         self._hear = hear
         self._wanted = node
-        self._context = rclpy.Context()
-        # the caller has a process to end; Ctrl-C stays what it is there
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._ros = rclpy.create_node(
-            'shipdrag_watch', context=self._context, start_parameter_services=False
-        )
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._ros)
+        self._context, self._ros, self._executor = _beside('shipdrag_watch')
         self._marks = marks
         self._stopped: Any = None
         self._of_node: list[Any] = []
@@ -243,7 +247,6 @@ class Player:
         self._node = node
         self._executor = executor
         self._topics: dict[str, Publisher] = {}
-        self._clock: Publisher | None = None
 
     def connect(self, block: Block, *, timeout_s: float = TIMEOUT_S) -> None:
         """
@@ -275,14 +278,13 @@ class Player:
         ShipdragError
             If nobody hears it.
         """
-        if self._clock is None:
-            self._clock = self._topics['/clock'] = self._node.create_publisher(
-                Clock, '/clock', QOS
-            )
+        first = '/clock' not in self._topics
+        clock = self._publisher('/clock', 'rosgraph_msgs/msg/Clock')
+        if first:
             self._wait_for_listeners(TIMEOUT_S)
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(int(time_ns), SECOND_NS)
-        self._clock.publish(message)
+        clock.publish(message)
 
     def play(
         self, block: Block, *, speed: float, progress: Callable[[float], None] = lambda _: None
@@ -366,12 +368,7 @@ class Rehearsal:
         self.estimates = 0
         self._heard = heard
         self._figures: defaultdict[int, dict[str, Any]] = defaultdict(dict)
-        self._context = rclpy.Context()
-        # Ctrl-C stays what it is in Python; the caller has a process to end
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node('rehearsal', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._context, self._node, self._executor = _beside('rehearsal')
         self.player = Player(self._node, self._executor)
         self._ready = False
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
