@@ -463,6 +463,7 @@ class LivePage:
         now_s = time.monotonic()
         jumped = self._source.advance(now_s)
         bridge = self._source.bridge
+        restarted, bridge.trace.restarted = bridge.trace.restarted, False
         rows = bridge.trace.closed()
         parts = {
             **bridge.parts(now_s),
@@ -470,7 +471,7 @@ class LivePage:
             'started': self._started,
             'clock': {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())},
         }
-        self.frames.add(parts, [list(row) for row in rows], anew=jumped)
+        self.frames.add(parts, [list(row) for row in rows], anew=jumped or restarted)
 
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:

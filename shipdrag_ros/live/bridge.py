@@ -137,7 +137,11 @@ class Bridge:
         """
         match heard:
             case topics.Samples(block):
+                before_s = self._now_s
                 self.trace.add(block)
+                if self._now_s < before_s:  # time went back: the rest is of another one
+                    self._recent, self._ahead = headline.Recent(), figures.Ahead()
+                    self._courses.clear()
                 self._recent.add(block)
                 self._ahead.add(block)
                 self._note_course()

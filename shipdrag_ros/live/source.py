@@ -245,8 +245,7 @@ class NodeSource(PictureFeed):
                 self.bridge.add_past(heard)
             else:
                 self.bridge.hear(heard, now_s)
-        restarted, self.bridge.trace.restarted = self.bridge.trace.restarted, False
-        return restarted
+        return False
 
 
 class BagSource(PictureFeed):
