@@ -27,14 +27,7 @@ from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError, ShipFileError
-from shipdrag_ros.messages import (
-    OUTPUT_TOPICS,
-    TOPICS,
-    EventKind,
-    OutputMessage,
-    OutputTopic,
-    Source,
-)
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, EventKind, OutputMessage, Source
 from shipdrag_ros.messages.topics import ERROR, Health, Status, diagnosis_message
 from shipdrag_ros.node import health
 from shipdrag_ros.node.announcer import Announcer
@@ -42,13 +35,7 @@ from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.requests import (
-    NodeParameters,
-    add_services,
-    check_sections,
-    limit_services,
-    refuse_illegal,
-)
+from shipdrag_ros.node.requests import NodeParameters, add_services, limit_services
 from shipdrag_ros.node.session import Session, Watching
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.parameters import Parameters
@@ -87,8 +74,7 @@ class CoastdownNode(LifecycleNode):
         super().__init__(
             NAME, context=context, automatically_declare_parameters_from_overrides=True
         )
-        check_sections(arguments, self)
-        self._node_parameters = NodeParameters(self)
+        self._node_parameters = NodeParameters(self, arguments)
         self._failure: ShipdragError | None = None
         self._settings: NodeSettings | None = None
         self._ship: Ship | None = None
@@ -111,9 +97,8 @@ class CoastdownNode(LifecycleNode):
         self._first = self.create_timer(FIRST_S, self._publish_diagnostics, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
         add_services(self, lambda: self._session)
-        change, warn = self._service_change_state, self.get_logger().warning
-        refuse_illegal(change, warn)
-        limit_services((*self.services, change), warn)  # rclpy does not list it among them
+        services = (*self.services, self._service_change_state)  # which rclpy does not list
+        limit_services(services, self.get_logger().warning)
 
     def declare_parameters(
         self, namespace: str, parameters: list[Any], ignore_override: bool = False
@@ -192,10 +177,10 @@ class CoastdownNode(LifecycleNode):
         self._settings = settings
         self.get_logger().info(f'recordings are written to {directory}')
         self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)
-        self._outputs = {
-            topic.under(self.get_fully_qualified_name()): self._publisher(topic)
-            for topic in OUTPUT_TOPICS
-        }
+        for topic in OUTPUT_TOPICS:
+            qos = LATCHED if topic.latched else QoSProfile(depth=10)
+            publisher = self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
+            self._outputs[topic.under(self.get_fully_qualified_name())] = publisher
         self._outputs['ship'] = self.create_publisher(String, '~/ship', LATCHED)
         self._outputs['ship'].publish(String(data=self._ship.to_yaml()))
         self._input_topics = [
@@ -289,10 +274,6 @@ class CoastdownNode(LifecycleNode):
         return bool(self.get_parameter('use_sim_time').value)
 
     # traffic
-
-    def _publisher(self, topic: OutputTopic) -> Publisher:
-        qos = LATCHED if topic.latched else QoSProfile(depth=10)
-        return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
         if self.context.ok():  # after an outside shutdown the bag alone gets the last figures

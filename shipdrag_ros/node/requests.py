@@ -16,6 +16,7 @@ from time import monotonic
 from types import SimpleNamespace
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -139,7 +140,7 @@ class RateLimit:
 
 def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
     """
-    Let each service refuse what comes too often or is too long.
+    Let each service refuse what comes too often, is too long, or is a transition that is not there.
 
     Parameters
     ----------
@@ -150,21 +151,14 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
     """
     for service in services:
         limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
+        if service.srv_type is ChangeState:
+            _refuse_illegal(service, warn)
         unpack_no_giants(service)
         service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
-def refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
-    """
-    Refuse transitions that are not there; rclpy would raise out of the executor.
-
-    Parameters
-    ----------
-    change_state
-        The service that is asked for transitions.
-    warn
-        Called with each refusal.
-    """
+def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
+    """Refuse transitions that are not there; rclpy would raise out of the executor."""
     change = change_state.callback
 
     def refuse_or_change(request: Any, response: Any) -> Any:
@@ -266,6 +260,8 @@ class NodeParameters:
     node
         Made with `automatically_declare_parameters_from_overrides`, so that unknown names and
         values without a type are seen.
+    arguments
+        Command line, to check its parameter files.
 
     Raises
     ------
@@ -273,7 +269,8 @@ class NodeParameters:
         Naming every unknown key and every bad value at once.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, arguments: Sequence[str]) -> None:
+        _check_sections(arguments, node)
         self._node = node
         self.fixed = False
         given = {name: each.value for name, each in node.get_parameters_by_prefix('').items()}
@@ -337,7 +334,7 @@ def _descriptor(name: str) -> ParameterDescriptor:
     return descriptor
 
 
-def check_sections(arguments: Sequence[str], node: Node) -> None:
+def _check_sections(arguments: Sequence[str], node: Node) -> None:
     """
     Refuse a parameter file none of whose sections is for this node.
 

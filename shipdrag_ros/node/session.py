@@ -53,8 +53,6 @@ from shipdrag_ros.samples import ALL_MOTION, BACKWARD_JUMP_NS, MOTION_INPUTS
 if TYPE_CHECKING:  # ROS is behind it
     from shipdrag_ros.node.inputs import InputTopic
 
-Publish = Callable[[OutputMessage], None]
-OnEvent = Callable[[Event], None]
 Count = Callable[[Decoded], None]
 
 WAITING_MOST = 200_000  # messages that wait for compiled code
@@ -97,10 +95,10 @@ class Session:
         monitor: Monitor,
         recorder: Recorder,
         *,
-        publish: Publish,
+        publish: Callable[[OutputMessage], None],
         node: str,
         ended: OnCoastdown = lambda coastdown, window: None,
-        on_event: OnEvent = lambda event: None,
+        on_event: Callable[[Event], None] = lambda event: None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
