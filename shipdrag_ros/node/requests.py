@@ -140,7 +140,7 @@ class RateLimit:
 
 def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
     """
-    Let each service refuse what comes too often, is too long, or is a transition that is not there.
+    Let each service refuse what comes too often, is too long, or is no transition.
 
     Parameters
     ----------

@@ -31,18 +31,7 @@ from std_srvs.srv import Trigger
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError, reason_of
-from shipdrag_ros.messages import (
-    DEFAULT_NODE,
-    OUTPUT_TOPICS,
-    TOPICS,
-    MalformedMessage,
-    Source,
-    decode,
-    encode,
-    input_type,
-    topics,
-)
-from shipdrag_ros.messages.topics import read_health as decode_health
+from shipdrag_ros.messages import MalformedMessage, decode, encode, input_type, topics
 from shipdrag_ros.messages.types import DIAGNOSTIC_ARRAY, stamp_ns
 from shipdrag_ros.node.inputs import LATCHED, is_installed, message_class
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
@@ -172,7 +161,7 @@ class Spectator:
                 lambda payload, name=topic.name: self._hear(topics.NodeMessage(name, payload)),
                 LATCHED if topic.latched else _RELIABLE,
             )
-            for topic in OUTPUT_TOPICS
+            for topic in topics.OUTPUT_TOPICS
         ]
         self._of_node.append(
             self._ros.create_subscription(
@@ -185,7 +174,7 @@ class Spectator:
 
     def _on_diagnostics(self, payload: bytes) -> None:
         try:
-            heard = decode_health(payload)
+            heard = topics.read_health(payload)
         except MalformedMessage:
             return  # of somebody else: nobody's health is known by it
         own = [health for health in heard if self._is_own(health)]
@@ -203,7 +192,7 @@ class Spectator:
         """Hear the topics that the node hears, in the types that it hears."""
         for status in health.inputs:
             topic, kind = status.values.get('topic', ''), status.values.get('type', '')
-            accepted = TOPICS.get(status.input, ())
+            accepted = topics.TOPICS.get(status.input, ())
             if not topic or kind not in accepted or not is_installed(kind):
                 continue
             known, subscription = self._of_inputs.get(status.input, (None, None))
@@ -211,11 +200,11 @@ class Spectator:
                 continue
             if subscription is not None:
                 self._ros.destroy_subscription(subscription)
-            hear = partial(self._on_reading, Source(status.input, kind))
+            hear = partial(self._on_reading, topics.Source(status.input, kind))
             subscription = self._subscribe(kind, topic, hear, _READINGS)
             self._of_inputs[status.input] = (topic, kind), subscription
 
-    def _on_reading(self, source: Source, payload: bytes) -> None:
+    def _on_reading(self, source: topics.Source, payload: bytes) -> None:
         now_s = time.monotonic()
         if now_s - self._last_s.get(source.input, 0.0) < CLOSEST_S:
             return
@@ -374,7 +363,7 @@ class Rehearsal:
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
         for topic in (topics.SPEED, topics.RESISTANCE):
             kind, hear = message_class(topic.type), partial(self._hear_figure, topic.name)
-            self._node.create_subscription(kind, topic.under(DEFAULT_NODE), hear, 1000)
+            self._node.create_subscription(kind, topic.under(topics.DEFAULT_NODE), hear, 1000)
 
     def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
         """
