@@ -260,9 +260,8 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found.values:
-            self.show_verdict(
-                found.values.get('state', ''), found.message, found.values.get(topics.AHEAD, '')
-            )
+            ahead = found.values.get(topics.AHEAD, '')
+            self.show_verdict(found.values.get('state', ''), found.message, ahead)
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':
@@ -278,9 +277,8 @@ class Bridge:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
                     self._bands.append((age_s, curve.band(self.ship)))
         elif name == 'forecast':
-            self._ahead.take(
-                outputs.read_forecast(payload), self.ship, self._speed, self._coast_ns
-            )
+            coming = outputs.read_forecast(payload)
+            self._ahead.take(coming, self.ship, self._speed, self._coast_ns)
         elif name == 'forecast_path':
             self._ahead.take_path(outputs.read_path(payload), self._coast_ns)
         elif name == 'events':
@@ -329,7 +327,7 @@ class Bridge:
             On the clock of `hear`.
         """
         now = self._situation(now_s)
-        of_run = _is_of_run(now)
+        of_run = now.coast_s is not None or now.just_ended is not None
         return {
             'headline': headline.headline(now)._asdict(),
             'ship': figures.ship_part(self.ship),
@@ -413,7 +411,7 @@ class Bridge:
     def _steer_deg(self) -> float | None:
         if not self.past or self._is_paired or self.past[-1].curve is None:
             return None
-        if self._now_s - self.past[-1].end_ns * 1e-9 > 12 * 3600.0:
+        if self._now_s - self.past[-1].end_ns * 1e-9 > outputs.ONE_DAY_S:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
@@ -471,7 +469,7 @@ class Bridge:
         speed = self.speed(now_s)
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
-        began = now.monitor == 'candidate' or _is_of_run(now)
+        began = now.monitor == 'candidate' or coasting or now.just_ended is not None
         lead_s = self._lead_at_stop if began else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
@@ -490,20 +488,12 @@ class Bridge:
                 min((each[0] for each in shafts if each is not None), default=None)
             ),
             headline.course_check(turned, coasting=coasting),
-            headline.reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
+            headline.reciprocal_check(now.steer_deg, paired=now.paired, coasting=coasting),
         ]
         return [self._unless_silent(check)._asdict() for check in checks]
 
     def _unless_silent(self, check: headline.Check) -> headline.Check:
-        name = _CHECKED.get(check.name, '')
-        status = self._health.of(f'input {name}')
+        status = self._health.of(f'input {_CHECKED.get(check.name)}')
         if status.level != topics.STALE:
             return check
         return check._replace(held=headline.Held.SILENT, text=status.message)
-
-
-def _is_of_run(now: headline.Situation) -> bool:
-    """Say whether she coasts, or has until a while ago."""
-    return now.coast_s is not None or (
-        now.ended is not None and now.ended.ago_s < headline.ENDED_S
-    )

@@ -307,6 +307,11 @@ class Situation:
     steer_deg: float | None = None
     paired: bool = False
 
+    @property
+    def just_ended(self) -> Ended | None:
+        """The last coastdown where it is the headline still."""
+        return self.ended if self.ended is not None and self.ended.ago_s < ENDED_S else None
+
 
 def headline(now: Situation) -> Headline:
     """
@@ -348,8 +353,8 @@ def _sailing(now: Situation) -> Headline:
             'SLOWING: coastdown?',
             'If the engine is stopped: leave it, rudder amidships. The answer takes two minutes.',
         )
-    if now.ended is not None and now.ended.ago_s < ENDED_S:
-        return _ended(now, now.ended)
+    if now.just_ended is not None:
+        return _ended(now, now.just_ended)
     return _before(now)
 
 

@@ -205,7 +205,7 @@ def _points(
 
 
 _OPPOSITE_DEG = 30.0  # by which a reciprocal heading may be off
-_ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair
+ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,7 @@ class PastRun:
         if self.curve is None or other.curve is None:
             return False
         apart = math.remainder(self.compass_deg - other.compass_deg - 180.0, 360.0)
-        near = abs(self.start_ns - other.start_ns) * 1e-9 <= _ONE_DAY_S
+        near = abs(self.start_ns - other.start_ns) * 1e-9 <= ONE_DAY_S
         return abs(apart) <= _OPPOSITE_DEG and near
 
 
