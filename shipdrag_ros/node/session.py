@@ -328,19 +328,13 @@ _MOMENT_NS = 100_000_000
 _LATEST = 2  # ticks that show a step forward
 
 
-def boot_ns() -> int:
-    """
-    Return a time that nobody sets, and that goes on while the computer sleeps [ns].
-    """
-    return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
-
-
 def both_ns() -> tuple[int, int] | None:
     """
-    Return the clock of this computer and `boot_ns` at one moment.
+    Return the clock of this computer and one that nobody sets at one moment [ns].
 
-    None where the process was held up between the two.
+    The other goes on while the computer sleeps. None where the process was held up between them.
     """
+    boot_ns = partial(time.clock_gettime_ns, time.CLOCK_BOOTTIME)
     before_ns, now_ns = boot_ns(), time.time_ns()
     after_ns = boot_ns()
     return (now_ns, after_ns) if after_ns - before_ns < _MOMENT_NS else None
@@ -492,7 +486,8 @@ class Watching:
     def _watch_silence(
         self, session: Session, health: Mapping[str, InputHealth], now_ns: int
     ) -> None:
-        steady_s, _ = now = time.monotonic(), now_ns
+        steady_s = time.monotonic()
+        now = (steady_s, now_ns)
         ages = [topic.age_s for topic in self._topics if topic.name in ALL_MOTION]
         used = sum(health[name].used for name in ALL_MOTION if name in health)
         last_s, self._tick_s = steady_s - self._tick_s, steady_s
