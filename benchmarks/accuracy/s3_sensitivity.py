@@ -33,10 +33,11 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import (
+from shipdrag_ros.studies.manoeuvring import (
+    FORM,
     Motions,
     Side,
+    mariner,
     overshoots_rad,
     steer,
     turn,

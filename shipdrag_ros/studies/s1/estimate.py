@@ -27,10 +27,15 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.least_squares import inverse, triangle
-from shipdrag_ros.studies.order import OrderTable, fit_orders, rounding
-from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.studies.s1.motion import PolynomialMotion, at_end, resistance_curve
+from shipdrag_ros.studies.least_squares import OrderTable, inverse, rounding, triangle
+from shipdrag_ros.studies.s1.motion import (
+    OrthogonalBasis,
+    PolynomialMotion,
+    TimeScale,
+    at_end,
+    fit_orders,
+    resistance_curve,
+)
 
 
 @dataclass(frozen=True)
@@ -153,7 +158,7 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     # each input condensed once; weights and orders are then a matter of small matrices
     factors = np.concatenate(
         [
-            triangle(_with_values(rows, data.value)) / sigma
+            triangle(np.vstack([rows, data.value]).T) / sigma
             for rows, data, sigma in zip((basis.columns[:, : counts[0]], rates), inputs, sigmas)
         ]
     )
@@ -189,11 +194,6 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
         basis.reorthogonalised + sum(solution.reorthogonalised for solution in alone),
         notes,
     )
-
-
-def _with_values(rows: Float64, values: Float64) -> Float64:
-    """Return [H | z], (n, k + 1), from H' (k, n) and z (n,)."""
-    return np.concatenate([rows, values[None]]).T
 
 
 def _least_sigma(values: Float64) -> float:

@@ -48,7 +48,6 @@ from shipdrag_ros.studies.cable.drag import (
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LINES: dict[str, dict[str, Any]] = {
@@ -112,13 +111,10 @@ def tangent_picture(tangent: Tangent, tolerance: float) -> Figure:
             xlim=(0.0, speed[-1]),
         )
         for axis in (top, bottom):
-            _shade(axis, low * v0, min(high * v0, speed[-1]))
+            span = low * v0, min(high * v0, speed[-1])
+            axis.axvspan(*span, color=RANGE_COLOR, zorder=0, label='where the tangent may be used')
         top.legend(loc='upper left')
     return figure
-
-
-def _shade(axis: Axes, low: float, high: float) -> None:
-    axis.axvspan(low, high, color=RANGE_COLOR, zorder=0, label='where the tangent may be used')
 
 
 _FORMULAS = (
@@ -171,21 +167,16 @@ def run(options: argparse.Namespace) -> int:
     cable = Cable(options.length, options.diameter, options.drag)
     tangent = Tangent(cable.in_water(options.density), options.speed)
     show(output, shown(cable, tangent, options.tolerance), options.report)
-    output.json(document(cable, tangent, options.tolerance))
+    output.json(
+        {  # ranges and rows are in u = V/V0
+            'c0': cable.c0,
+            'drag_n': tangent.drag_n,
+            'linear_gain_n_per_m_s': tangent.gain_n_per_m_s,
+            'linear_range': tangent_range(options.tolerance),
+            'errors': compare_errors(tangent.speed_m_s, options.tolerance),
+        }
+    )
     return 0
-
-
-def document(cable: Cable, tangent: Tangent, tolerance: float) -> dict[str, Any]:
-    """
-    Return the document of a cable; ranges and rows are in u = V/V0.
-    """
-    return {
-        'c0': cable.c0,
-        'drag_n': tangent.drag_n,
-        'linear_gain_n_per_m_s': tangent.gain_n_per_m_s,
-        'linear_range': tangent_range(tolerance),
-        'errors': compare_errors(tangent.speed_m_s, tolerance),
-    }
 
 
 def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
@@ -218,7 +209,7 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
     on_a_ship = f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...'
     return Presentation(
         'Drag of a towed cable, and a line in place of it',
-        f'{sentence(cable, tangent)} {line(tangent, tolerance)}',
+        sentence(cable, tangent, tolerance),
         [
             Section(_LINES, tables=tables),
             Section('Before it is used', lines=(*notes(cable), on_a_ship)),
@@ -229,28 +220,20 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
     )
 
 
-def sentence(cable: Cable, tangent: Tangent) -> str:
+def sentence(cable: Cable, tangent: Tangent, tolerance: float) -> str:
     """
-    Say what the drag is.
+    Say what the drag is, which line may replace it, and where.
     """
     kind = (
         f'{cable.drag} cable' if isinstance(cable.drag, CableSurface) else 'cable with a stated C0'
     )
-    return (
-        f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
-        f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N.'
-    )
-
-
-def line(tangent: Tangent, tolerance: float) -> str:
-    """
-    Say which line may replace the drag, and where.
-    """
     low, high = tangent_range(tolerance)
     upward = f'to {high * tangent.speed_m_s:.4g} m/s (u = V/V0 from {low:.4f} to {high:.4f})'
     if not math.isfinite(high):
         upward = f'on (u = V/V0 from {low:.4f}, without upper end)'
     return (
+        f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
+        f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N. '
         f'The tangent R = {tangent.gain_n_per_m_s:.4g} N/(m/s) V - {tangent.drag_n:.4g} N is '
         f'within {100.0 * tolerance:.3g} % of it from {low * tangent.speed_m_s:.4g} m/s {upward}; '
         'it is never above it.'

@@ -11,8 +11,7 @@ import numpy as np
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.studies.face import Presentation, by_columns
-from shipdrag_ros.studies.manoeuvring.ship import meaning
-from shipdrag_ros.studies.manoeuvring.simulate import Motions
+from shipdrag_ros.studies.manoeuvring import Motions, meaning
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     CONTROL_S,
@@ -35,16 +34,15 @@ def ranking_picture(found: SteeringStudy) -> Figure:
     """
     losses, order = found.losses, found.losses.ranking
     places = np.arange(len(order))[::-1]
-    chosen = [losses.names.index(name) for name in order]
     with one_axis(9.0, 0.8 + 0.2 * len(order)) as (figure, axis):
         count = len(found.selection.kept)
         for part, color, label in (
             (slice(0, count), BLUE, 'kept'),
             (slice(count, None), _PALE, 'set to 0'),
         ):
-            axis.barh(places[part], losses.mean[chosen][part], color=color, label=label)
+            axis.barh(places[part], losses.mean[losses.order][part], color=color, label=label)
         axis.plot(
-            found.mean_norms.mean[chosen],
+            found.mean_norms.mean[losses.order],
             places,
             linestyle='none',
             marker='|',
@@ -230,14 +228,13 @@ def loss_table(found: SteeringStudy) -> Table:
     """
     order = found.losses.ranking
     table = np.column_stack([found.losses.table, found.losses.mean, found.mean_norms.mean])
-    ranked = table[[found.losses.names.index(name) for name in order]]
     heads = ('+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm')
     return by_columns(
         {
             '': order,
             **{
                 head: [f'{1e3 * value:.3f}' for value in column]
-                for head, column in zip(heads, ranked.T)
+                for head, column in zip(heads, table[found.losses.order].T)
             },
             'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
             'multiple of': (found.ship.multiples.get(name, '-') for name in order),

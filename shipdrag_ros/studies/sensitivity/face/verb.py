@@ -33,8 +33,7 @@ from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.manoeuvring.simulate import parse
+from shipdrag_ros.studies.manoeuvring import mariner, parse
 from shipdrag_ros.studies.sensitivity.coasting import (
     KIND,
     SPEED_FRACTION,

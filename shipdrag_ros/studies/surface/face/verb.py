@@ -159,7 +159,7 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'function in {options.export}')
     content = document(found)
     if asked is not None:
-        slopes = found.polynomial.gradient(asked).tolist()
+        slopes = found.polynomial.gradient(asked)
         content['predictions'] = [
             {**each, 'gradient': dict(zip(inputs, slope))}
             for each, slope in zip(prediction_documents(predictions), slopes)
@@ -173,22 +173,13 @@ def document(found: Surface) -> dict[str, Any]:
     Return the document of a surface.
     """
     table = found.table
-    columns = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
+    tried = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
+    terms = (found.polynomial.powers, found.coefficients, found.sd)
+    heads = ('degree', 'terms', 'sse', 'rmse', 'f', 'p')
     return {
         'degree': found.degree,
-        'table': [
-            dict(zip(('degree', 'terms', 'sse', 'rmse', 'f', 'p'), row))
-            for row in zip(
-                found.degrees,
-                *(each.tolist() for each in columns),
-            )
-        ],
-        'coefficients': [
-            {'powers': powers, 'value': value, 'sd': sd}
-            for powers, value, sd in zip(
-                found.polynomial.powers.tolist(), found.coefficients.tolist(), found.sd.tolist()
-            )
-        ],
+        'table': [dict(zip(heads, row)) for row in zip(found.degrees, *tried)],
+        'coefficients': [dict(zip(('powers', 'value', 'sd'), row)) for row in zip(*terms)],
         'domain': found.domain.ranges,
         'notes': found.notes,
     }
@@ -198,15 +189,8 @@ def prediction_documents(found: Sequence[Prediction]) -> list[dict[str, Any]]:
     """
     Return the documents of predictions.
     """
-    return [
-        {
-            'value': each.value,
-            'sd': each.sd,
-            'inside': each.inside,
-            'reasons': list(each.reasons),
-        }
-        for each in found
-    ]
+    keys = ('value', 'sd', 'inside', 'reasons')
+    return [{key: getattr(each, key) for key in keys} for each in found]
 
 
 def shown(
