@@ -50,7 +50,7 @@ from shipdrag_ros.studies.sensitivity.coasting import (
     study_coast,
 )
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
-from shipdrag_ros.studies.sensitivity.face import steering as steering_words
+from shipdrag_ros.studies.sensitivity.face import verb as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,

@@ -215,10 +215,7 @@ def run(options: argparse.Namespace) -> int:
     out: Path = options.out
     recordings = out / 'recordings'
     recordings.mkdir(parents=True, exist_ok=True)
-    ship_file = out / SHIP
-    ship_file.write_text(
-        files('shipdrag_ros').joinpath('data', SHIP).read_text(encoding='utf-8'), encoding='utf-8'
-    )
+    ship_file = _ship_file(out)
     ship = Ship.load(ship_file)
     block, truth = simulated.make(ship, SETTINGS)
     seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
@@ -252,6 +249,12 @@ def run(options: argparse.Namespace) -> int:
     for path in files_made:
         output.say(str(path))
     return _verdict(results)
+
+
+def _ship_file(folder: Path) -> Path:
+    path = folder / SHIP
+    path.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
+    return path
 
 
 def _verdict(results: Sequence[RunResult]) -> int:
@@ -328,8 +331,7 @@ def run_through() -> Iterator[CheckResult]:
 
 def _way(folder: Path) -> Iterator[CheckResult]:
     need('rclpy')
-    ship_file = folder / SHIP
-    ship_file.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
+    ship_file = _ship_file(folder)
     block, truth = simulated.make(Ship.load(ship_file), _TRIAL)
     yield _step('simulated ship', True, f'{len(block)} readings')
     node = OnboardNode(ship_file, folder, folder / 'node.log', *TRIAL_SETTINGS)

@@ -430,17 +430,12 @@ def _goes_on(coastdown: EndedCoastdown, speed_m_s: float) -> bool:
     return coastdown.ended_by is EndedBy.SPEED and slow
 
 
-def _named(coastdown: EndedCoastdown) -> str:
-    return f'the coastdown of {utc(coastdown.start_ns)}'
-
-
 def _hull(coastdown: EndedCoastdown) -> HullNow:
     assert coastdown.estimate is not None
     curve = coastdown.estimate.valid_curve
     curve = curve if len(curve) > 1 else coastdown.estimate.curve
-    return HullNow.of_run(
-        curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, _named(coastdown)
-    )
+    named = f'the coastdown of {utc(coastdown.start_ns)}'
+    return HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, named)
 
 
 def _recent(run: RunResult) -> tuple[Window, Series, str]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from shipdrag_ros import __version__
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError, ShipFileError
+from shipdrag_ros.library.record import Resistance
 from shipdrag_ros.library.replaying import Listener, Notes
-from shipdrag_ros.library.resistance import Resistance
 from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, time_column, writing
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words

@@ -143,10 +143,12 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     """
     alone = solve_one(position), solve_one(speed)
     inputs = (position, speed)
+    # above 0 for data that a fit follows exactly, too
+    least = [float(np.finfo(np.float64).eps * np.abs(data.value).max()) for data in inputs]
     sigmas = np.array(
         [
-            data.known_sigma or max(solution.noise_sd[data.name], _least_sigma(data.value))
-            for data, solution in zip(inputs, alone)
+            data.known_sigma or max(solution.noise_sd[data.name], rounded) or 1.0
+            for data, solution, rounded in zip(inputs, alone, least)
         ]
     )
     scale = TimeScale.of(position.time_ns, speed.time_ns)
@@ -194,11 +196,6 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
         basis.reorthogonalised + sum(solution.reorthogonalised for solution in alone),
         notes,
     )
-
-
-def _least_sigma(values: Float64) -> float:
-    """Return a standard deviation above 0 for data that a fit follows exactly."""
-    return float(np.finfo(np.float64).eps * np.abs(values).max()) or 1.0
 
 
 def _choose(table: OrderTable, known: float) -> tuple[int, bool, tuple[str, ...]]:

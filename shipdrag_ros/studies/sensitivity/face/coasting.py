@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_PALE = '#c3d3df'
+PALE = '#c3d3df'
 
 
 def particulars_picture(found: CoastStudy) -> Figure:
@@ -31,7 +31,7 @@ def particulars_picture(found: CoastStudy) -> Figure:
     places = np.arange(len(order))[::-1]
     with one_axis(9.0, 0.8 + 0.28 * len(order)) as (figure, axis):
         axis.barh(
-            places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
+            places, table[:, :2].mean(axis=1), color=PALE, height=0.7, label='10 per cent wrong'
         )
         axis.barh(
             places,

@@ -144,8 +144,14 @@ def run(options: argparse.Namespace) -> int:
     inputs, target = options.inputs, options.target
     if target in inputs:
         raise DataError('--target', [f'{target!r} is one of the inputs too; name another column'])
-    if options.export is not None:
-        _check_names((*inputs, target))
+    if options.export is not None and (
+        problems := [
+            f'{name!r} is no name in Python; rename the column'
+            for name in (*inputs, target)
+            if not name.isidentifier() or keyword.iskeyword(name)
+        ]
+    ):
+        raise DataError('--export', problems)
     data = read_numbers(options.data, (*inputs, target))
     points, values = data.values[:, :-1], data.values[:, -1]
     found = fit_surface(points, values, inputs=inputs, max_degree=options.max_degree)
@@ -253,16 +259,6 @@ def _names(text: str) -> tuple[str, ...]:
             f'{text!r}, expected different columns separated by commas'
         )
     return names
-
-
-def _check_names(names: Sequence[str]) -> None:
-    problems = [
-        f'{name!r} is no name in Python; rename the column'
-        for name in names
-        if not name.isidentifier() or keyword.iskeyword(name)
-    ]
-    if problems:
-        raise DataError('--export', problems)
 
 
 def degrees_table(surface: Surface) -> Table:
