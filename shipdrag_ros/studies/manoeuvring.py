@@ -516,12 +516,9 @@ def steer(
 
     Examples
     --------
-    >>> import math
-    >>> from shipdrag_ros.studies.manoeuvring import turn
-    >>> from shipdrag_ros.studies.manoeuvring import mariner
-    >>> from shipdrag_ros.studies.manoeuvring import steer
+    >>> from shipdrag_ros.studies.manoeuvring import mariner, steer, turn
     >>> ship = mariner()
-    >>> motions = steer(ship, turn(math.radians(20.0)))
+    >>> motions = steer(ship, turn(20.0))
     >>> motions.position_m.shape
     (1, 1200, 2)
     """

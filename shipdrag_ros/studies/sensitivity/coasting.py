@@ -18,20 +18,8 @@ import numpy as np
 from shipdrag_ros.errors import SensitivityError, ShipdragError
 from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import Channel, Float64
-from shipdrag_ros.ship import (
-    CoefficientBaseline,
-    Ship,
-    TableAddedMass,
-    TableBaseline,
-)
-from shipdrag_ros.simulation import (
-    STANDARD_SD,
-    Action,
-    Effect,
-    Frame,
-    Scenario,
-    simulate_columns,
-)
+from shipdrag_ros.ship import CoefficientBaseline, Ship, TableAddedMass, TableBaseline
+from shipdrag_ros.simulation import STANDARD_SD, Action, Effect, Frame, Scenario, simulate_columns
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Selection, vary
 
