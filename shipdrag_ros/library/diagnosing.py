@@ -81,7 +81,7 @@ def diagnose_runs(
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
-    asked = _Asked(runs, facts, earlier, progress)
+    asked = _Together(runs, facts, earlier, progress)
     if (
         not windowed
         and stop is None
@@ -120,7 +120,7 @@ def diagnose_runs(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Together:
     """Runs that are diagnosed together, and what is known beside them."""
 
     runs: Sequence[WindowedRun]
