@@ -24,8 +24,7 @@ from shipdrag_ros.library.replaying import Notes, refuse_two_ships, replay_run
 from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_in_python
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.playback import SHIP_FILE
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 

@@ -6,8 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown.bins import Bins, displacement, line, mean_place, mean_turning, speeds
-from shipdrag_ros.coastdown.filling import add, close
+from shipdrag_ros.coastdown.bins import (
+    Bins,
+    add,
+    close,
+    displacement,
+    line,
+    mean_place,
+    mean_turning,
+    speeds,
+)
 from shipdrag_ros.samples import Channel
 
 SECOND_NS = 1_000_000_000
