@@ -27,9 +27,9 @@ from shipdrag_ros.coastdown.bins import (
     PER_UNIT,
     RANK,
     SOURCES,
-    SPEED,
     A,
     Bins,
+    mean_speeds,
     mean_turning,
     smoothing,
     unread,
@@ -631,14 +631,9 @@ def _scales(
 
 def _means(bins: Bins, source: int, last: int) -> Float64:
     """Return means of the speed [m/s] up to a second; none where one is missing."""
-    totals, newest = bins.speeds[source], int(bins.closed[source])
-    if newest < last - LOOK_S:
-        return np.empty(0)
-    edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
-    each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
-    if not each[:, COUNT].all():
-        return np.empty(0)
-    return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
+    count, speed = mean_speeds(bins, source, last - _MEAN_S * np.arange(_MEANS, -1, -1))
+    heard = bins.closed[source] >= last - LOOK_S and count.all()
+    return speed if heard else np.empty(0)
 
 
 def _doubt(

@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.events import NotCoastdown
 from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.replay import ReplayResult
-from shipdrag_ros.replay.no_coastdown import why_no_coastdown
+from shipdrag_ros.replay.coasts import why_no_coastdown
 from shipdrag_ros.replay.words import run_warnings
 from shipdrag_ros.samples import Float64
 
