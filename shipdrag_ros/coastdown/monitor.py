@@ -32,19 +32,11 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, heading_doubt, mean_heading
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import (
-    ALWAYS,
-    CAPACITY,
-    RECENT,
-    InputTally,
-    Memory,
-    Tuning,
-    make_room,
-    since,
-)
+from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LATE_S, LEAD_S, Dated, RegimeFilter
+from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
@@ -80,7 +72,7 @@ class Monitor:
     Source: docs/architecture.md, the main job. It raises nothing: what is wrong with a sample
     is a counted rejection.
 
-    Memory is bounded: `history_ns` of samples, at most `memory.CAPACITY` of them.
+    Memory is bounded: `history_ns` of samples, at most `ring.CAPACITY` of them.
 
     Examples
     --------

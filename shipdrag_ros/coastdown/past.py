@@ -211,15 +211,13 @@ def median(past: Past, channel: int, count: int, column: int, near: float) -> fl
         value = past.value[channel, (count - 1 - i) % KEPT, column]
         if KIND[channel] == GEODETIC and column == 1:
             value -= 360.0 * np.round((value - near) / 360.0)
-        insert(scratch, i, value)
+        _insert(scratch, i, value)
     return float(scratch[MIDDLE // 2])
 
 
 @compiled(inline=True, uncounted=True)
-def insert(scratch: Float64, count: int, value: float) -> None:
-    """
-    Put a value among the first `count`, ascending.
-    """
+def _insert(scratch: Float64, count: int, value: float) -> None:
+    """Put a value among the first `count`, ascending."""
     at = count
     while at > 0 and scratch[at - 1] > value:
         scratch[at] = scratch[at - 1]
@@ -272,7 +270,7 @@ def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
     known = 0
     for i in range(kept):
         if value[(count - 1 - i) % KEPT, 0] != 0.0:
-            insert(scratch, known, abs(value[(count - 1 - i) % KEPT, 0]))
+            _insert(scratch, known, abs(value[(count - 1 - i) % KEPT, 0]))
             known += 1
     # zeros are no readings where the others stay far from them
     drops = known >= MIDDLE and scratch[0] > _DEAD_M_S
@@ -282,7 +280,7 @@ def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
         if one == 0.0 and drops:
             continue
         if not np.isnan(other):
-            insert(scratch, known, abs(one - other))
+            _insert(scratch, known, abs(one - other))
             known += 1
         other = one
     sd, wider = scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE
@@ -309,7 +307,7 @@ def _learn_track(past: Past, channel: int, count: int, kept: int) -> None:
     for i in range(kept - 1):
         one, other = (count - 1 - i) % KEPT, (count - 2 - i) % KEPT
         step = (past.stamp_ns[channel, one] - past.stamp_ns[channel, other]) * 1e-9
-        insert(
+        _insert(
             scratch,
             i,
             apart(

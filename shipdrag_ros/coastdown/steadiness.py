@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, line, smoothing, speeds_kept
-from shipdrag_ros.coastdown.past import CHANNELS, FIRST_TRACK, NEVER, insert
+from shipdrag_ros.coastdown.past import CHANNELS, FIRST_TRACK, NEVER
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import KIND, Float64, Int64
@@ -237,7 +237,11 @@ def white_sd_of_slopes(bins: Bins, source: int, last: int, width: int, scratch: 
     if 2 * count < width or count < 4:
         return np.nan
     for i in range(count):
-        insert(scratch, i, abs(scratch[i + apart] - scratch[i]))
+        change, at = abs(scratch[i + apart] - scratch[i]), i
+        while at > 0 and scratch[at - 1] > change:
+            scratch[at] = scratch[at - 1]
+            at -= 1
+        scratch[at] = change
     reading = _sd_of_changes(scratch, count)
     used = line(bins, source, last, width)[2] / apart
     return float(reading * math.sqrt(12.0 / max(used, 1.0)) / width)

@@ -81,6 +81,7 @@ _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
 _FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 _TOGETHER = 0.5  # share of those of a kind that have one driver, setting or aerial
 _STILL = 0.5  # share of minutes of a source that was wrong just before
+_STUCK_LOOK_S = 60
 _DISTINCT = 0.9  # of the readings of a shaft whose sensor has no coarse levels
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
@@ -531,6 +532,8 @@ class Vouching:
             Probability that they say nothing true, by the regimes; NaN where these follow none.
         """
         heard = [int(each) for each in SHAFTS if bins.closed[each] != NEVER]
+        if not heard:
+            return
         turning = {each: mean_turning(bins, each, last, LOOK_S)[0] for each in heard}
         why = ''
         if lie > 0.5:
@@ -547,7 +550,10 @@ class Vouching:
             for each, level in self._lied.items()
         ):
             self._lied = {}
-        self._stuck = {each: said for each in heard if (said := self._sticks(bins, each, last))}
+        if self._stuck or self._now % _STUCK_LOOK_S < LOOK_S:
+            self._stuck = {
+                each: said for each in heard if (said := self._sticks(bins, each, last))
+            }
         unused = self._lied or self._stuck
         until = self._now + LOOK_S + 1
         self.until[_with_pitch(unused)] = until

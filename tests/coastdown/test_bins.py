@@ -11,8 +11,6 @@ from shipdrag_ros.coastdown.bins import (
     PER_SECOND,
     TIME,
     Bins,
-    add,
-    close,
     displacement,
     line,
     mean_place,
@@ -20,6 +18,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
     span,
 )
+from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.samples import Channel
 
 SECOND_NS = 1_000_000_000
