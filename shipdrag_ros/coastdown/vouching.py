@@ -637,9 +637,10 @@ def _scales(
 
 def _means(bins: Bins, source: int, last: int) -> Float64:
     """Return means of the speed [m/s] up to a second; none where one is missing."""
+    if bins.closed[source] < last - LOOK_S:
+        return np.empty(0)
     count, speed = mean_speeds(bins, source, last - _MEAN_S * np.arange(_MEANS, -1, -1))
-    heard = bins.closed[source] >= last - LOOK_S and count.all()
-    return speed if heard else np.empty(0)
+    return speed if count.all() else np.empty(0)
 
 
 def _doubt(
