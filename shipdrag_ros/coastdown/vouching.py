@@ -534,7 +534,9 @@ class Vouching:
         heard = [int(each) for each in SHAFTS if bins.closed[each] != NEVER]
         if not heard:
             return
-        turning = {each: mean_turning(bins, each, last, LOOK_S)[0] for each in heard}
+        turning = {}
+        if lie > 0.5 or self._lied:
+            turning = {each: mean_turning(bins, each, last, LOOK_S)[0] for each in heard}
         why = ''
         if lie > 0.5:
             self._lied = turning
