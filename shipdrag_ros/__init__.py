@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
     from shipdrag_ros.library.diagnosis import Diagnosis, diagnose, learn
-    from shipdrag_ros.library.record import Coastdown, Record, read
-    from shipdrag_ros.library.resistance import Resistance, estimate
+    from shipdrag_ros.library.record import Coastdown, Record, Resistance, estimate, read
     from shipdrag_ros.library.simulated import simulate
     from shipdrag_ros.library.trends import Trends, trends
     from shipdrag_ros.parameters import Parameters
@@ -56,12 +55,12 @@ _HOME = {
     'Diagnosis': 'library.diagnosis',
     'Parameters': 'parameters',
     'Record': 'library.record',
-    'Resistance': 'library.resistance',
+    'Resistance': 'library.record',
     'Ship': 'ship',
     'ShipdragError': 'errors',
     'Trends': 'library.trends',
     'diagnose': 'library.diagnosis',
-    'estimate': 'library.resistance',
+    'estimate': 'library.record',
     'learn': 'library.diagnosis',
     'read': 'library.record',
     'simulate': 'library.simulated',

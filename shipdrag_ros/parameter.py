@@ -20,7 +20,7 @@ import numpy as np
 
 from shipdrag_ros.fields import declare, number
 
-WIDER, WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
+TAILS = ((1.0, 0.9), (3.0, 0.1))  # what is stated or calculated is so many times worse, so often
 
 
 class Shape(StrEnum):

@@ -41,9 +41,9 @@ from shipdrag_ros.estimation import estimate
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.simulation import Truth
-from shipdrag_ros.studies import order
-from shipdrag_ros.studies.order import OrderTable, fit_orders
-from shipdrag_ros.studies.orthogonal import OrthogonalBasis
+from shipdrag_ros.studies import least_squares
+from shipdrag_ros.studies.least_squares import OrderTable
+from shipdrag_ros.studies.s1.motion import OrthogonalBasis, fit_orders
 
 PICTURE = Path(__file__).resolve().parents[2] / 'docs' / 'pictures' / 's1_experiment.png'
 PROBLEMS = ('s1_speed', 's1_position', 's1_joint')
@@ -160,11 +160,11 @@ def order_rules(runs: int, coasts: int) -> Iterator[list[str]]:
 
     There no degree is right, and too low costs more than too high.
     """
-    kept = order.SIGNIFICANCE, order.NEIGHBOURS
+    kept = least_squares.SIGNIFICANCE, least_squares.NEIGHBOURS
     truth, known = voyage(CASES[0]), {size: polynomials(size, runs) for size in SIZES}
     windows = [read(truth, CASES[0], seed) for seed in range(coasts)]
     for p, steps in RULES:
-        order.SIGNIFICANCE, order.NEIGHBOURS = p, steps
+        least_squares.SIGNIFICANCE, least_squares.NEIGHBOURS = p, steps
         chosen = [
             np.array(
                 [t.coefficients[OrderTable(t.coefficients, t.sse, t.rows).plateau()] for t in some]
@@ -180,7 +180,7 @@ def order_rules(runs: int, coasts: int) -> Iterator[list[str]]:
             *(f'{100 * np.mean(each < TRUE_ORDER):.1f}' for each in chosen),
             *scored(found, truth),
         ]
-    order.SIGNIFICANCE, order.NEIGHBOURS = kept
+    least_squares.SIGNIFICANCE, least_squares.NEIGHBOURS = kept
 
 
 def main() -> None:
@@ -207,8 +207,8 @@ def main() -> None:
     )
     grid(
         f'Order rule: {options.polynomials} polynomials of order {TRUE_ORDER} (seed 1), '
-        f'{options.coasts} coastdowns; in use: p < {order.SIGNIFICANCE}, '
-        f'{order.NEIGHBOURS} steps',
+        f'{options.coasts} coastdowns; in use: p < {least_squares.SIGNIFICANCE}, '
+        f'{least_squares.NEIGHBOURS} steps',
         ['p <', 'steps', 'too high %', *(f'too low % at {size:g} sd' for size in SIZES), *share],
         order_rules(options.polynomials, options.coasts),
         width=120,

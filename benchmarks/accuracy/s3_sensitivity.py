@@ -33,10 +33,11 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import (
+from shipdrag_ros.studies.manoeuvring import (
+    FORM,
     Motions,
     Side,
+    mariner,
     overshoots_rad,
     steer,
     turn,
@@ -49,7 +50,7 @@ from shipdrag_ros.studies.sensitivity.coasting import (
     study_coast,
 )
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
-from shipdrag_ros.studies.sensitivity.face import steering as steering_words
+from shipdrag_ros.studies.sensitivity.face import verb as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,

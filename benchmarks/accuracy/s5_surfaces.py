@@ -30,8 +30,7 @@ from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.least_squares import least_squares
-from shipdrag_ros.studies.order import OrderTable
+from shipdrag_ros.studies.least_squares import OrderTable, least_squares
 from shipdrag_ros.studies.surface.face.verb import contour_picture, degree_picture
 from shipdrag_ros.studies.surface.fit import (
     SIGNIFICANCE,

@@ -18,9 +18,9 @@ from playwright.sync_api import sync_playwright
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.figures import LATE_S, LONGEST_S
 from shipdrag_ros.live.serve import listen, serve
 from shipdrag_ros.live.source import BagSource, NodeSource, PictureFeed
-from shipdrag_ros.live.trace import LATE_S, LONGEST_S
 from shipdrag_ros.messages.topics import Samples
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship

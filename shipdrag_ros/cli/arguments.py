@@ -28,6 +28,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -59,22 +60,16 @@ def stop_time(text: str) -> float | datetime:
     """
     Read a time: s from the start of the bag, or ISO 8601 with its zone.
     """
-    try:
-        at_s = float(text)
-    except ValueError:
-        at_s = math.nan
-    if math.isfinite(at_s) and at_s >= 0.0:
-        return at_s
-    try:
+    with suppress(argparse.ArgumentTypeError):
+        return number(0.0)(text)
+    with suppress(ValueError):
         at = datetime.fromisoformat(text)
-    except ValueError:
-        at = None
-    if at is None or at.tzinfo is None:
-        raise argparse.ArgumentTypeError(
-            f'{text!r}, expected s from the start of the bag, or a time of day with its zone, as '
-            '2026-06-01T08:05:00Z'
-        )
-    return at
+        if at.tzinfo is not None:
+            return at
+    raise argparse.ArgumentTypeError(
+        f'{text!r}, expected s from the start of the bag, or a time of day with its zone, as '
+        '2026-06-01T08:05:00Z'
+    )
 
 
 def number(

@@ -47,18 +47,14 @@ def run(options: argparse.Namespace) -> int:
     with output.progress('checking') as progress:
         found = check(options.bags, progress=progress)
     for each in found:
-        _show(output, each)
+        verdict = 'sound' if each.sound else f'NOT SOUND, {each.damage_count} damage(s)'
+        output.heading(f'{each.path}: {verdict}')
+        output.say(f'{each.messages} messages, {each.size_bytes} bytes')
+        if not each.sound:
+            damage_table(output, each.damage, each.damage_count)
     sound = all(each.sound for each in found)
     output.json({'sound': sound, 'files': [_document(each) for each in found]})
     return 0 if sound else NOT_SOUND
-
-
-def _show(output: Output, about: FileCheck) -> None:
-    verdict = 'sound' if about.sound else f'NOT SOUND, {about.damage_count} damage(s)'
-    output.heading(f'{about.path}: {verdict}')
-    output.say(f'{about.messages} messages, {about.size_bytes} bytes')
-    if not about.sound:
-        damage_table(output, about.damage, about.damage_count)
 
 
 def _document(about: FileCheck) -> dict[str, Any]:

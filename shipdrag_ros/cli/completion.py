@@ -57,21 +57,12 @@ def script(shell: str) -> str:
     Return the script for a shell, one of `SHELLS`.
     """
     whole = cli.parser(*(verb.name for verb in cli.verbs()))
-    for parser in (whole, *_below(whole)):
+    verbs = next(each for each in whole._actions if isinstance(each, argparse._SubParsersAction))
+    for parser in (whole, *verbs.choices.values()):
         for action in parser._actions:
             metavar = str(action.metavar or '').partition('.')[0]
             if metavar in _FOLDER:
-                action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
+                action.complete = shtab.DIRECTORY
             elif metavar in _FILE:
-                action.complete = shtab.FILE  # type: ignore[attr-defined]
+                action.complete = shtab.FILE
     return shtab.complete(whole, shell)
-
-
-def _below(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    """Return the parsers of the verbs."""
-    return [
-        verb
-        for action in parser._actions
-        if isinstance(action, argparse._SubParsersAction)
-        for verb in action.choices.values()
-    ]

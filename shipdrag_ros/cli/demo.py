@@ -214,10 +214,7 @@ def run(options: argparse.Namespace) -> int:
     out: Path = options.out
     recordings = out / 'recordings'
     recordings.mkdir(parents=True, exist_ok=True)
-    ship_file = out / SHIP
-    ship_file.write_text(
-        files('shipdrag_ros').joinpath('data', SHIP).read_text(encoding='utf-8'), encoding='utf-8'
-    )
+    ship_file = _ship_file(out)
     ship = Ship.load(ship_file)
     block, truth = simulated.make(ship, SETTINGS)
     seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
@@ -228,12 +225,12 @@ def run(options: argparse.Namespace) -> int:
     )
     output.log('starting the node; the first start on a machine compiles for some seconds')
     before = set(recordings.glob('*.mcap'))
-    live = _Live(truth, block, output)
+    stop_ns = int(block.receive_ns[0]) + round(SETTINGS.lead_in_s * 1e9)
     node = OnboardNode(ship_file, recordings, out / 'node.log')
     sail(
         node,
         block,
-        show=live.show,
+        show=_live(truth, stop_ns, output),
         speed_up=options.speed_up,
         begins=lambda: output.heading('Live from the node, over ROS topics'),
     )
@@ -253,6 +250,12 @@ def run(options: argparse.Namespace) -> int:
     return _verdict(results)
 
 
+def _ship_file(folder: Path) -> Path:
+    path = folder / SHIP
+    path.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
+    return path
+
+
 def _verdict(results: Sequence[RunResult]) -> int:
     """Fail if what was to be demonstrated was not."""
     for result in results:
@@ -267,25 +270,23 @@ def _verdict(results: Sequence[RunResult]) -> int:
     return 0
 
 
-class _Live:
-    """Prints estimates beside the truth as they come, but not all of them."""
+def _live(truth: TrueCurve, stop_ns: int, output: Output) -> Callable[[LiveEstimate], None]:
+    """Return what prints estimates beside the truth as they come, but not all of them."""
+    next_ns = 0
 
-    def __init__(self, truth: TrueCurve, block: Block, output: Output) -> None:
-        self._truth = truth
-        self._output = output
-        self._stop_ns = int(block.receive_ns[0]) + round(SETTINGS.lead_in_s * 1e9)
-        self._next_ns = 0
-
-    def show(self, estimate: LiveEstimate) -> None:
-        if estimate.stamp_ns < self._next_ns:
+    def show(estimate: LiveEstimate) -> None:
+        nonlocal next_ns
+        if estimate.stamp_ns < next_ns:
             return
-        self._next_ns = estimate.stamp_ns + _SHOWN_NS
-        self._output.say(
-            f'{(estimate.stamp_ns - self._stop_ns) * 1e-9:7.0f} s after the stop: '
+        next_ns = estimate.stamp_ns + _SHOWN_NS
+        output.say(
+            f'{(estimate.stamp_ns - stop_ns) * 1e-9:7.0f} s after the stop: '
             f'{estimate.speed_m_s:6.3f} m/s, r = '
             f'{display.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
-            f'true {self._truth.at(estimate.speed_m_s):.5f}'
+            f'true {truth.at(estimate.speed_m_s):.5f}'
         )
+
+    return show
 
 
 _TRIAL = replace(SETTINGS, lead_in_s=600.0, duration_s=600.0)
@@ -327,8 +328,7 @@ def run_through() -> Iterator[CheckResult]:
 
 def _way(folder: Path) -> Iterator[CheckResult]:
     need('rclpy')
-    ship_file = folder / SHIP
-    ship_file.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
+    ship_file = _ship_file(folder)
     block, truth = simulated.make(Ship.load(ship_file), _TRIAL)
     yield _step('simulated ship', True, f'{len(block)} readings')
     node = OnboardNode(ship_file, folder, folder / 'node.log', *TRIAL_SETTINGS)

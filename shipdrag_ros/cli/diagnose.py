@@ -83,8 +83,7 @@ def run(options: argparse.Namespace) -> int:
 
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
-    window = None if options.window is None else tuple(options.window)
-    runs = open_windowed(options.bags, remap=options.remap, window=window, output=output)
+    runs = open_windowed(options.bags, remap=options.remap, window=options.window, output=output)
     refuse_overlaps(runs)
     facts = _facts(options.fact)
     earlier = [read_earlier(path) for path in options.earlier]

@@ -27,17 +27,13 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from shipdrag_ros.bags import WindowedRun
 from shipdrag_ros.cli.arguments import add, number
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import add_bags, open_windowed
+from shipdrag_ros.cli.replay import replayed
+from shipdrag_ros.cli.windowed import add_bags
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
-from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.library import forecasts
-from shipdrag_ros.library.replaying import replay_run
-from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
 
 AFTER = ' '.join(f'{each:g}' for each in forecasts.AFTER_S)
 
@@ -68,15 +64,8 @@ def run(options: argparse.Namespace) -> int:
     Foretell, and say what followed.
     """
     output = Output(options.json)
-    ship = None if options.ship is None else Ship.load(options.ship)
-    parameters = None if options.parameters is None else Parameters.load(options.parameters)
-    given = open_windowed(options.bags, remap=options.remap, output=output)
-    if options.if_stopped_now:  # a window says when `now` is, not that she glides in it
-        given = [WindowedRun(run.part(*own) if own else run, None) for run, own in given]
-    results = [
-        replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
-        for each, own in given
-    ]
+    # a window says when `now` is, not that she glides in it
+    results = replayed(options, output, parts=options.if_stopped_now)
     if options.if_stopped_now:
         stopped = forecasts.if_stopped_now(results)
         output.heading(stopped.bag)
@@ -107,14 +96,13 @@ def document(found: forecasts.Forecasts) -> dict[str, Any]:
     """
     Return the document of the verb; a forecast that was not made says why under `not_made`.
     """
-    not_made: list[tuple[object, ...]] = [
-        (each.bag, each.stop_ns, each.after_s, each.why)
-        for each in found.made
-        if each.checked is None
-    ]
-    not_made += [(bag, None, None, why) for bag, why in found.without]
-    return {
-        'forecasts': [
+    made: list[dict[str, Any]] = []
+    not_made: list[tuple[object, ...]] = []
+    for each in found.made:
+        if each.checked is None:
+            not_made.append((each.bag, each.stop_ns, each.after_s, each.why))
+            continue
+        made.append(
             {
                 'bag': each.bag,
                 'stop_ns': each.stop_ns,
@@ -125,13 +113,10 @@ def document(found: forecasts.Forecasts) -> dict[str, Any]:
                 'interval_score': each.checked.interval_score,
                 'not_compared': each.why or None,
             }
-            for each in found.made
-            if each.checked is not None
-        ],
-        'not_made': [
-            dict(zip(('bag', 'stop_ns', 'after_s', 'reason'), each)) for each in not_made
-        ],
-    }
+        )
+    not_made += [(bag, None, None, why) for bag, why in found.without]
+    keys = ('bag', 'stop_ns', 'after_s', 'reason')
+    return {'forecasts': made, 'not_made': [dict(zip(keys, each)) for each in not_made]}
 
 
 def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
@@ -154,11 +139,8 @@ def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
 
 
 def _milestone(one: Passed) -> Mapping[str, Any]:
-    def band(foretold: Band, was: float | None) -> dict[str, float | None]:
-        return {**foretold._asdict(), 'was': was}
-
     return {
         'speed_m_s': one.foretold.speed_m_s,
-        'time_s': band(one.foretold.time_s, one.was_s),
-        'distance_m': band(one.foretold.distance_m, one.was_m),
+        'time_s': {**one.foretold.time_s._asdict(), 'was': one.was_s},
+        'distance_m': {**one.foretold.distance_m._asdict(), 'was': one.was_m},
     }

@@ -30,6 +30,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from shipdrag_ros.bags import WindowedRun
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
@@ -67,26 +68,19 @@ def run(options: argparse.Namespace) -> int:
     Replay the bags and say what they gave.
     """
     output = Output(options.json)
-    ship = None if options.ship is None else Ship.load(options.ship)
-    parameters = None
-    if options.parameters is not None:
-        parameters = Parameters.load(options.parameters)
     if options.out is not None:
         need(*REPORT_MODULES)
         options.out.mkdir(parents=True, exist_ok=True)
-    window = None if options.window is None else tuple(options.window)
-    results = [
-        replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
-        for each, own in open_windowed(
-            options.bags, remap=options.remap, window=window, output=output
-        )
-    ]
+    results = replayed(options, output, options.window)
     ranking = rank(results) if options.compare else None
 
     for result in results:
         show_run(output, result)
     if ranking is not None:
-        show_ranking(output, ranking)
+        output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
+        output.table(tables.ranking_table(ranking))
+        for note in ranking.notes:
+            output.say(f'- {note}')
     else:
         show_together(output, together(results), results)
     if options.report is not None:
@@ -99,6 +93,38 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'{REPORT}, {JSON} and {CURVES} in {options.out}')
     output.json(document(results, ranking=ranking))
     return 0
+
+
+def replayed(
+    options: argparse.Namespace,
+    output: Output,
+    window: Sequence[float] | None = None,
+    *,
+    parts: bool = False,
+) -> list[RunResult]:
+    """
+    Replay the bags with the ship, the parameters and the stop that were given.
+
+    Parameters
+    ----------
+    options
+        Of the verb.
+    output
+        Called with what is found on the way.
+    window
+        Of the bags without a window of their own.
+    parts
+        Whether a window is a part of the bag in which coastdowns are looked for.
+    """
+    ship = None if options.ship is None else Ship.load(options.ship)
+    parameters = None if options.parameters is None else Parameters.load(options.parameters)
+    runs = open_windowed(options.bags, remap=options.remap, window=window, output=output)
+    if parts:
+        runs = [WindowedRun(run.part(*own) if own else run, None) for run, own in runs]
+    return [
+        replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
+        for each, own in runs
+    ]
 
 
 def write_results(
@@ -158,16 +184,6 @@ def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -
     if estimate is not None:
         for note in estimate_words.notes(estimate):
             output.say(f'- {note}')
-
-
-def show_ranking(output: Output, ranking: Ranking) -> None:
-    """
-    Print hulls by Fr_max.
-    """
-    output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
-    output.table(tables.ranking_table(ranking))
-    for note in ranking.notes:
-        output.say(f'- {note}')
 
 
 def show_together(output: Output, found: Together, runs: Sequence[RunResult]) -> None:

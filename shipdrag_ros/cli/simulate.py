@@ -58,11 +58,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.library import simulated
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import (
-    STANDARD_INPUTS,
-    STANDARD_SD,
-    START_NS,
-)
+from shipdrag_ros.simulation import STANDARD_INPUTS, STANDARD_SD, START_NS
 from shipdrag_ros.simulation.effects import LIBRARY, effects_of, find, parse, values_of
 
 
@@ -105,11 +101,8 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     ship = Ship.load(options.ship)
     effects_of(ship)  # those that her file declares are known by name from here on
-    speed_m_s = options.speed
-    if speed_m_s is None:
-        speed_m_s = simulated.usual_speed(ship)
     settings = simulated.SimulationSettings(
-        speed_m_s=speed_m_s,
+        speed_m_s=simulated.usual_speed(ship) if options.speed is None else options.speed,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
         heading_rad=options.heading,

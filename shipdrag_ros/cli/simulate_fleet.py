@@ -38,13 +38,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli.arguments import add, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.simulation import voyages
@@ -151,6 +150,7 @@ def _truth_row(
     speed_m_s = _REFERENCE * planned.ship.baseline_range_m_s[1]
     clean = float(each.ship.resistance_n(speed_m_s))
     scattered = float(each.fouled().resistance_n(speed_m_s))
+    alone = float(replace(each, scatter=1.0).fouled().resistance_n(speed_m_s))
     return {
         'ship': planned.ship.name,
         'bag': f'{folder}/{_file(each)}',
@@ -158,7 +158,7 @@ def _truth_row(
         'stamped_ns': each.stamped_ns,
         'file': each.fate.value,
         'added_friction': round(each.added_friction, 6),
-        'added_resistance': round(_added(each, speed_m_s), 6),
+        'added_resistance': round(alone / clean - 1.0, 6),
         'added_with_scatter': round(scattered / clean - 1.0, 6),
         'speed_m_s': round(speed_m_s, 4),
         'draught_m': each.ship.draught_m,
@@ -169,12 +169,6 @@ def _truth_row(
         'current_east_m_s': round(each.scenario.current_m_s[0], 4),
         'current_north_m_s': round(each.scenario.current_m_s[1], 4),
     }
-
-
-def _added(each: voyages.PlannedRun, speed_m_s: float) -> float:
-    """Return the added resistance of the hull alone, a fraction of the clean one's."""
-    fouled = replace(each, scatter=1.0).fouled().resistance_n(speed_m_s)
-    return float(np.asarray(fouled / each.ship.resistance_n(speed_m_s))) - 1.0
 
 
 def _write_truth(
@@ -204,11 +198,9 @@ def _write_truth(
 
 
 def _file(planned: voyages.PlannedRun) -> str:
-    moment = datetime.fromtimestamp(planned.start_ns // 1_000_000_000, UTC)
-    return moment.strftime('%Y-%m-%d-%H%M.mcap')
+    return f'{datetime.fromtimestamp(planned.start_ns // SECOND_NS, UTC):%Y-%m-%d-%H%M}.mcap'
 
 
 def _date(change: voyages.HullChange) -> str:
-    return datetime.fromtimestamp(
-        voyages.FLEET_START_NS // 1_000_000_000 + round(change.day * 86_400), UTC
-    ).strftime('%Y-%m-%d')
+    second = voyages.FLEET_START_NS // SECOND_NS + round(change.day * 86_400)
+    return f'{datetime.fromtimestamp(second, UTC):%Y-%m-%d}'

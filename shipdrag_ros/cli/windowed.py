@@ -87,7 +87,7 @@ def open_windowed(
     *,
     remap: Mapping[str, str],
     output: Output,
-    window: WindowSpan | None = None,
+    window: Sequence[float] | None = None,
 ) -> list[WindowedRun]:
     """
     Open bags in the order given.
@@ -113,6 +113,7 @@ def open_windowed(
     """
     whole = [each.path for each in bags if each.window is None]
     left = open_sources(whole, output, remap=remap) if whole else []
+    of_all = None if window is None else (window[0], window[1])
     found: list[WindowedRun] = []
     for each in bags:
         if each.window is not None:
@@ -121,8 +122,8 @@ def open_windowed(
             files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
             runs = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
             left = [run for run in left if run not in runs]
-        found += [WindowedRun(run, each.window or window) for run in runs]
-    return found + [WindowedRun(run, window) for run in left]
+        found += [WindowedRun(run, each.window or of_all) for run in runs]
+    return found + [WindowedRun(run, of_all) for run in left]
 
 
 def open_parts(

@@ -103,7 +103,7 @@ class Steadiness(NamedTuple):
 
     Attributes
     ----------
-    slope : (channels, SCALES, points + lag + 1)
+    slope : (channels, SCALES, points + 2 lag + 1)
         Slopes at the points [m/s^2]; NaN where there were too few bins.
     changes : (channels, SCALES, points)
         Sizes of the changes between the last of them, ascending; inf for those unknown.
@@ -130,7 +130,7 @@ class Steadiness(NamedTuple):
         Return the state before the first bin.
         """
         return cls(
-            np.full((CHANNELS, SCALES, slopes.points + slopes.lag + 1), np.nan),
+            np.full((CHANNELS, SCALES, slopes.points + 2 * slopes.lag + 1), np.nan),
             np.full((CHANNELS, SCALES, slopes.points), np.inf),
             np.full((CHANNELS, SCALES), NEVER),
             np.full((CHANNELS, SCALES), np.nan),
@@ -151,7 +151,7 @@ def update_limits(
     """
     Bring the sd up to the last point at or before the closed bin `number`.
 
-    The result depends on the bins of the last steady_s and two windows alone.
+    The result depends on the bins of the last steady_s and three windows alone.
     """
     for scale in range(SCALES):
         if number >= steadiness.due[source, scale]:
@@ -173,19 +173,24 @@ def _update_scale(
         slope[:] = np.nan
         changes[:] = np.inf
     for point in range(first, newest + 1):
-        gone = _change(slope, slopes.lag, point - points)
+        # what falls now must not teach what is chance: a slope counts a window's length later
+        at = point - slopes.lag
+        gone = _change(slope, slopes.lag, at - points)
         slope[point % len(slope)] = line(bins, source, point * stride - 1, width)[0]
-        _replace(changes, gone, _change(slope, slopes.lag, point))
+        _replace(changes, gone, _change(slope, slopes.lag, at))
     steadiness.due[source, scale] = (newest + 1) * stride - 1
 
     count = int(np.searchsorted(changes, np.inf))
     sd = _sd_of_changes(changes, count)
     threshold = slopes.quantile[scale, count]
     if threshold == np.inf:
-        # a longer window would need a longer guess
+        # a longer window of a log would need a longer guess: its errors are no white noise there
         guess = np.nan
-        if scale == 0:
-            guess = _COLOUR * white_sd_of_slopes(bins, source, number, width, steadiness.scratch)
+        if scale == 0 or KIND[source] >= FIRST_TRACK:
+            white = white_sd_of_slopes(
+                bins, source, number, slopes.width, width, steadiness.scratch
+            )
+            guess = _COLOUR * white
         sd = guess if np.isnan(guess) else max(guess, _FEW * sd)
         threshold = slopes.white
     steadiness.slope_sd[source, scale] = sd + SLOPE_FLOOR_M_S2
@@ -225,16 +230,19 @@ def _sd_of_changes(changes: Float64, known: int) -> float:
 
 
 @compiled(uncounted=True)
-def white_sd_of_slopes(bins: Bins, source: int, last: int, width: int, scratch: Float64) -> float:
+def white_sd_of_slopes(
+    bins: Bins, source: int, last: int, shortest: int, width: int, scratch: Float64
+) -> float:
     """
-    Return the sd of a slope over `width` bins if successive bins differ by white noise.
+    Return the sd of a slope over `width` bins if readings differ by white noise.
 
-    NaN while fewer than half a window's changes from bin to bin are known.
+    That of a log is of speeds, that of a track of places, of whose means the speeds are
+    differences. NaN while fewer than half the shortest window's changes from bin to bin are known.
     """
-    # speeds from positions are averages over this many bins, and so are their errors
-    apart = 2 * smoothing(width) if KIND[source] >= FIRST_TRACK else 1
-    count = speeds_kept(bins, source, last, 4 * width, scratch) - apart
-    if 2 * count < width or count < 4:
+    averaged = smoothing(shortest) if KIND[source] >= FIRST_TRACK else 0
+    apart = max(2 * averaged, 1)
+    count = speeds_kept(bins, source, last, 4 * shortest, scratch) - apart
+    if 2 * count < shortest or count < 4:
         return np.nan
     for i in range(count):
         change, at = abs(scratch[i + apart] - scratch[i]), i
@@ -243,5 +251,9 @@ def white_sd_of_slopes(bins: Bins, source: int, last: int, width: int, scratch: 
             at -= 1
         scratch[at] = change
     reading = _sd_of_changes(scratch, count)
-    used = line(bins, source, last, width)[2] / apart
+    used = line(bins, source, last, width)[2]
+    if averaged > 0:
+        # errors of means within the window cancel but for those at its ends
+        part = averaged / width
+        return float(reading * part * math.sqrt(24.0 + 72.0 * part) / width)
     return float(reading * math.sqrt(12.0 / max(used, 1.0)) / width)

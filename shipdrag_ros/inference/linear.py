@@ -127,6 +127,29 @@ def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
     return x
 
 
+@compiled
+def inverted(lower: Float64, scale: Float64) -> Float64:
+    """
+    Return the inverse of a matrix by its factor of `cholesky`.
+    """
+    p = len(lower)
+    of_lower, inverse = np.zeros((p, p)), np.empty((p, p))
+    for a in range(p):
+        of_lower[a, a] = scale[a] / lower[a, a]
+        for b in range(a):
+            total = 0.0
+            for c in range(b, a):
+                total += lower[a, c] * of_lower[c, b]
+            of_lower[a, b] = -total / lower[a, a]
+    for a in range(p):
+        for b in range(a + 1):
+            total = 0.0
+            for c in range(a, p):
+                total += of_lower[c, a] * of_lower[c, b]
+            inverse[a, b] = inverse[b, a] = total
+    return inverse
+
+
 def solve_scaled(matrix: Float64, right: Float64) -> Float64:
     """
     Solve for right sides (p,) or (p, k) of a positive matrix whose unknowns have many units.

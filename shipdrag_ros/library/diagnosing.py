@@ -81,6 +81,7 @@ def diagnose_runs(
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
+    asked = _Together(runs, facts, earlier, progress)
     if (
         not windowed
         and stop is None
@@ -88,10 +89,9 @@ def diagnose_runs(
         and not any(SHIP_FILE in run.attachments for run, _ in runs)
     ):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        sailing = _sailing(runs, None, f'No coastdown was found: {why}.', facts, progress)
-        return _unused(sailing, facts, earlier), None
+        sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
+        return asked.unused(sailing, facts), None
     seen = _found(listener, runs, given, progress, stop, facts)
-    alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
     of_whole = partial(
         diagnose,
         seen.whole,
@@ -103,7 +103,10 @@ def diagnose_runs(
     )
     try:
         found = with_whole_glides(
-            alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
+            partial(asked.of_coastdowns, seen),
+            of_whole if seen.whole else None,
+            seen.notes,
+            coastdowns=len(seen.coasts),
         )
     except ShipdragError:
         for line in seen.warnings:  # no notes hold them
@@ -116,89 +119,78 @@ def diagnose_runs(
     return found, seen.ship
 
 
-def _of_coastdowns(
-    runs: Sequence[WindowedRun],
-    seen: _Coastdowns,
-    facts: Sequence[Fact],
-    earlier: Sequence[EarlierDiagnosis],
-    progress: Progress,
-) -> DiagnosisResult:
-    """Diagnose the coastdowns, or log and track alone where there is none."""
-    if not seen.coasts:
-        stated = (*seen.ship.facts, *facts)
-        log_track = _sailing(runs, seen.ship, seen.no_coastdown, stated, progress)
-        return _unused(log_track, stated, earlier)
-    found = _of_force(runs, seen, facts, earlier, progress)
-    return replace(found, estimates=seen.estimates)
+@dataclass(frozen=True)
+class _Together:
+    """Runs that are diagnosed together, and what is known beside them."""
 
+    runs: Sequence[WindowedRun]
+    facts: Sequence[Fact]
+    earlier: Sequence[EarlierDiagnosis]
+    progress: Progress
 
-def _of_force(
-    runs: Sequence[WindowedRun],
-    seen: _Coastdowns,
-    facts: Sequence[Fact],
-    earlier: Sequence[EarlierDiagnosis],
-    progress: Progress,
-) -> DiagnosisResult:
-    """Diagnose coastdowns; without a baseline the logs and the ways over ground as well."""
-    diagnosed = partial(
-        diagnose, seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress
-    )
-    if seen.ship.baseline is not None:
-        return diagnosed(earlier=earlier)
-    stated = (*seen.ship.facts, *facts)
-    try:
-        found = diagnosed()
-    except (DiagnosisError, EstimationError) as error:
-        why = f'No coastdown could be diagnosed: {error}.'
-        return _unused(_sailing(runs, seen.ship, why, stated, progress), stated, earlier)
-    unused = _unused(found, (), earlier).earlier
-    try:
-        found = with_log_track(found, _sailing(runs, seen.ship, '', stated, progress))
-    except DiagnosisError as error:
-        why = f'the log was not compared with the way over ground: {str(error).strip()}'
-        found = replace(found, notes=(*found.notes, why))
-    return replace(found, earlier=unused)
+    def of_coastdowns(self, seen: _Coastdowns) -> DiagnosisResult:
+        """Diagnose the coastdowns, or log and track alone where there is none."""
+        if not seen.coasts:
+            stated = (*seen.ship.facts, *self.facts)
+            return self.unused(self.sailing(seen.ship, seen.no_coastdown, stated), stated)
+        return replace(self._of_force(seen), estimates=seen.estimates)
 
+    def _of_force(self, seen: _Coastdowns) -> DiagnosisResult:
+        """Diagnose coastdowns; without a baseline the logs and the ways over ground as well."""
+        known = (seen.coasts, seen.ship, seen.parameters)
+        diagnosed = partial(diagnose, *known, facts=self.facts, progress=self.progress)
+        if seen.ship.baseline is not None:
+            return diagnosed(earlier=self.earlier)
+        stated = (*seen.ship.facts, *self.facts)
+        try:
+            found = diagnosed()
+        except (DiagnosisError, EstimationError) as error:
+            why = f'No coastdown could be diagnosed: {error}.'
+            return self.unused(self.sailing(seen.ship, why, stated), stated)
+        unused = self.unused(found, ()).earlier
+        try:
+            found = with_log_track(found, self.sailing(seen.ship, '', stated))
+        except DiagnosisError as error:
+            why = f'the log was not compared with the way over ground: {str(error).strip()}'
+            found = replace(found, notes=(*found.notes, why))
+        return replace(found, earlier=unused)
 
-def _unused(
-    found: DiagnosisResult, facts: Sequence[Fact], earlier: Sequence[EarlierDiagnosis]
-) -> DiagnosisResult:
-    """Say of facts and of earlier diagnoses that they were given and not used."""
-    return replace(
-        found,
-        facts=tuple(
-            WeighedFact(fact, '', None)
-            for fact in overriding(facts)
-            if fact.name != UNITS_CHECKED  # which counts here too
-        ),
-        earlier=tuple(WeighedEarlier(each.name, each.runs, used=False) for each in earlier),
-    )
+    def unused(self, found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
+        """Say of facts and of earlier diagnoses that they were given and not used."""
+        return replace(
+            found,
+            facts=tuple(
+                WeighedFact(fact, '', None)
+                for fact in overriding(facts)
+                if fact.name != UNITS_CHECKED  # which counts here too
+            ),
+            earlier=tuple(
+                WeighedEarlier(each.name, each.runs, used=False) for each in self.earlier
+            ),
+        )
 
-
-def _sailing(
-    runs: Sequence[WindowedRun],
-    ship: Ship | None,
-    no_coastdown: str,
-    facts: Sequence[Fact],
-    progress: Progress,
-) -> DiagnosisResult:
-    """Compare the logs with the ways over ground."""
-    read = []
-    for done, (run, _) in enumerate(runs):
-        progress(f'reading {run.name}', done, len(runs))
-        own = run_sheet.find(run.paths)
-        stated = (*facts, *(RunSheet.load(own).facts if own is not None else ()))
-        checked = any(fact.name == UNITS_CHECKED for fact in stated)
-        read.append((run.name, *accepted_samples(run, ship, zeros=True), checked))
-    progress('holding the log against the way over ground', 0, 0)
-    records = [SailingRecord(name, block, checked) for name, block, _, checked in read]
-    at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)
-    try:
-        found = diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
-        return replace(found, runs=at)
-    except DiagnosisError as error:
-        said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
-        raise DiagnosisError(said) from error
+    def sailing(
+        self, ship: Ship | None, no_coastdown: str, facts: Sequence[Fact]
+    ) -> DiagnosisResult:
+        """Compare the logs with the ways over ground."""
+        records, parameters = [], None
+        for done, (run, _) in enumerate(self.runs):
+            self.progress(f'reading {run.name}', done, len(self.runs))
+            own = run_sheet.find(run.paths)
+            stated = (*facts, *(RunSheet.load(own).facts if own is not None else ()))
+            checked = any(fact.name == UNITS_CHECKED for fact in stated)
+            block, used = accepted_samples(run, ship, zeros=True)
+            parameters = parameters or used
+            records.append(SailingRecord(run.name, block, checked))
+        self.progress('holding the log against the way over ground', 0, 0)
+        at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in self.runs if run.span_ns)
+        assert parameters is not None
+        try:
+            found = diagnose_sailing(records, parameters, no_coastdown=no_coastdown)
+            return replace(found, runs=at)
+        except DiagnosisError as error:
+            said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
+            raise DiagnosisError(said) from error
 
 
 def coasts_of(

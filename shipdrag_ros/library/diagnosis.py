@@ -20,8 +20,7 @@ from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library import replaying
 from shipdrag_ros.library.diagnosing import coasts_of, diagnose_runs
-from shipdrag_ros.library.record import Record, ShipGiven, ship_of
-from shipdrag_ros.library.resistance import records_of
+from shipdrag_ros.library.record import Record, ShipGiven, records_of, ship_of
 from shipdrag_ros.library.shown import Shown, drawing, in_python, says_it_in_python, writing
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay.playback import StopTime

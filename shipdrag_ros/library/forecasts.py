@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -276,18 +277,14 @@ def _forecast(
 ) -> GlideForecast:
     ship, parameters = result.ship, result.parameters
     stop_ns, length_s = window.start_ns, (window.end_ns - window.start_ns) / SECOND_NS
-    bag = result.run.name
-
-    def none(why: str) -> GlideForecast:
-        return GlideForecast(bag, ship, stop_ns, after_s, None, why)
-
+    made = partial(GlideForecast, result.run.name, ship, stop_ns, after_s)
     if after_s >= length_s:
-        return none(f'the glide ends {length_s:.0f} s after the stop')
+        return made(None, f'the glide ends {length_s:.0f} s after the stop')
     try:
         so_far = window.part(stop_ns, stop_ns + round(after_s * SECOND_NS))
         found = estimate(so_far, ship, parameters)
         if why := too_vague(found, parameters):
-            return none(why)
+            return made(None, why)
         forecast = foretell(
             found,
             ship,
@@ -295,13 +292,11 @@ def _forecast(
             speeds_m_s=parameters.forecast_speeds,
         )
     except EstimationError as error:
-        return none(str(error))
+        return made(None, str(error))
     if followed is None:
         milestones = tuple(Passed(each, None, None) for each in forecast.milestones)
-        checked = Checked(forecast, milestones, after_s, 0.0)
-        return GlideForecast(bag, ship, stop_ns, after_s, checked, unseen)
-    checked = followed.beside(forecast, stop_ns)
-    return GlideForecast(bag, ship, stop_ns, after_s, checked, followed=followed)
+        return made(Checked(forecast, milestones, after_s, 0.0), unseen)
+    return made(followed.beside(forecast, stop_ns), followed=followed)
 
 
 _RECENT_S = 30.0  # whose mean is the present speed
@@ -430,17 +425,12 @@ def _goes_on(coastdown: EndedCoastdown, speed_m_s: float) -> bool:
     return coastdown.ended_by is EndedBy.SPEED and slow
 
 
-def _named(coastdown: EndedCoastdown) -> str:
-    return f'the coastdown of {utc(coastdown.start_ns)}'
-
-
 def _hull(coastdown: EndedCoastdown) -> HullNow:
     assert coastdown.estimate is not None
     curve = coastdown.estimate.valid_curve
     curve = curve if len(curve) > 1 else coastdown.estimate.curve
-    return HullNow.of_run(
-        curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, _named(coastdown)
-    )
+    named = f'the coastdown of {utc(coastdown.start_ns)}'
+    return HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, named)
 
 
 def _recent(run: RunResult) -> tuple[Window, Series, str]:

@@ -21,13 +21,7 @@ from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
 from shipdrag_ros.sources.formats.csv.importer import read_csv
-from shipdrag_ros.sources.formats.csv.table import (
-    Cells,
-    LogTable,
-    TableRows,
-    are_numbers,
-    written,
-)
+from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows, are_numbers, written
 from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.reading import LogRun, format_of, join
 
@@ -320,8 +314,13 @@ def read_logs(
         part, said = _part(source, place, how, alone=len(sources) == 1)
         parts.append(part)
         notes += said
-    _refuse_missing(how, [part.source for part in parts])
-    _refuse_foreign(how, [part.declared for part in parts])
+    for text in how.maps:
+        if not any(_is_in(text, part.source) for part in parts):
+            raise ImportDataError(f'columns {text!r}: none of the sources has them; name others')
+    known = {option.key for part in parts for option in part.declared.options}
+    for key in (key for key in how.others or {} if key not in known | {_FORMAT}):
+        kinds = ' and '.join(dict.fromkeys(part.declared.kind for part in parts))
+        raise ImportDataError(f'options {key!r}: {kinds} has no use for it; leave it out')
     runs: list[Run] = []
     for group in _groups(parts):
         if len(group) == 1:
@@ -335,23 +334,6 @@ def read_logs(
     for run in runs:
         run.attachments |= attachments
     return runs, notes
-
-
-def _refuse_missing(how: ReadOptions, sources: Sequence[Path | LogTable]) -> None:
-    """Refuse columns that none of the sources has."""
-    for text in how.maps:
-        if not any(_is_in(text, source) for source in sources):
-            raise ImportDataError(f'columns {text!r}: none of the sources has them; name others')
-
-
-def _refuse_foreign(how: ReadOptions, chosen: Sequence[Format]) -> None:
-    """Refuse options that none of the formats knows."""
-    for key in how.others or {}:
-        if key != _FORMAT and not any(
-            key == option.key for each in chosen for option in each.options
-        ):
-            kinds = ' and '.join(dict.fromkeys(each.kind for each in chosen))
-            raise ImportDataError(f'options {key!r}: {kinds} has no use for it; leave it out')
 
 
 def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_Part, list[str]]:

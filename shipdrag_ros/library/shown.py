@@ -13,8 +13,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-import numpy as np
-
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import what_to_install
@@ -179,13 +177,24 @@ class Shown(ABC):
         ShipdragError
             Without pandas.
         """
-        return frame_of(self._columns())
+        try:
+            import pandas
+        except ImportError as error:
+            raise ShipdragError(
+                'to_frame() needs pandas, which is not installed: pip install pandas'
+            ) from error
+        return pandas.DataFrame(dict(self._columns()))
 
     def __repr__(self) -> str:
         return f'<{type(self).__name__}: {self._title()}>'
 
     def _repr_html_(self) -> str:
-        return html_of(self._title(), self.summary().splitlines(), self.table())
+        table = self.table()
+        rows = [_row(table.columns, 'th')] if any(table.columns) else []
+        rows += [_row(row, 'td') for row in table.rows]
+        shown = f'<table>{"".join(rows)}</table>' if table.rows else ''
+        title = f'<p><strong>{escape(self._title())}</strong></p>'
+        return f'<div>{title}{self.summary()._repr_html_()}{shown}</div>'
 
 
 class ShownResistance(Shown):
@@ -215,39 +224,6 @@ class ShownResistance(Shown):
     @abstractmethod
     def _drawing(self) -> Callable[[Axes], None]:
         """Return what draws it; an EstimationError where there is nothing to draw."""
-
-
-def frame_of(columns: Mapping[str, Any]) -> DataFrame:
-    """
-    Return columns as a pandas frame.
-
-    Raises
-    ------
-    ShipdragError
-        Without pandas.
-    """
-    try:
-        import pandas
-    except ImportError as error:
-        raise ShipdragError(
-            'to_frame() needs pandas, which is not installed: pip install pandas'
-        ) from error
-    return pandas.DataFrame(dict(columns))
-
-
-def html_of(title: str, lines: Sequence[str], table: Table) -> str:
-    """
-    Return a title, paragraphs and a table for a notebook; all of them are text.
-    """
-    parts = [f'<p><strong>{escape(title)}</strong></p>']
-    parts += [f'<p>{escape(line)}</p>' for line in lines]
-    if table.rows:
-        parts.append('<table>')
-        if any(table.columns):
-            parts.append(_row(table.columns, 'th'))
-        parts += [_row(row, 'td') for row in table.rows]
-        parts.append('</table>')
-    return f'<div>{"".join(parts)}</div>'
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
@@ -281,10 +257,3 @@ def drawing(ax: Axes | None) -> Iterator[Axes]:
 
     with plt.rc_context(STYLE):
         yield plt.subplots(figsize=_SIZE, layout='constrained')[1] if ax is None else ax
-
-
-def time_column(times_ns: Sequence[int]) -> Any:
-    """
-    Return times as numpy dates, in UTC.
-    """
-    return np.array(times_ns, np.int64).astype('datetime64[ns]')

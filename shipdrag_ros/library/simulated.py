@@ -53,10 +53,10 @@ class SimulationSettings:
 
     speed_m_s: float
     duration_s: float
-    lead_in_s: float
+    lead_in_s: float = 600.0
     heading_rad: float
-    rate_hz: float
-    noise: float
+    rate_hz: float = 1.0
+    noise: float = 1.0
     seed: int
     inputs: tuple[str, ...] = STANDARD_INPUTS
     effects: tuple[StatedEffect, ...] = ()
@@ -283,7 +283,6 @@ def simulate(
             f'{", ".join(sorted(unknown))}: not known; beside the arguments by name there are '
             f'{", ".join(Sensing.__annotations__)}'
         )
-    known = {'lead_in_s': 600.0, 'rate_hz': 1.0, 'noise': 1.0, **more}
     settings = SimulationSettings(
         speed_m_s=usual_speed(ship) if speed_m_s is None else speed_m_s,
         duration_s=duration_s,
@@ -291,7 +290,7 @@ def simulate(
         seed=seed,
         effects=tuple(_stated(name, size) for name, size in (effects or {}).items()),
         start_ns=START_NS if start is None else moment_ns(start),
-        **known,  # type: ignore[arg-type]
+        **more,  # type: ignore[arg-type]
     )
     block, truth = make(ship, settings)
     folder = TemporaryDirectory(prefix='shipdrag-')

@@ -9,12 +9,14 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from shipdrag_ros import __version__
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError, ShipFileError
+from shipdrag_ros.library.record import Resistance
 from shipdrag_ros.library.replaying import Listener, Notes
-from shipdrag_ros.library.resistance import Resistance
-from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, time_column, writing
+from shipdrag_ros.library.shown import Shown, drawing, says_it_in_python, writing
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 
@@ -151,7 +153,7 @@ class Trends(Shown):
         points = [(trend.series.name, point) for trend in self.ships for point in trend.points]
         return {
             'ship': [name for name, _ in points],
-            'time': time_column([point.time_ns for _, point in points]),
+            'time': np.array([point.time_ns for _, point in points], 'datetime64[ns]'),
             'added_resistance': [point.value for _, point in points],
             'sd': [point.sd for _, point in points],
             'sd_repeatable': [point.sd_repeatable for _, point in points],

@@ -22,6 +22,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -46,7 +47,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.display import json_text, printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.bridge import Bridge
-from shipdrag_ros.live.headline import Tone
+from shipdrag_ros.live.headline import Headline, Tone
 from shipdrag_ros.live.source import PictureFeed
 
 SOURCE = {'label': 'shipdrag', 'type': 'shipdrag_ros'}
@@ -86,8 +87,6 @@ def signal_k_deltas(bridge: Bridge, now_s: float) -> list[dict[str, Any]]:
         return []
     parts = bridge.parts(now_s)
     figures, said = parts['figures'], parts['headline']
-    assert isinstance(figures, dict)
-    assert isinstance(said, dict)
     values: dict[str, Any] = {'navigation.speedThroughWater': figures['speed_m_s']}
     ship, r = bridge.ship, bridge.resistance
     if r is not None:
@@ -125,16 +124,16 @@ def signal_k_units() -> dict[str, Any]:
 
 
 def _values(values: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [{'path': path, 'value': value} for path, value in values.items() if _is_known(value)]
-
-
-def _is_known(value: object) -> bool:
-    return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+    return [
+        {'path': path, 'value': value}
+        for path, value in values.items()
+        if value is not None and not (isinstance(value, float) and not math.isfinite(value))
+    ]
 
 
 def _time(seconds: float) -> str:
     moment = datetime.fromtimestamp(seconds, UTC)
-    return moment.strftime('%Y-%m-%dT%H:%M:%S.') + f'{moment.microsecond // 1000:03d}Z'
+    return moment.isoformat(timespec='milliseconds').replace('+00:00', 'Z')
 
 
 COOKIE = 'shipdrag'
@@ -142,6 +141,7 @@ _HEADERS = {
     'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; "
     "img-src 'self' data:; connect-src 'self'; form-action 'self'; base-uri 'none'; "
     "frame-ancestors 'none'",
+    'Cache-Control': 'no-store',
     'X-Content-Type-Options': 'nosniff',
     'X-Frame-Options': 'DENY',
     'Referrer-Policy': 'no-referrer',
@@ -179,7 +179,6 @@ class Guard:
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
-                headers.setdefault('Cache-Control', 'no-store')
             await send(message)
 
         app: ASGIApp = self._app if refused is None else refused
@@ -201,12 +200,14 @@ class Guard:
         return PlainTextResponse('A token is needed: open the page and give it there.\n', 401)
 
     def _is_known(self, host: str) -> bool:
-        name = _name_of(f'//{host}')
         try:
+            name = urlsplit(f'//{host}').hostname or ''
+        except ValueError:  # half a bracket
+            return False
+        with suppress(ValueError):
             ipaddress.ip_address(name)
-        except ValueError:
-            return name in self._names or name.removesuffix('.local') in self._names
-        return True
+            return True
+        return name in self._names or name.removesuffix('.local') in self._names
 
     def _knows_token(self, headers: Headers) -> bool:
         assert self._token is not None
@@ -229,13 +230,6 @@ def same(given: str, expected: str) -> bool:
     Compare in constant time.
     """
     return hmac.compare_digest(given.encode(), expected.encode())
-
-
-def _name_of(address: str) -> str:
-    try:
-        return urlsplit(address).hostname or ''
-    except ValueError:  # half a bracket
-        return ''
 
 
 def _is_same_origin(headers: Headers) -> bool:
@@ -278,9 +272,8 @@ class Frames:
         self.dropped = 0
         self._history = history
         self._parts: dict[str, str] = {}
-        self._kept: deque[bytes] = deque(maxlen=KEPT)
-        self._whole: tuple[int, bytes] | None = None
-        self._first = 1  # a viewer who has not seen this frame needs the whole picture
+        self._kept: deque[bytes] = deque(maxlen=KEPT)  # without those before the last jump
+        self._whole = b''  # as it is, once it was asked for
         self._event = asyncio.Event()
 
     def add(self, parts: Mapping[str, Any], rows: list[Any], *, anew: bool = False) -> None:
@@ -304,11 +297,8 @@ class Frames:
         self.number += 1
         self._kept.append(self._frame('frame', changed, rows))
         if anew:
-            self._first = self.number + 1
             self._kept.clear()
-        elif len(self._kept) == KEPT:
-            self._first = max(self._first, self.number - KEPT + 1)
-        self._whole = None
+        self._whole = b''
         event, self._event = self._event, asyncio.Event()
         event.set()
 
@@ -321,20 +311,18 @@ class Frames:
         number
             None for a viewer who has seen nothing.
         """
-        if number is None or number + 1 < self._first or number > self.number:
-            if number is not None:
-                self.dropped += max(self.number - number, 0)
-            return self.number, self.whole()
-        missing = self.number - number
-        return self.number, b''.join(list(self._kept)[len(self._kept) - missing :])
+        kept, missing = len(self._kept), 0 if number is None else self.number - number
+        if number is not None and 0 <= missing <= kept:
+            return self.number, b''.join(islice(self._kept, kept - missing, None))
+        self.dropped += max(missing, 0)
+        return self.number, self.whole()
 
     def whole(self) -> bytes:
         """
         Return the whole picture, as a viewer who comes gets it.
         """
-        if self._whole is None or self._whole[0] != self.number:
-            self._whole = self.number, self._frame('whole', self._parts, self._history())
-        return self._whole[1]
+        self._whole = self._whole or self._frame('whole', self._parts, self._history())
+        return self._whole
 
     async def more(self, number: int) -> None:
         """
@@ -381,12 +369,12 @@ class FleetPages:
     """
 
     def __init__(self, page: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        from shipdrag_ros.trend.page import page_name  # pictures take long to import
+        from shipdrag_ros.trend.page import coastdown_page, page_name  # slow to import
 
         self.page = page
         self._rows = {page_name(row): row for row in rows}
         self._drawing = threading.Lock()
-        self._made = lru_cache(_KEPT)(self._make)
+        self._made = lru_cache(_KEPT)(lambda name: coastdown_page(self._rows[name], fleet=FLEET))
 
     def coastdown(self, name: str) -> str | None:
         """
@@ -396,11 +384,6 @@ class FleetPages:
             return None
         with self._drawing:
             return self._made(name)
-
-    def _make(self, name: str) -> str:
-        from shipdrag_ros.trend.page import coastdown_page
-
-        return coastdown_page(self._rows[name], fleet=FLEET)
 
 
 class LivePage:
@@ -480,12 +463,15 @@ class LivePage:
         now_s = time.monotonic()
         jumped = self._source.advance(now_s)
         bridge = self._source.bridge
+        restarted, bridge.trace.restarted = bridge.trace.restarted, False
         rows = bridge.trace.closed()
-        parts: dict[str, Any] = dict(bridge.parts(now_s))
-        parts['player'] = self._source.player()
-        parts['started'] = self._started
-        parts['clock'] = {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())}
-        self.frames.add(parts, [list(row) for row in rows], anew=jumped)
+        parts = {
+            **bridge.parts(now_s),
+            'player': self._source.player(),
+            'started': self._started,
+            'clock': {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())},
+        }
+        self.frames.add(parts, [list(row) for row in rows], anew=jumped or restarted)
 
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
@@ -512,8 +498,8 @@ class LivePage:
         """Say on the page that it shows nothing, and why; once in the log."""
         why = f'{type(error).__name__}: {printable(str(error))}'
         action = f'Nothing here is of now ({why}). Start the page again, and report this.'
-        said = {'tone': Tone.BAD.value, 'text': 'THE PAGE HAS FAILED', 'action': action}
-        self.frames.add({'headline': said}, [], anew=False)
+        said = Headline(Tone.BAD, 'THE PAGE HAS FAILED', action)
+        self.frames.add({'headline': said._asdict()}, [])
         if why not in self._failures and len(self._failures) < _FAILURES:
             self._failures.add(why)
             about = {'message': 'the page cannot be made', 'exception': error}

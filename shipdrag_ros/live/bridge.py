@@ -11,42 +11,14 @@ import json
 import re
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import outputs
-from shipdrag_ros.live.figures import (
-    Ahead,
-    PagePart,
-    at_usual_speed,
-    curve_part,
-    past_part,
-    ship_part,
-    to_go_s,
-)
-from shipdrag_ros.live.headline import (
-    ENDED_S,
-    GOAL,
-    SILENT_S,
-    Check,
-    Ended,
-    Held,
-    Recent,
-    Situation,
-    course_check,
-    depth_check,
-    headline,
-    lead_check,
-    reciprocal_check,
-    rudder_check,
-    shaft_check,
-    wind_check,
-)
-from shipdrag_ros.live.trace import Trace
+from shipdrag_ros.live import figures, headline, outputs
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, topics, types
-from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SHAFTS, Channel, kind_of
+from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SECOND_NS, SHAFTS, Channel, kind_of
 from shipdrag_ros.ship import Ship
 
 _OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
@@ -104,8 +76,6 @@ _CHECKED = {
     'Shaft': 'shaft',
 }
 
-_AnyPart = PagePart | list[Any] | None
-
 
 @dataclass(frozen=True)
 class SpeedNow:
@@ -137,12 +107,12 @@ class Bridge:
 
     def __init__(self, ship: Ship | None = None, *, bag: str = '') -> None:
         self._bag = bag
-        self.trace = Trace()
+        self.trace = figures.Trace()
         self.past: list[outputs.PastRun] = []
         self.ship = ship
         self._heard_s: float | None = None
         self._health = topics.Health(())
-        self._recent = Recent()
+        self._recent = headline.Recent()
         self._courses: deque[tuple[int, float]] = deque()
         self._course_at_stop: float | None = None
         self._lead_at_stop: float | None = None
@@ -151,9 +121,9 @@ class Bridge:
         self._speed: outputs.Figure | None = None
         self.resistance: outputs.Figure | None = None
         self._curve: outputs.Curve | None = None
-        self._ahead = Ahead()
-        self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
-        self._found: PagePart | None = None  # the last diagnosis
+        self._ahead = figures.Ahead()
+        self._verdict: figures.PagePart = {'state': '', 'sentence': ''}  # as the health says it
+        self._found: figures.PagePart | None = None  # the last diagnosis
         self._would_show = ''  # by the next coastdown
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
         self._noted: EventKind | None = None
@@ -167,7 +137,11 @@ class Bridge:
         """
         match heard:
             case topics.Samples(block):
+                before_s = self._now_s
                 self.trace.add(block)
+                if self._now_s < before_s:  # time went back: the rest is of another one
+                    self._recent, self._ahead = headline.Recent(), figures.Ahead()
+                    self._courses.clear()
                 self._recent.add(block)
                 self._ahead.add(block)
                 self._note_course()
@@ -236,7 +210,7 @@ class Bridge:
     @property
     def now_ns(self) -> int:
         """The ship's time: the latest stamp, 0 before the first [ns]."""
-        return self.trace.newest_s * 1_000_000_000
+        return self.trace.newest_s * SECOND_NS
 
     def speed(self, now_s: float) -> SpeedNow | None:
         """
@@ -286,16 +260,15 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found.values:
-            self.show_verdict(
-                found.values.get('state', ''), found.message, found.values.get(topics.AHEAD, '')
-            )
+            ahead = found.values.get(topics.AHEAD, '')
+            self.show_verdict(found.values.get('state', ''), found.message, ahead)
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':
-            self._speed = outputs.read_speed(payload)
+            self._speed = outputs.read_figure(topics.SPEED, payload)
             self.trace.add_estimate(self._speed.stamp_ns, self._speed.value)
         elif name == 'resistance':
-            self.resistance = outputs.read_resistance(payload)
+            self.resistance = outputs.read_figure(topics.RESISTANCE, payload)
         elif name == 'resistance_curve':
             curve = outputs.read_curve(payload)
             if curve is not None:
@@ -304,9 +277,8 @@ class Bridge:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
                     self._bands.append((age_s, curve.band(self.ship)))
         elif name == 'forecast':
-            self._ahead.take(
-                outputs.read_forecast(payload), self.ship, self._speed, self._coast_ns
-            )
+            coming = outputs.read_forecast(payload)
+            self._ahead.take(coming, self.ship, self._speed, self._coast_ns)
         elif name == 'forecast_path':
             self._ahead.take_path(outputs.read_path(payload), self._coast_ns)
         elif name == 'events':
@@ -345,7 +317,7 @@ class Bridge:
     def _now_s(self) -> int:
         return self.trace.newest_s
 
-    def parts(self, now_s: float) -> dict[str, _AnyPart]:
+    def parts(self, now_s: float) -> dict[str, Any]:
         """
         Return every part of the page but the traces.
 
@@ -355,42 +327,46 @@ class Bridge:
             On the clock of `hear`.
         """
         now = self._situation(now_s)
-        said = headline(now)
-        of_run = _is_of_run(now)
+        of_run = now.coast_s is not None or now.just_ended is not None
         return {
-            'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
-            'ship': ship_part(self.ship),
+            'headline': headline.headline(now)._asdict(),
+            'ship': figures.ship_part(self.ship),
             'figures': self._figures(now_s),
-            'curve': curve_part(self._curve),
+            'curve': figures.curve_part(self._curve),
             'forecast': self._ahead.forecast if of_run else None,
             'if_stopped': None if of_run else self._if_stopped(now_s),
             'track': self._ahead.track,
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
             'verdict': self._verdict_now,
-            'past': [past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
-            'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
+            'past': [figures.past_part(run, self.ship) for run in self.past[-PAST_RUNS:]],
+            'notes': [[stamp // SECOND_NS, text] for stamp, text in self._notes],
         }
 
-    def _if_stopped(self, now_s: float) -> PagePart:
+    def _if_stopped(self, now_s: float) -> figures.PagePart:
         speed = self.speed(now_s)
         read = speed is not None and (speed.age_s or 0.0) <= _OLD_S
         value = speed.value_m_s if speed is not None and read else None
-        return self._ahead.if_stopped(self.ship, value, self.past, self._now_s)
+        return self._ahead.if_stopped(self.ship, value, self._last_run, self._now_s)
 
     @property
-    def _verdict_now(self) -> PagePart:
+    def _last_run(self) -> outputs.PastRun | None:
+        """The last coastdown that gave a curve."""
+        return next((run for run in reversed(self.past) if run.curve is not None), None)
+
+    @property
+    def _verdict_now(self) -> figures.PagePart:
         done = self._found if self._verdict['state'] == 'done' else None
         ahead = self._would_show if self._coast_ns is None else ''
         return {**(done or self._verdict), 'ahead': ahead}
 
-    def _situation(self, now_s: float) -> Situation:
+    def _situation(self, now_s: float) -> headline.Situation:
         state = self._health.of('state')
         coast_s = None
         if self._coast_ns is not None and self._now_s:
             coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
         lead_s, ready_s = self._health.lead
-        return Situation(
+        return headline.Situation(
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
             lifecycle=state.values.get('lifecycle', ''),
             monitor=state.values.get('monitor', ''),
@@ -400,7 +376,7 @@ class Bridge:
             ready_s=ready_s,
             coast_s=coast_s,
             band=self._bands[-1][1] if self._bands else None,
-            to_go_s=to_go_s(self._bands, GOAL),
+            to_go_s=figures.to_go_s(self._bands, headline.GOAL),
             ended=self._ended(),
             steer_deg=self._steer_deg(),
             paired=self._is_paired,
@@ -416,12 +392,12 @@ class Bridge:
             and status.number('messages')
         )
 
-    def _ended(self) -> Ended | None:
+    def _ended(self) -> headline.Ended | None:
         own = [run for run in self.past if run.bag == self._bag]
         if not own or not self._now_s:
             return None
         last = own[-1]
-        return Ended(
+        return headline.Ended(
             by=last.ended_by,
             ago_s=self._now_s - last.end_ns * 1e-9,
             band=None if last.curve is None else last.curve.band(self.ship),
@@ -435,36 +411,35 @@ class Bridge:
     def _steer_deg(self) -> float | None:
         if not self.past or self._is_paired or self.past[-1].curve is None:
             return None
-        if self._now_s - self.past[-1].end_ns * 1e-9 > 12 * 3600.0:
+        if self._now_s - self.past[-1].end_ns * 1e-9 > outputs.ONE_DAY_S:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self, now_s: float) -> _AnyPart:
+    def _figures(self, now_s: float) -> figures.PagePart:
         speed = self.speed(now_s)
-        figures: dict[str, Any] = {'speed_m_s': None}
+        shown: dict[str, Any] = {'speed_m_s': None}
         if speed is not None:
             old = speed.age_s is not None and speed.age_s > _OLD_S
-            figures = {
+            shown = {
                 'speed_m_s': speed.value_m_s,
                 'speed_kind': speed.kind,
                 'speed_old_s': int(speed.age_s or 0.0) if old else None,
             }
         if self.resistance is not None:
-            figures |= {'r': self.resistance.value, 'r_sigma': self.resistance.sigma}
+            shown |= {'r': self.resistance.value, 'r_sigma': self.resistance.sigma}
         estimate = self._health.of('estimate')
         if topics.OF_CONDITIONS in estimate.values:
-            figures['r_of'] = estimate.values[topics.OF_CONDITIONS]
-        ended = [run for run in self.past if run.curve is not None]
-        if self._curve is not None:
-            figures['usual'] = at_usual_speed(self._curve, self.ship)
-        elif ended and self._coast_ns is None and ended[-1].curve is not None:
-            figures['usual'] = at_usual_speed(ended[-1].curve, self.ship)
-        if 'usual' in figures and self._coast_ns is None and ended:
-            figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
-        return figures
+            shown['r_of'] = estimate.values[topics.OF_CONDITIONS]
+        last = self._last_run if self._coast_ns is None else None
+        curve = last.curve if self._curve is None and last is not None else self._curve
+        if curve is not None:
+            shown['usual'] = figures.at_usual_speed(curve, self.ship)
+            if last is not None:
+                shown['usual']['run_s'] = last.start_ns // SECOND_NS  # not of now
+        return shown
 
-    def _inputs(self, silent_s: float) -> _AnyPart:
-        silent = silent_s > SILENT_S  # what the node said last is no health of now
+    def _inputs(self, silent_s: float) -> list[figures.PagePart]:
+        silent = silent_s > headline.SILENT_S  # what the node said last is no health of now
         since_s = silent_s if silent else 0.0
         others = ('nmea ', 'recording')  # a sentence that is not used shows in no input
         besides = (each for each in self._health.statuses if each.part.startswith(others))
@@ -472,9 +447,9 @@ class Bridge:
         for status in (*self._health.inputs, *besides):
             age_s = status.number('age')
             rejected = {
-                key.removeprefix('rejected '): int(status.number(key) or 0)
+                key.removeprefix('rejected '): int(count)
                 for key in status.values
-                if key.startswith('rejected ')
+                if key.startswith('rejected ') and (count := status.number(key))
             }
             rows.append(
                 {
@@ -485,16 +460,16 @@ class Bridge:
                     else status.message,
                     'rate_hz': None if silent else status.number('rate'),
                     'age_s': None if age_s is None else age_s + since_s,
-                    'rejected': {name: count for name, count in rejected.items() if count},
+                    'rejected': rejected,
                 }
             )
         return rows
 
-    def _checks(self, now: Situation, now_s: float) -> _AnyPart:
+    def _checks(self, now: headline.Situation, now_s: float) -> list[figures.PagePart]:
         speed = self.speed(now_s)
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
-        began = now.monitor == 'candidate' or _is_of_run(now)
+        began = now.monitor == 'candidate' or coasting or now.just_ended is not None
         lead_s = self._lead_at_stop if began else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
@@ -505,25 +480,20 @@ class Bridge:
         rudder = self._recent.mean(Channel.RUDDER, second)
         shafts = [self._recent.mean(channel, second) for channel in SHAFTS]
         checks = [
-            lead_check(lead_s, now.ready_s),
-            wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
-            depth_check(depth and depth[0], speed_m_s, self.ship),
-            rudder_check(rudder and rudder[0]),
-            shaft_check(min((each[0] for each in shafts if each is not None), default=None)),
-            course_check(turned, coasting=coasting),
-            reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
+            headline.lead_check(lead_s, now.ready_s),
+            headline.wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
+            headline.depth_check(depth and depth[0], speed_m_s, self.ship),
+            headline.rudder_check(rudder and rudder[0]),
+            headline.shaft_check(
+                min((each[0] for each in shafts if each is not None), default=None)
+            ),
+            headline.course_check(turned, coasting=coasting),
+            headline.reciprocal_check(now.steer_deg, paired=now.paired, coasting=coasting),
         ]
-        checks = [self._unless_silent(check) for check in checks]
-        return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
+        return [self._unless_silent(check)._asdict() for check in checks]
 
-    def _unless_silent(self, check: Check) -> Check:
-        name = _CHECKED.get(check.name, '')
-        status = self._health.of(f'input {name}')
+    def _unless_silent(self, check: headline.Check) -> headline.Check:
+        status = self._health.of(f'input {_CHECKED.get(check.name)}')
         if status.level != topics.STALE:
             return check
-        return replace(check, held=Held.SILENT, text=status.message)
-
-
-def _is_of_run(now: Situation) -> bool:
-    """Say whether she coasts, or has until a while ago."""
-    return now.coast_s is not None or (now.ended is not None and now.ended.ago_s < ENDED_S)
+        return check._replace(held=headline.Held.SILENT, text=status.message)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The figures of the page: the ship, a curve, a run that has ended, what is to come.
+The figures of the page: the ship, a curve, a run that has ended, what is to come, traces.
 
-Plain numbers in SI units.
+Plain numbers in SI units. Traces are of the last two days: means over 1 s of late, over 10 s
+before. Memory is bounded, whatever the rates of the sensors.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from itertools import islice, repeat
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.forecast.foretell import HullNow, if_stopped
 from shipdrag_ros.forecast.result import places
 from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure, PastRun
-from shipdrag_ros.samples import GEODETIC, SECOND_NS, Block, Float64
+from shipdrag_ros.samples import GEODETIC, KIND, SECOND_NS, Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 
 _PLACES = 7200  # kept, one a second at most
@@ -112,7 +114,7 @@ class Ahead:
             self._paths.append(path)
             glide = next((each for each in self._coming if each.stamp_ns == path.stamp_ns), None)
             time_s = (self.forecast or {}).get('time_s', (None,))[0]
-        shown = _half_way(self._paths, coast_ns) if path is None else path
+        shown = path or _half_way(self._paths, coast_ns, self._paths[-1].stamp_ns)
         kept = [place for each in self._places.values() for place in each if place[1] >= coast_ns]
         if kept:
             end_ns = max(place[1] for place in kept)
@@ -130,7 +132,7 @@ class Ahead:
             self.forecast['withdrawn'] = known.get(ended_by, ended_by)
 
     def if_stopped(
-        self, ship: Ship | None, speed_m_s: float | None, past: Sequence[PastRun], now_s: int
+        self, ship: Ship | None, speed_m_s: float | None, run: PastRun | None, now_s: int
     ) -> PagePart:
         """
         Return the glide that would begin now, from the hull as last known, or why it is not said.
@@ -140,12 +142,11 @@ class Ahead:
         ship
         speed_m_s
             None where none is read now.
-        past
-            Coastdowns that ended.
+        run
+            The last coastdown that gave a curve.
         now_s
             The ship's time.
         """
-        run = next((each for each in reversed(past) if each.curve is not None), None)
         asked = (ship, speed_m_s is None, run, now_s // _STEP_S)
         if self._answer is None or asked != self._answered:
             self._answered, self._answer = asked, _if_stopped(ship, speed_m_s, run, now_s)
@@ -161,13 +162,8 @@ def _if_stopped(
         return {'why': 'no speed is read'}
     try:
         if run is not None and run.curve is not None:
-            curve = run.curve
-            hull = HullNow.of_run(
-                curve.speed_m_s,
-                curve.resistance_m_s2,
-                curve.sigma_m_s2,
-                f'the coastdown of {utc(run.start_ns)}',
-            )
+            curve, of = run.curve, f'the coastdown of {utc(run.start_ns)}'
+            hull = HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, of)
         else:
             hull = HullNow.of_file(ship)
         found = if_stopped(hull, ship, speed_m_s, now_s * SECOND_NS)
@@ -177,10 +173,13 @@ def _if_stopped(
     return {**part, 'rows': [], 'hull': hull.source}
 
 
-def _half_way(made: Sequence[ComingPath], coast_ns: int) -> ComingPath:
-    """Return the first that was made after the half of the time."""
-    half_ns = (coast_ns + made[-1].stamp_ns) // 2
-    return next(each for each in made if each.stamp_ns >= half_ns)
+_Foretold = TypeVar('_Foretold', ComingGlide, ComingPath)
+
+
+def _half_way(made: Sequence[_Foretold], start_ns: int, end_ns: int) -> _Foretold:
+    """Return the first that was made after the half of a time, or the last."""
+    half_ns = (start_ns + end_ns) // 2
+    return next((each for each in made if each.stamp_ns >= half_ns), made[-1])
 
 
 _CLEAN_POINTS = 60
@@ -190,7 +189,7 @@ _TRACK_POINTS = 60
 _SPOKEN_OF_M_S = 2.0 * M_S_PER_KNOT
 
 PagePart = dict[str, Any]
-LONGEST_S = 3600.0  # a time to go beyond it is not shown
+_TO_GO_S = 3600.0  # a time to go beyond it is not shown
 _LEAST_POINTS = 4
 _LEAST_SLOPE = 0.2  # of log band over log time; flatter is no promise
 
@@ -240,7 +239,7 @@ def past_part(run: PastRun, ship: Ship | None) -> PagePart:
     Return a run that has ended, for the list and for the chart.
     """
     part: PagePart = {
-        'start_s': run.start_ns // 1_000_000_000,
+        'start_s': run.start_ns // SECOND_NS,
         'length_s': (run.end_ns - run.start_ns) * 1e-9,
         'heading_deg': run.compass_deg,
         'ended_by': run.ended_by,
@@ -281,7 +280,7 @@ def forecast_part(coming: ComingGlide, ship: Ship | None) -> PagePart:
         wanted = max(0.5 * float(speed[0]), float(speed[-1]))
     time_s, low_s, high_s = coming.time_s(wanted)
     return {
-        'made_s': coming.stamp_ns // 1_000_000_000,
+        'made_s': coming.stamp_ns // SECOND_NS,
         'speed_m_s': wanted,
         'time_s': [time_s, low_s, high_s],
         'way_m': None if time_s is None else coming.way_m(time_s),
@@ -293,8 +292,7 @@ def checked_part(made: Sequence[ComingGlide], last: Figure, start_ns: int) -> Pa
     """
     Return what was foretold half-way, beside what was: when she had her last speed.
     """
-    half_ns = (start_ns + last.stamp_ns) // 2
-    then = next((each for each in made if each.stamp_ns >= half_ns), made[-1])
+    then = _half_way(made, start_ns, last.stamp_ns)
     foretold_s, low_s, high_s = then.time_s(last.value)
     return {
         'speed_m_s': last.value,
@@ -380,4 +378,161 @@ def to_go_s(bands: Sequence[tuple[float, float]], goal: float) -> float | None:
     if slope > -_LEAST_SLOPE:
         return None
     left = last_s * ((last / goal) ** (-1.0 / slope) - 1.0)
-    return left if left <= LONGEST_S else None
+    return left if left <= _TO_GO_S else None
+
+
+FINE_S = 1800  # of 1 s each
+COARSE_S = 10
+LONGEST_S = 2 * 86400
+LATE_S, JUMP_S = 60, 3600  # a stamp further off than these is strange
+_STRANGE = 20  # readings in a row after which the time of all is another
+COLUMNS = ('log', 'ground', 'estimate', 'shaft')
+"""Speed through water, over ground, as estimated [m/s]; the fastest shaft [rad/s]."""
+_ESTIMATE, _SHAFT = 2, 3
+_COLUMN_OF = {  # of a kind
+    int(Channel.SPEED_THROUGH_WATER): 0,
+    int(Channel.SPEED_OVER_GROUND): 1,
+    int(Channel.SHAFT): _SHAFT,
+}
+
+TraceRow = tuple[int, float | None, float | None, float | None, float | None]
+
+
+class _Bin(dict[int, tuple[int, float, int]]):
+    """Instrument, sum and count of each column over a second, of the first that spoke in it."""
+
+    def add(self, column: int, total: float, count: int, instrument: int = 0) -> None:
+        first, before, times = self.get(column, (instrument, 0.0, 0))
+        if instrument < first:
+            before, times = 0.0, 0
+        if instrument <= first:
+            self[column] = instrument, before + total, times + count
+
+    def row(self, second: int) -> TraceRow:
+        log, ground, estimate, shaft = (
+            float(f'{self[column][1] / self[column][2]:.5g}') if column in self else None
+            for column in range(len(COLUMNS))
+        )
+        return second, log, ground, estimate, shaft
+
+
+class Trace:
+    """
+    What speeds and shafts did, by second of stamp.
+
+    Attributes
+    ----------
+    newest_s
+        Last second with a reading, 0 before the first.
+    restarted
+        Whether all was dropped because time went back; for the reader to clear.
+    """
+
+    def __init__(self) -> None:
+        self.newest_s = 0
+        self.restarted = False
+        self._strange = 0
+        self._open: dict[int, _Bin] = {}
+        self._fine: deque[TraceRow] = deque()
+        self._coarse: deque[TraceRow] = deque()
+        self._thinning: list[TraceRow] = []
+
+    def add(self, block: Block) -> None:
+        """
+        Take readings; what comes for a second that is closed already is left out.
+        """
+        sums: list[tuple[int, int, float, int, int]] = []
+        for code in np.unique(block.channel).tolist():
+            column = _COLUMN_OF.get(int(KIND[code]))
+            if column is None:
+                continue
+            rows = np.flatnonzero(block.channel == code)
+            value = block.value[rows, 0]
+            if KIND[code] == Channel.SPEED_OVER_GROUND:
+                value = np.hypot(value, block.value[rows, 1])
+            known = np.isfinite(value) & (np.abs(value) < 1e4)
+            second = block.stamp_ns[rows[known]] // SECOND_NS
+            seconds, place, counts = np.unique(second, return_inverse=True, return_counts=True)
+            totals = np.bincount(place, weights=value[known], minlength=len(seconds))
+            instrument = 0 if column == _SHAFT else code
+            kept = (seconds.tolist(), repeat(column), totals.tolist(), counts.tolist())
+            sums += zip(*kept, repeat(instrument))
+        for each in sorted(sums):  # by time, all inputs abreast
+            self._bin(*each)
+
+    def add_estimate(self, stamp_ns: int, speed_m_s: float) -> None:
+        """
+        Take an estimated speed.
+        """
+        self._bin(stamp_ns // SECOND_NS, _ESTIMATE, speed_m_s, 1)
+
+    def closed(self) -> list[TraceRow]:
+        """
+        Return the rows that no more reading is waited for, each once.
+        """
+        ready = sorted(second for second in self._open if second < self.newest_s)
+        rows = [self._open.pop(second).row(second) for second in ready]
+        for row in rows:
+            self._keep(row)
+        return rows
+
+    @property
+    def current(self) -> TraceRow | None:
+        """The newest second as far as it has been read, None before the first reading."""
+        found = self._open.get(self.newest_s)
+        if found is not None:
+            return found.row(self.newest_s)
+        return self._fine[-1] if self._fine else None
+
+    def newest(self, column: int) -> float | None:
+        """
+        Return the last that was read of a column of `COLUMNS`; None where that is long ago.
+        """
+        rows = [self.current, *islice(reversed(self._fine), LATE_S)]
+        return next((row[1 + column] for row in rows if row and row[1 + column] is not None), None)
+
+    def rows(self) -> list[TraceRow]:
+        """
+        Return all that is kept, oldest first.
+        """
+        return [*self._coarse, *self._thinning, *self._fine]
+
+    def _bin(
+        self, second: int, column: int, total: float, count: int, instrument: int = 0
+    ) -> None:
+        off_s = second - self.newest_s
+        if self.newest_s and not -LATE_S < off_s < JUMP_S:
+            self._strange += 1
+            if self._strange < _STRANGE:
+                return  # one clock that is off is not drawn; the health of its input says so
+            if off_s < 0:
+                self._start_over()
+            self.newest_s = second
+        self._strange = 0
+        self.newest_s = max(self.newest_s, second)
+        if not self._fine or second > self._fine[-1][0]:
+            self._open.setdefault(second, _Bin()).add(column, total, count, instrument)
+
+    def _start_over(self) -> None:
+        """The time of all went back: a clock was set, or a record is played again."""
+        for kept in (self._open, self._fine, self._coarse, self._thinning):
+            kept.clear()
+        self.restarted = True
+
+    def _keep(self, row: TraceRow) -> None:
+        self._fine.append(row)
+        while self._fine and self._fine[0][0] < row[0] - FINE_S:
+            self._thin(self._fine.popleft())
+        while self._coarse and self._coarse[0][0] < row[0] - LONGEST_S:
+            self._coarse.popleft()
+
+    def _thin(self, row: TraceRow) -> None:
+        if self._thinning and self._thinning[0][0] // COARSE_S != row[0] // COARSE_S:
+            merged = _Bin()
+            for each in self._thinning:
+                for column, value in enumerate(each[1:]):
+                    if value is not None:
+                        merged.add(column, value, 1)
+            self._coarse.append(merged.row(self._thinning[0][0]))
+            self._thinning = []
+        self._thinning.append(row)

@@ -12,6 +12,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,13 +20,14 @@ from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
 from shipdrag_ros.messages.topics import READY_S
-from shipdrag_ros.samples import SHAFTS, Block, Channel
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Block, Channel
 from shipdrag_ros.ship import Ship
 
 WIND_M_S = 5.4  # true wind, Beaufort 3: above it air drag is no small correction
 RUDDER_RAD = math.radians(5.0)  # a mean angle above it is steering, and slows the ship
 COURSE_RAD = 0.35  # the parameter `turn_rad` as it is set at first
 _RECENT_S = 60
+_CONTEXT = (Channel.RUDDER, Channel.HEADING, Channel.WIND_APPARENT, Channel.DEPTH, *SHAFTS)
 _GRAVITY_M_S2 = 9.81
 
 
@@ -39,8 +41,7 @@ class Held(StrEnum):
     SILENT = 'silent'
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """A line of the checklist."""
 
     name: str
@@ -55,14 +56,7 @@ class Recent:
 
     def __init__(self) -> None:
         self._seconds: dict[Channel, deque[tuple[int, float, float]]] = {
-            channel: deque()
-            for channel in (
-                Channel.RUDDER,
-                Channel.HEADING,
-                Channel.WIND_APPARENT,
-                Channel.DEPTH,
-                *SHAFTS,
-            )
+            channel: deque() for channel in _CONTEXT
         }
 
     def add(self, block: Block) -> None:
@@ -71,7 +65,7 @@ class Recent:
         """
         for channel, kept in self._seconds.items():
             for row in np.flatnonzero(block.channel == channel).tolist():
-                second = int(block.stamp_ns[row]) // 1_000_000_000
+                second = int(block.stamp_ns[row]) // SECOND_NS
                 first, other = block.value[row].tolist()
                 if not (math.isfinite(first) and math.isfinite(other)):
                     continue
@@ -217,15 +211,15 @@ ENDED_S = 600.0  # a run that has ended is the headline for so long
 SILENT_S = 5.0  # the node speaks every second
 
 _ENDED = {
-    EndedBy.SPEED: 'COASTDOWN COMPLETE',
-    EndedBy.TURN: 'TURNED: this run ends here',
-    EndedBy.ENGINE: 'ENGINE AHEAD: this run ends here',
-    EndedBy.BRAKE: 'BRAKED: this run ends here',
-    EndedBy.ASTERN: 'ASTERN: this run ends here',
-    EndedBy.DATA_STOP: 'SPEED LOST: this run ends here',
-    EndedBy.SILENCE: 'ALL INPUTS SILENT: this run ends here',
-    EndedBy.RESET: 'RESET: this run is lost',
-    EndedBy.RECORD_END: 'RECORD ENDS: this run ends here',
+    EndedBy.SPEED.value: 'COASTDOWN COMPLETE',
+    EndedBy.TURN.value: 'TURNED: this run ends here',
+    EndedBy.ENGINE.value: 'ENGINE AHEAD: this run ends here',
+    EndedBy.BRAKE.value: 'BRAKED: this run ends here',
+    EndedBy.ASTERN.value: 'ASTERN: this run ends here',
+    EndedBy.DATA_STOP.value: 'SPEED LOST: this run ends here',
+    EndedBy.SILENCE.value: 'ALL INPUTS SILENT: this run ends here',
+    EndedBy.RESET.value: 'RESET: this run is lost',
+    EndedBy.RECORD_END.value: 'RECORD ENDS: this run ends here',
 }
 
 
@@ -238,8 +232,7 @@ class Tone(StrEnum):
     BAD = 'bad'
 
 
-@dataclass(frozen=True)
-class Headline:
+class Headline(NamedTuple):
     """The state in large letters, and the next action."""
 
     tone: Tone
@@ -314,6 +307,11 @@ class Situation:
     steer_deg: float | None = None
     paired: bool = False
 
+    @property
+    def just_ended(self) -> Ended | None:
+        """The last coastdown where it is the headline still."""
+        return self.ended if self.ended is not None and self.ended.ago_s < ENDED_S else None
+
 
 def headline(now: Situation) -> Headline:
     """
@@ -355,8 +353,8 @@ def _sailing(now: Situation) -> Headline:
             'SLOWING: coastdown?',
             'If the engine is stopped: leave it, rudder amidships. The answer takes two minutes.',
         )
-    if now.ended is not None and now.ended.ago_s < ENDED_S:
-        return _ended(now, now.ended)
+    if now.just_ended is not None:
+        return _ended(now, now.just_ended)
     return _before(now)
 
 
@@ -394,10 +392,7 @@ def _coasting(now: Situation) -> Headline:
 
 
 def _ended(now: Situation, ended: Ended) -> Headline:
-    try:
-        text = _ENDED[EndedBy(ended.by)]
-    except (KeyError, ValueError):
-        text = f'RUN ENDED: {ended.by}'
+    text = _ENDED.get(ended.by, f'RUN ENDED: {ended.by}')
     if ended.band is None:
         why = ended.why_not or 'no estimate was possible'
         return Headline(Tone.BAD, 'RUN NOT USABLE', f'{_sentence(why)} {_then(now)}')

@@ -70,32 +70,20 @@ class Curve:
         return 2.0 * sigma / r if r > 0.0 else math.inf
 
 
-def read_speed(payload: bytes) -> Figure:
+def read_figure(topic: topics.OutputTopic, payload: bytes) -> Figure:
     """
-    Read `~/speed` [m/s].
+    Read `~/speed` [m/s] or `~/resistance` [m/s^2].
 
     Raises
     ------
     MalformedMessage
         If it is none.
     """
-    message = types.deserialize(topics.SPEED.type, payload)
-    variance = float(message.twist.covariance[0])
-    return _figure(message, float(message.twist.twist.linear.x), variance)
-
-
-def read_resistance(payload: bytes) -> Figure:
-    """
-    Read `~/resistance` [m/s^2].
-
-    Raises
-    ------
-    MalformedMessage
-        If it is none.
-    """
-    message = types.deserialize(topics.RESISTANCE.type, payload)
-    variance = float(message.accel.covariance[0])
-    return _figure(message, float(message.accel.accel.linear.x), variance)
+    message = types.deserialize(topic.type, payload)
+    held = message.twist if topic is topics.SPEED else message.accel
+    vector = held.twist if topic is topics.SPEED else held.accel
+    sigma = math.sqrt(max(float(held.covariance[0]), 0.0))
+    return Figure(types.stamp_ns(message), float(vector.linear.x), sigma)
 
 
 def read_curve(payload: bytes) -> Curve | None:
@@ -216,12 +204,8 @@ def _points(
     return types.stamp_ns(message), points[np.isfinite(points).all(axis=1)]
 
 
-def _figure(message: object, value: float, variance: float) -> Figure:
-    return Figure(types.stamp_ns(message), value, math.sqrt(max(variance, 0.0)))
-
-
 _OPPOSITE_DEG = 30.0  # by which a reciprocal heading may be off
-_ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair
+ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair
 
 
 @dataclass(frozen=True)
@@ -286,7 +270,7 @@ class PastRun:
         if self.curve is None or other.curve is None:
             return False
         apart = math.remainder(self.compass_deg - other.compass_deg - 180.0, 360.0)
-        near = abs(self.start_ns - other.start_ns) * 1e-9 <= _ONE_DAY_S
+        near = abs(self.start_ns - other.start_ns) * 1e-9 <= ONE_DAY_S
         return abs(apart) <= _OPPOSITE_DEG and near
 
 

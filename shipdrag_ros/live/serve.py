@@ -8,7 +8,7 @@ import json
 import resource
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from time import monotonic
 from types import FrameType
 from typing import Any
@@ -192,18 +192,14 @@ class Connection(H11Protocol):
         self._expect_request()
         if len(self.connections) <= CONNECTIONS:
             return
-        waiting = [each for each in self._others() if each.owes_request]
+        others = [each for each in self.connections if isinstance(each, Connection)]
+        waiting = [each for each in others if each is not self and each.owes_request]
         min(waiting, key=lambda each: each.since_s, default=self).leave()
 
     @property
     def owes_request(self) -> bool:
         """Whether no whole request has come since the last answer."""
         return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
-
-    def _others(self) -> Iterator[Connection]:
-        for each in self.connections:
-            if isinstance(each, Connection) and each is not self:
-                yield each
 
     def leave(self) -> None:
         """Say that there are too many, and give its place away at once."""
@@ -230,8 +226,7 @@ class Connection(H11Protocol):
     def pause_writing(self) -> None:
         """Wait for a reader who is behind, but not for ever."""
         super().pause_writing()
-        self._stop_timer()
-        self._timer = self.loop.call_later(STUCK_S, self.transport.abort)
+        self._set_timer(STUCK_S, self.transport.abort)
 
     def resume_writing(self) -> None:
         """Go on: he reads again."""
@@ -239,8 +234,11 @@ class Connection(H11Protocol):
         super().resume_writing()
 
     def _expect_request(self) -> None:
+        self._set_timer(ASK_S, self._close_if_late)
+
+    def _set_timer(self, seconds: float, act: Callable[[], object]) -> None:
         self._stop_timer()
-        self._timer = self.loop.call_later(ASK_S, self._close_if_late)
+        self._timer = self.loop.call_later(seconds, act)
 
     def _close_if_late(self) -> None:
         if self.owes_request:

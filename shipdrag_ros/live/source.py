@@ -7,7 +7,7 @@ import bisect
 import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import chain, groupby, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
 from shipdrag_ros.errors import ShipdragError, reason_of
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.outputs import PastRun
@@ -37,10 +36,6 @@ class Moment(NamedTuple):
 
     receive_ns: int
     heard: tuple[Heard, ...]
-
-
-def _unheard(coastdown: EndedCoastdown, window: Window) -> None:
-    """Inform nobody."""
 
 
 class Timeline:
@@ -69,7 +64,12 @@ class Timeline:
     """
 
     def __init__(
-        self, run: Run, ship: Ship, parameters: Parameters, *, ended: OnCoastdown = _unheard
+        self,
+        run: Run,
+        ship: Ship,
+        parameters: Parameters,
+        *,
+        ended: OnCoastdown = lambda coastdown, window: None,
     ) -> None:
         self.start_ns, last_ns = run.span_ns or (0, 0)
         self.end_ns = last_ns + 1  # after the last message: what ends with the record
@@ -79,7 +79,6 @@ class Timeline:
         self._ship, self._parameters = ship, parameters
         self._ended = ended
         self._moments: list[Moment] = []
-        self._times: list[int] = []
         self._last_ns: dict[str, int] = {}  # arrival, by input
         self._stop = threading.Event()
 
@@ -88,14 +87,17 @@ class Timeline:
         """How far it has been read."""
         if self.done:
             return self.end_ns
-        return self._times[-1] if self._times else self.start_ns
+        return self._moments[-1].receive_ns if self._moments else self.start_ns
 
     def between(self, after_ns: int, until_ns: int) -> list[Moment]:
         """
         Return the moments that are read, after one time and until another.
         """
-        first = bisect.bisect_right(self._times, after_ns)
-        return self._moments[first : bisect.bisect_right(self._times, until_ns)]
+        first, last = (
+            bisect.bisect_right(self._moments, at_ns, key=lambda each: each.receive_ns)
+            for at_ns in (after_ns, until_ns)
+        )
+        return self._moments[first:last]
 
     def stop(self) -> None:
         """
@@ -103,9 +105,18 @@ class Timeline:
         """
         self._stop.set()
 
+    def read_or_say(self) -> None:
+        """
+        Read the bag, in a thread of its own, which would leave a page waiting if it ended unseen.
+        """
+        try:
+            self.read()
+        except Exception as error:
+            self.problem = reason_of(error)
+
     def read(self) -> None:
         """
-        Read the bag; for a thread of its own.
+        Read the bag.
         """
         monitor = Monitor(self._ship, self._parameters)
         inputs = InputStates()
@@ -142,15 +153,16 @@ class Timeline:
                 yield item[i:j]
 
     def _add(self, at_ns: int, heard: list[Heard]) -> None:
-        at_ns = max(at_ns, self._times[-1] if self._times else at_ns)
-        self._moments.append(Moment(at_ns, tuple(heard)))
-        self._times.append(at_ns)  # last: whoever looks finds the moment there
+        last_ns = self._moments[-1].receive_ns if self._moments else at_ns
+        self._moments.append(Moment(max(at_ns, last_ns), tuple(heard)))
 
     def _heard(self, monitor: Monitor, events: list[Event]) -> list[Heard]:
         heard: list[Heard] = []
         for event in events:
-            for message in outputs(event):
-                heard.append(NodeMessage(message.topic.rpartition('/')[2], message.payload))
+            heard += [
+                NodeMessage(message.topic.rpartition('/')[2], message.payload)
+                for message in outputs(event)
+            ]
             if isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, monitor.ended_window(event))
         return heard
@@ -173,13 +185,11 @@ class Timeline:
         states = inputs.tick(facts, simulated=True, now_s=now_ns * 1e-9)
         standing = Standing(
             'active',
-            monitor.state,
+            monitor,
             now_ns,
             sim_time=False,
             hint='the record is silent here',
-            steady_lead_s=monitor.steady_lead_s,
             steady_needed_s=self._parameters.slope_window_s,
-            progress=monitor.progress,
         )
         return Health((state_status(standing, states), *(each.status for each in states)))
 
@@ -235,8 +245,7 @@ class NodeSource(PictureFeed):
                 self.bridge.add_past(heard)
             else:
                 self.bridge.hear(heard, now_s)
-        restarted, self.bridge.trace.restarted = self.bridge.trace.restarted, False
-        return restarted
+        return False
 
 
 class BagSource(PictureFeed):
@@ -276,7 +285,6 @@ class BagSource(PictureFeed):
         self._looked_s: float | None = None
         self._jumped = False
         self._past = list(past)
-        self._diagnosing: Diagnosing | None = None
         self._open(0)
 
     def advance(self, now_s: float) -> bool:
@@ -342,8 +350,7 @@ class BagSource(PictureFeed):
     def close(self) -> None:
         """Read no further, diagnose nothing more."""
         self._timeline.stop()
-        if self._diagnosing is not None:
-            self._diagnosing.close()
+        self._diagnosing.close()
 
     def _open(self, number: int) -> None:
         if self._number >= 0:
@@ -352,21 +359,9 @@ class BagSource(PictureFeed):
         self._number = number
         run, ship, parameters = self._runs[number]
         self._diagnosing = Diagnosing(ship, parameters, enabled=True)
-        self._timeline = Timeline(run, ship, parameters, ended=self._begin)
-        self._reader = threading.Thread(target=self._read, name='reading', daemon=True)
-        self._reader.start()
+        self._timeline = Timeline(run, ship, parameters, ended=self._diagnosing.begin)
+        threading.Thread(target=self._timeline.read_or_say, name='reading', daemon=True).start()
         self._rewind()
-
-    def _read(self) -> None:
-        line = self._timeline
-        try:
-            line.read()
-        except Exception as error:  # a thread that ends unseen would leave the page waiting
-            line.problem = reason_of(error)
-
-    def _begin(self, coastdown: EndedCoastdown, window: Window) -> None:
-        assert self._diagnosing is not None
-        self._diagnosing.begin(coastdown, window)
 
     def _rewind(self) -> None:
         run, ship, _ = self._runs[self._number]
@@ -383,9 +378,7 @@ class BagSource(PictureFeed):
         to_ns = min(max(to_ns, line.start_ns), line.read_ns)
         if to_ns < self._at_ns:
             self._rewind()
-            self._hear(line.start_ns - 1, to_ns, self._looked_s or 0.0)
-        else:
-            self._hear(self._at_ns, to_ns, self._looked_s or 0.0)
+        self._hear(self._at_ns, to_ns, self._looked_s or 0.0)
         self._at_ns = to_ns
         self._jumped = True
 
@@ -393,23 +386,17 @@ class BagSource(PictureFeed):
         """Hear what lies between; readings without anything said between them at once."""
         if after_ns == self._timeline.start_ns:
             after_ns -= 1  # the first moment too
-        waiting = []
-        for moment in self._timeline.between(after_ns, until_ns):
-            for heard in moment.heard:
-                if isinstance(heard, Samples):
-                    waiting.append(heard.block)
-                    continue
-                if waiting:
-                    self.bridge.hear(Samples(concatenate(waiting)), now_s)
-                    waiting = []
+        between = self._timeline.between(after_ns, until_ns)
+        said = chain.from_iterable(moment.heard for moment in between)
+        for _, each in groupby(said, key=lambda heard: isinstance(heard, Samples)):
+            together = list(each)
+            blocks = [heard.block for heard in together if isinstance(heard, Samples)]
+            for heard in [Samples(concatenate(blocks))] if blocks else together:
                 self.bridge.hear(heard, now_s)
-        if waiting:
-            self.bridge.hear(Samples(concatenate(waiting)), now_s)
         self.bridge.keep_alive(now_s)
 
     def _show_verdict(self) -> None:
         """Say what the diagnosis says of a coastdown that has ended by now."""
-        assert self._diagnosing is not None
         status = self._diagnosing.status
         of, found = status.coastdown, status.found
         if of is not None and of.end_ns > self._at_ns:  # read ahead, and not played yet

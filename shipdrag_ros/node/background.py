@@ -190,7 +190,6 @@ class Diagnosing:
         self._queue = ThreadPoolExecutor(max_workers=1, thread_name_prefix='diagnosis')
         self._lock = Lock()
         self._process: subprocess.Popen[bytes] | None = None
-        self._closed = False
         self._look_again_s = 0.0
         self.ahead = ''
         self.status = DiagnosisStatus(DiagnosisState.NONE_YET)
@@ -204,7 +203,7 @@ class Diagnosing:
         """
         Diagnose a coastdown after those that wait; returns at once. None any more once closed.
         """
-        if not self._possible or self._closed:
+        if not self._possible:
             return
         if coastdown.estimate is None:
             reason = f'the coastdown gave no estimate: {coastdown.failure}'
@@ -218,7 +217,7 @@ class Diagnosing:
         """
         Find out what a coastdown would show, now and then in steady sailing; returns at once.
         """
-        if not self._possible or self._closed or monotonic() < self._look_again_s:
+        if not self._possible or monotonic() < self._look_again_s:
             return
         if monitor.progress.steady_s < min(READY_S, self._parameters.steady_s):
             return
@@ -229,10 +228,7 @@ class Diagnosing:
 
     def _look(self, task: _Task) -> None:
         """Wait for a process, in a thread."""
-        try:
-            answer = self._answer(task)
-        except Exception as error:  # as in `_diagnose`
-            answer = {'reason': str(error) or type(error).__name__}
+        answer = self._answer(task)
         self.ahead = answer.get('ahead') or f'What a coastdown would show: {answer["reason"]}'
 
     def close(self) -> None:
@@ -240,7 +236,7 @@ class Diagnosing:
         End what runs and drop what waits.
         """
         with self._lock:
-            self._closed = True
+            self._possible = False
             if self._process is not None:
                 self._process.kill()
         self._queue.shutdown(cancel_futures=True)
@@ -248,10 +244,7 @@ class Diagnosing:
     def _diagnose(self, task: _Task, running: DiagnosisStatus) -> None:
         """Wait for a process, in a thread."""
         assert running.coastdown is not None
-        try:
-            answer = self._answer(task)
-        except Exception as error:  # nobody asks this thread: it would seem to run for ever
-            answer = {'state': 'failed', 'reason': str(error) or type(error).__name__}
+        answer = self._answer(task)
         if 'reason' in answer:
             state = DiagnosisState(answer['state'])
             self.status = replace(running, state=state, reason=answer['reason'])
@@ -261,9 +254,15 @@ class Diagnosing:
         self.status = replace(running, state=DiagnosisState.DONE, found=found)
 
     def _answer(self, task: _Task) -> dict[str, Any]:
-        """Return what a process says."""
+        """Return what a process says, or why it says nothing."""
+        try:
+            return self._asked(task)
+        except Exception as error:  # nobody asks this thread: it would seem to run for ever
+            return {'state': 'failed', 'reason': str(error) or type(error).__name__}
+
+    def _asked(self, task: _Task) -> dict[str, Any]:
         with self._lock:
-            if self._closed:
+            if not self._possible:
                 raise subprocess.SubprocessError('the node has ended')
             self._process = subprocess.Popen(
                 [sys.executable, '-c', f'from {__name__} import main; main()'],

@@ -15,8 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import State
-from shipdrag_ros.coastdown.health import MonitorProgress
 from shipdrag_ros.display import printable
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import conditions
@@ -78,12 +78,10 @@ class Counts:
         """
         Return what was added since an earlier moment.
         """
-        rejected = Counter(self.rejected)
-        rejected.subtract(before.rejected)
         return Counts(
             self.messages - before.messages,
             self.used - before.used,
-            {reason: times for reason, times in rejected.items() if times > 0},
+            Counter(self.rejected) - Counter(before.rejected),  # without what is not above 0
             self.lost - before.lost,
             self.unstamped - before.unstamped,
         )
@@ -283,17 +281,13 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
     readings = recent.readings
     if not facts.active or not readings:
         return
-    share = recent.used / readings
+    share, motion = recent.used / readings, facts.name in ALL_MOTION
     if share >= USED_MIN:
-        if (
-            facts.name in ALL_MOTION
-            and facts.seconds > 0.5 * RECENT_S
-            and recent.used < RATE_MIN_HZ * facts.seconds
-        ):
+        enough = recent.used >= RATE_MIN_HZ * facts.seconds
+        if motion and facts.seconds > 0.5 * RECENT_S and not enough:
             rate = math.floor(100.0 * recent.used / facts.seconds) / 100.0  # never rounded to 0.2
             yield Finding(WARN, f'{rate:g} Hz is too slow, at least 0.2 Hz is needed')
         return
-    motion = facts.name in ALL_MOTION
     grave = share < MOTION_USED_MIN if motion else not recent.used
     reasons = sorted(recent.rejected.items(), key=lambda item: -item[1])
     why = ', '.join(f'{times} {reason.replace("_", " ")}' for reason, times in reasons)
@@ -385,19 +379,10 @@ def behind_others(
     known = {
         name: offset
         for name, offset in offsets_s.items()
-        if name in ALL_MOTION and offset is not None and math.isfinite(offset)
+        if name in ALL_MOTION and offset is not None and (simulated or offset >= -AHEAD_S)
     }
-    if len(known) < 2:
-        return {}
-    measures = [name for name in known if simulated or known[name] >= -AHEAD_S]
-    if not measures:
-        return {}
-    first = min(measures, key=lambda name: known[name])
-    return {
-        name: (first, known[name] - known[first])
-        for name in known
-        if name != first and known[name] >= known[first]
-    }
+    first = min(known, key=known.__getitem__, default='')
+    return {name: (first, known[name] - known[first]) for name in known if name != first}
 
 
 _SHOWN = 6  # candidates of an input
@@ -456,17 +441,15 @@ class Standing:
     lifecycle
         State of the managed node.
     monitor
-        State of the monitor, None while not active.
+        None while not active.
     clock_ns
         The node's clock; 0 under sim time before the first /clock.
     hint
         What to look at where nothing is received.
     candidates
         Which topics may be meant then; '' without any.
-    steady_lead_s, steady_needed_s
-        The longest that the ship was seen to be steady, and what an onset needs.
-    progress
-        How far the monitor is by now, None while not active.
+    steady_needed_s
+        The longest that the ship is to be seen to be steady before an onset.
     compiling_s
         Since when code is being compiled; None where it is.
     waiting
@@ -476,14 +459,12 @@ class Standing:
     """
 
     lifecycle: str
-    monitor: State | None
+    monitor: Monitor | None
     clock_ns: int
     sim_time: bool
     hint: str = 'is the driver running, in this ROS domain and discovery range?'
     candidates: str = ''
-    steady_lead_s: float = 0.0
     steady_needed_s: float = 0.0
-    progress: MonitorProgress | None = None
     compiling_s: float | None = None
     waiting: int = 0
     namesakes: int = 0
@@ -500,12 +481,13 @@ def state_status(standing: Standing, inputs: Sequence[InputFacts]) -> Status:
             f'; {standing.namesakes + 1} nodes have the name of this one, so that their figures '
             'and services are mixed up: end one, or name it with -r __node:=NAME'
         )
+    monitor = standing.monitor
     values: dict[str, object] = {
         'lifecycle': standing.lifecycle,
-        'monitor': 'none' if standing.monitor is None else standing.monitor.value,
+        'monitor': 'none' if monitor is None else monitor.state.value,
         'clock': 'simulated' if standing.sim_time else 'system',
-        **({} if standing.progress is None else standing.progress.values),
-        'longest steady sailing [s]': standing.steady_lead_s,
+        **({} if monitor is None else monitor.progress.values),
+        'longest steady sailing [s]': 0.0 if monitor is None else monitor.steady_lead_s,
     }
     if standing.compiling_s is not None:
         values |= {'compiling [s]': standing.compiling_s, 'messages that wait': standing.waiting}
@@ -535,11 +517,12 @@ def _state(standing: Standing, inputs: Sequence[InputFacts]) -> tuple[int, str]:
     said = '; '.join(f'{each.name}: {each.finding.text}' for each in unwell)
     if fresh and all(each.finding.level == ERROR for each in fresh):
         return ERROR, f'no input can be used: {said}'
-    text = standing.monitor.value
-    if standing.monitor is State.WAITING:
-        lead = f'{standing.steady_lead_s:.0f} of {standing.steady_needed_s:.0f} s'
+    state = standing.monitor.state
+    text = state.value
+    if state is State.WAITING:
+        lead = f'{standing.monitor.steady_lead_s:.0f} of {standing.steady_needed_s:.0f} s'
         text = f'waiting: not enough steady sailing yet to know a coastdown by, {lead}'
-    elif standing.monitor is State.COASTDOWN and not any(
+    elif state is State.COASTDOWN and not any(
         each.fresh for each in inputs if each.name == 'shaft'
     ):
         text += '; no shaft is received: is the engine stopped, and not astern?'
@@ -633,9 +616,9 @@ def diagnosis_status(status: DiagnosisStatus, ahead: str = '') -> Status:
 
 def candidates(
     published: Iterable[tuple[str, Sequence[str]]], inputs: Iterable[str], *, taken: Sequence[str]
-) -> dict[str, list[str]]:
+) -> str:
     """
-    Return the topics whose type an input accepts, by input, the likeliest first.
+    Say which topics may be meant, the likeliest first, and how to name one; '' without any.
 
     Parameters
     ----------
@@ -646,26 +629,19 @@ def candidates(
     taken
         Topics that are inputs already.
     """
-    found: dict[str, list[str]] = {}
     there = [(topic, types) for topic, types in published if topic not in taken]
+    listed, first = [], ''
     for name in inputs:
         fits = [topic for topic, types in there if set(types) & set(TOPICS[name])]
         if fits:
-            found[name] = sorted(fits, key=partial(_unlike, name))[:_SHOWN]
-    return found
+            fits = [printable(topic) for topic in sorted(fits, key=partial(_unlike, name))]
+            listed.append(f'{name}: {", ".join(fits[:_SHOWN])}')
+            first = first or f'{name}:={fits[0]}'
+    if not listed:
+        return ''
+    return f'of a type that fits are {"; ".join(listed)}; name one with -r {first}'
 
 
 def _unlike(name: str, topic: str) -> int:
     """Rank a topic: one that shares words with the input is more likely to be it."""
     return -len(set(name.split('_')) & set(topic.lower().replace('/', '_').split('_')))
-
-
-def candidates_text(found: Mapping[str, Sequence[str]]) -> str:
-    """
-    Say which topics may be meant, and how to name one; '' without any.
-    """
-    if not found:
-        return ''
-    listed = '; '.join(f'{name}: {printable(", ".join(topics))}' for name, topics in found.items())
-    name, topics = next(iter(found.items()))
-    return f'of a type that fits are {listed}; name one with -r {name}:={printable(topics[0])}'

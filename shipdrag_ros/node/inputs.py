@@ -26,7 +26,6 @@ from rclpy.event_handler import (
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
-    HistoryPolicy,
     QoSProfile,
     ReliabilityPolicy,
     qos_policy_name_from_kind,
@@ -39,9 +38,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.health import Counts, InputFacts
-from shipdrag_ros.samples import FURTHER
-
-Publishers = Callable[[], frozenset[str]]
+from shipdrag_ros.samples import FURTHER, SECOND_NS
 
 
 class Sequences:
@@ -70,7 +67,7 @@ class Sequences:
     What was sent before the first message heard is not lost: nobody listened.
     """
 
-    def __init__(self, publishers: Publishers) -> None:
+    def __init__(self, publishers: Callable[[], frozenset[str]]) -> None:
         self.lost = 0
         self.numbered = False
         self._publishers = publishers
@@ -84,16 +81,11 @@ class Sequences:
         if number is None:
             return
         self.numbered = True
-        if not self._known:
-            self.look()
-        before = max((last for last in self._last if last < number), default=None)
-        if before is not None and number != before + 1:
+        if number - 1 not in self._last:
             self.look()  # a hole, or a publisher that nobody knew
-            if len(self._last) < len(self._known):
-                before = None
-            else:
-                before = max((last for last in self._last if last < number), default=None)
-        if before is not None:
+        new = number - 1 not in self._last and len(self._last) < len(self._known)
+        before = max((last for last in self._last if last < number), default=None)
+        if before is not None and not new:
             self.lost += number - before - 1
             self._last.remove(before)
         self._last.append(number)
@@ -124,23 +116,25 @@ class Mailbox:
     ----------
     topics
         Where they wait.
-    ahead
-        Whether to take what the executor has not come to. Not under simulated time: /clock
-        waits among its messages, and what overtakes it seems to come from the future.
     """
 
-    def __init__(self, topics: Sequence[InputTopic], *, ahead: bool) -> None:
+    def __init__(self, topics: Sequence[InputTopic]) -> None:
         self._topics = topics
-        self._ahead = ahead
         self._waiting: list[HeardMessage] = []
 
-    def take(self) -> list[HeardMessage]:
+    def take(self, *, ahead: bool) -> list[HeardMessage]:
         """
         Return what has come so far, or the older part of it where that is much.
+
+        Parameters
+        ----------
+        ahead
+            Whether to take what the executor has not come to. Not under simulated time: /clock
+            waits among its messages, and what overtakes it seems to come from the future.
         """
         until_ns = sys.maxsize
         for topic in self._topics:
-            taken = topic.take(MOST, ahead=self._ahead)
+            taken = topic.take(MOST, ahead=ahead)
             self._waiting += taken
             if len(taken) == MOST:  # there may be more, that the others must wait for
                 until_ns = min(until_ns, taken[-1].received_ns)
@@ -156,18 +150,11 @@ DEPTH = 5000
 LONGEST_BYTES = 65536  # no instrument sends a message as long; thousands may have to wait
 TRIES = 5
 SHARE_HZ = 1000  # of one input, as of one source of NMEA; a flood takes no time from the others
-_SECOND_NS = 1_000_000_000
 _OFFSETS = 32  # readings whose clock offset is kept
 # who joins late still gets the last message
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATIENCE_S = 10.0  # a type that is subscribed has so long to show that it is sound
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
-
-Arrived = Callable[[], object]
 
 
 def message_class(type_name: str) -> Any:
@@ -259,7 +246,7 @@ class InputTopic:
         *,
         accepted: tuple[str, ...],
         fixed: str,
-        arrived: Arrived,
+        arrived: Callable[[], object],
         simulated: bool,
     ) -> None:
         self._node = node
@@ -502,25 +489,17 @@ class InputTopic:
 
     def _subscribe(self, type_name: str, *, reliable: bool) -> None:
         again = self._subscription is not None
-        waiting: list[HeardMessage] = []
-        if again:
-            waiting = self.take(DEPTH)  # would go with the subscription
-            self.close()
-            self._taken = waiting + self._taken
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=DEPTH,
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.VOLATILE,
-        )
+        self._taken = self.take(DEPTH) + self._taken  # they would go with the subscription
+        self.close()
+        offered = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=DEPTH, reliability=offered)
         try:
             self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
         except UnsupportedEventTypeError:  # not every middleware says so
             self._subscription = self._create(type_name, qos)
-        changed = again and self.type != type_name
-        self.type, self.reliable = type_name, reliable
-        if changed or not again:
+        if self.type != type_name:
             self._since_s, self._last_s = time.monotonic(), None
+        self.type, self.reliable = type_name, reliable
         self.incompatible_qos = None
         how = 'reliably' if reliable else 'as best effort, as it is sent'
         what = 'now ' if again else ''
@@ -564,7 +543,7 @@ class InputTopic:
         """Count a message in its second of arrival, and say whether that holds too many."""
         if self._share is None or not received_ns:
             return False
-        second = received_ns // _SECOND_NS
+        second = received_ns // SECOND_NS
         if second != self._share[0]:
             self._share = [second, 0]
         self._share[1] += 1

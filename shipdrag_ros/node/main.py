@@ -18,8 +18,9 @@ import socket
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -31,24 +32,20 @@ from shipdrag_ros.messages.topics import OK, Health
 _CLEAR = '\x1b[K'
 
 
-def terminal_line(stream: TextIO) -> Callable[[Health], None] | None:
+def show(health: Health, stream: TextIO) -> None:
     """
-    Return what shows the health on a terminal; None where there is none.
+    Tell the service manager each second that the executor goes round, and a terminal the health.
 
     Parameters
     ----------
     stream
         Of the log; the line is left of the cursor, so that a log line writes over it.
     """
-    if not stream.isatty():
-        return None
-
-    def show(health: Health) -> None:
+    notify(f'WATCHDOG=1\nSTATUS={health.of("state").message}')
+    if stream.isatty():
         width = shutil.get_terminal_size().columns
         stream.write(f'{line(health)[: width - 1]}{_CLEAR}\r')
         stream.flush()
-
-    return show
 
 
 def line(health: Health) -> str:
@@ -174,11 +171,11 @@ def _run(line: list[str]) -> int:
             print(f'{USAGE}\nunknown: {" ".join(stray)}', file=sys.stderr)
             return 2
         executor = SingleThreadedExecutor(context=context)
-        with _ended_by_signal(executor) as stop:
+        with _ended_by_signal() as stop:
             node = CoastdownNode(context=context, arguments=line)
             try:
                 executor.add_node(node)
-                node.shown = _shown(terminal_line(sys.stderr))
+                node.shown = partial(show, stream=sys.stderr)
                 node.start()
                 notify('READY=1')
                 while not stop.is_set():
@@ -193,47 +190,21 @@ def _run(line: list[str]) -> int:
     return 0
 
 
-def _shown(terminal: Callable[[Health], None] | None) -> Callable[[Health], None]:
-    """Return what takes the health each second: it shows that the executor goes round."""
-
-    def show(health: Health) -> None:
-        notify(f'WATCHDOG=1\nSTATUS={health.of("state").message}')
-        if terminal is not None:
-            terminal(health)
-
-    return show
-
-
 @contextmanager
-def _ended_by_signal(executor: SingleThreadedExecutor) -> Iterator[threading.Event]:
+def _ended_by_signal() -> Iterator[threading.Event]:
     """
     Give an event that SIGINT and SIGTERM set.
 
-    A Python handler has to wait until the executor returns from C; the byte that
-    a signal writes at once into a pipe does not.
+    A Python handler has to wait until the executor returns from C, which the timers of the node
+    let it do every `LOOK_S`.
     """
     stop = threading.Event()
-    read_end, write_end = os.pipe()
-    os.set_blocking(write_end, False)
-
-    def wait() -> None:
-        if os.read(read_end, 1):  # nothing where the pipe was closed
-            stop.set()
-            executor.wake()
-
-    thread = threading.Thread(target=wait, name='signals')
-    thread.start()
-    fd_before = signal.set_wakeup_fd(write_end)
-    before = {number: signal.signal(number, lambda *_: None) for number in STOPPING}
+    before = {number: signal.signal(number, lambda *_: stop.set()) for number in STOPPING}
     try:
         yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        signal.set_wakeup_fd(fd_before)
-        os.close(write_end)
-        thread.join()
-        os.close(read_end)
 
 
 if __name__ == '__main__':

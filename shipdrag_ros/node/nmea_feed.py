@@ -116,12 +116,9 @@ class NmeaFeed:
         self._topics: dict[str, InputTopic] = {}
         transducer_m = settings.nmea_transducer_m
         self._transducer_m = transducer_m if transducer_m >= 0.0 else None
-        self._interpreter = Interpreter(self._transducer_m)
-        self._rivals: defaultdict[str, Rivals] = defaultdict(Rivals)
-        self._topic_refused: Counter[str] = Counter()
-        self._nmea_refused: Counter[str] = Counter()
+        self.renew()
         self._unused = 0
-        self._problems: dict[str, str] = {}
+        self._problems: dict[Address, str] = {}
         self._published: dict[Source, Publisher] = {}
         self._live = LiveNmea(
             parse_addresses(settings.nmea),
@@ -155,9 +152,9 @@ class NmeaFeed:
         Choose anew who feeds what: the node was activated.
         """
         self._interpreter = Interpreter(self._transducer_m)
-        self._rivals.clear()
-        self._topic_refused.clear()
-        self._nmea_refused.clear()
+        self._rivals: defaultdict[str, Rivals] = defaultdict(Rivals)
+        self._topic_refused: Counter[str] = Counter()
+        self._nmea_refused: Counter[str] = Counter()
         for topic in self._topics.values():
             topic.fed_by, topic.fed = '', None
 
@@ -165,13 +162,13 @@ class NmeaFeed:
         """
         Say whether a message of a topic may be used.
         """
-        rivals = self._rivals[source.input]
-        if not self._live.counts() or (rivals.holder == '' and not _is_sound(source, payload)):
+        if not self._live.counts():
             return True
-        if rivals.holder == NMEA_FEEDS and not _is_sound(source, payload):
-            self._topic_refused[source.input] += 1
-            return False
-        if not self._decides(source.input, TOPIC_FEEDS, now_ns):
+        rivals = self._rivals[source.input]
+        sound = rivals.holder == TOPIC_FEEDS or _is_sound(source, payload)
+        if not (rivals.holder or sound):
+            return True
+        if not (sound and self._decides(source.input, TOPIC_FEEDS, now_ns)):
             self._topic_refused[source.input] += 1
             return False
         self._topics[source.input].fed_by, self._topics[source.input].fed = '', None
@@ -223,21 +220,18 @@ class NmeaFeed:
         """
         Say how each source is doing; a change of the line is logged too.
         """
-        counts = self._live.counts()
-        self._log_changes(counts)
-        return [self._status(str(address), of_one) for address, of_one in counts.items()]
-
-    def _log_changes(self, counts: Mapping[Address, SourceCounts]) -> None:
-        for address, count in counts.items():
-            before = self._problems.get(str(address), 'not opened yet')
-            if count.problem != before:
+        said = []
+        for address, counts in self._live.counts().items():
+            if counts.problem != self._problems.get(address, 'not opened yet'):
                 log = self._node.get_logger()
-                if count.problem:
+                if counts.problem:
                     self._interpreter.lose(str(address))
-                    log.warning(f'NMEA {address}: {count.problem}')
+                    log.warning(f'NMEA {address}: {counts.problem}')
                 else:
                     log.info(f'NMEA {address}: open')
-                self._problems[str(address)] = count.problem
+                self._problems[address] = counts.problem
+            said.append(self._status(str(address), counts))
+        return said
 
     def _wake(self) -> None:
         with suppress(rclpy_implementation.InvalidHandle):  # the node goes while a line comes

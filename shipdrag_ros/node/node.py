@@ -19,7 +19,7 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -27,41 +27,17 @@ from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError, ShipFileError
-from shipdrag_ros.messages import (
-    OUTPUT_TOPICS,
-    TOPICS,
-    EventKind,
-    OutputMessage,
-    OutputTopic,
-    Source,
-)
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, EventKind, OutputMessage, Source
 from shipdrag_ros.messages.topics import ERROR, Health, Status, diagnosis_message
+from shipdrag_ros.node import health
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.background import Compiling, Diagnosing, DiagnosisStatus
-from shipdrag_ros.node.health import (
-    InputFacts,
-    InputStates,
-    Standing,
-    candidates,
-    candidates_text,
-    diagnosis_status,
-    estimate_status,
-    recording_status,
-    state_status,
-)
 from shipdrag_ros.node.inputs import LATCHED, InputTopic, Mailbox, message_class
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.requests import (
-    NodeParameters,
-    add_services,
-    check_sections,
-    limit_services,
-    refuse_illegal,
-)
-from shipdrag_ros.node.session import Session
+from shipdrag_ros.node.requests import NodeParameters, add_services, limit_services
+from shipdrag_ros.node.session import Session, Watching
 from shipdrag_ros.node.settings import NodeSettings
-from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS
 from shipdrag_ros.ship import Ship
@@ -98,8 +74,7 @@ class CoastdownNode(LifecycleNode):
         super().__init__(
             NAME, context=context, automatically_declare_parameters_from_overrides=True
         )
-        check_sections(arguments, self)
-        self._node_parameters = NodeParameters(self)
+        self._node_parameters = NodeParameters(self, arguments)
         self._failure: ShipdragError | None = None
         self._settings: NodeSettings | None = None
         self._ship: Ship | None = None
@@ -111,20 +86,19 @@ class CoastdownNode(LifecycleNode):
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
         self._nmea: NmeaFeed | None = None
-        self._input_states = InputStates()
-        self._mailbox = Mailbox((), ahead=False)
+        self._input_states = health.InputStates()
+        self._mailbox = Mailbox(())
         self._watching = Watching((), Parameters(), simulated=False)
         self._outputs: dict[str, Publisher] = {}
         self.shown: Callable[[Health], None] = lambda health: None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
-        self._first = self.create_timer(FIRST_S, self._publish_first, clock=steady)
+        self._first = self.create_timer(FIRST_S, self._publish_diagnostics, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
         add_services(self, lambda: self._session)
-        change, warn = self._service_change_state, self.get_logger().warning
-        refuse_illegal(change, warn)
-        limit_services((*self.services, change), warn)  # rclpy does not list it among them
+        services = (*self.services, self._service_change_state)  # which rclpy does not list
+        limit_services(services, self.get_logger().warning)
 
     def declare_parameters(
         self, namespace: str, parameters: list[Any], ignore_override: bool = False
@@ -158,8 +132,7 @@ class CoastdownNode(LifecycleNode):
         """
         if self._diagnosing is not None:
             self._diagnosing.close()  # the coastdown that ends now will not be diagnosed
-        self._deactivate('the process ends')
-        self._end_what_runs_beside()
+        self._release('the process ends')
         self.destroy_node()
 
     # lifecycle
@@ -204,10 +177,10 @@ class CoastdownNode(LifecycleNode):
         self._settings = settings
         self.get_logger().info(f'recordings are written to {directory}')
         self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)
-        self._outputs = {
-            topic.under(self.get_fully_qualified_name()): self._publisher(topic)
-            for topic in OUTPUT_TOPICS
-        }
+        for topic in OUTPUT_TOPICS:
+            qos = LATCHED if topic.latched else QoSProfile(depth=10)
+            publisher = self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
+            self._outputs[topic.under(self.get_fully_qualified_name())] = publisher
         self._outputs['ship'] = self.create_publisher(String, '~/ship', LATCHED)
         self._outputs['ship'].publish(String(data=self._ship.to_yaml()))
         self._input_topics = [
@@ -221,8 +194,8 @@ class CoastdownNode(LifecycleNode):
             )
             for name, accepted in TOPICS.items()
         ]
-        self._input_states = InputStates()
-        self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
+        self._input_states = health.InputStates()
+        self._mailbox = Mailbox(self._input_topics)
         self._nmea = NmeaFeed(self, settings, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
@@ -265,7 +238,7 @@ class CoastdownNode(LifecycleNode):
         self._session.note(EventKind.LIFECYCLE, 'active', self._now_ns())
         recording = self._recorder.status()
         self.get_logger().info(f'active; {recording.text}; {recording.kept}')
-        self._announcer.status(recording_status(recording))
+        self._announcer.status(health.recording_status(recording))
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
@@ -275,22 +248,19 @@ class CoastdownNode(LifecycleNode):
             left = f'; {session.waiting} messages are for a replay' if session.waiting else ''
             self.get_logger().info(f'{why}; {session.recorder.status().text}{left}')
 
-    def _end_what_runs_beside(self) -> None:
+    def _release(self, why: str = 'released') -> None:
+        self._deactivate(why)
         if self._diagnosing is not None:
             self._diagnosing.close()
         if self._nmea is not None:
             self._nmea.close()
         self._diagnosing = self._nmea = None
-
-    def _release(self) -> None:
-        self._deactivate('released')
-        self._end_what_runs_beside()
         for topic in self._input_topics:
             topic.close()
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._input_topics, self._outputs = [], {}
-        self._mailbox = Mailbox((), ahead=False)
+        self._mailbox = Mailbox(())
         self._ship = self._settings = self._recorder = None
         self._node_parameters.fixed = False
 
@@ -305,14 +275,6 @@ class CoastdownNode(LifecycleNode):
 
     # traffic
 
-    def _publisher(self, topic: OutputTopic) -> Publisher:
-        qos = (
-            LATCHED
-            if topic.latched
-            else QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-        )
-        return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
-
     def _send(self, message: OutputMessage) -> None:
         if self.context.ok():  # after an outside shutdown the bag alone gets the last figures
             self._outputs[message.topic].publish(message.payload)
@@ -324,7 +286,7 @@ class CoastdownNode(LifecycleNode):
         """Take what has come on all topics, in its order; say whether that was anything."""
         if self._session is not None and self._session.full:
             return False  # each input keeps some more, and counts what it drops
-        taken = self._mailbox.take()
+        taken = self._mailbox.take(ahead=not self._simulated)
         for topic, type_name, data, received_ns in taken:
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
@@ -351,38 +313,44 @@ class CoastdownNode(LifecycleNode):
     # health
 
     def _publish_diagnostics(self) -> None:
+        self._first.cancel()
         for _ in range(TURNS):  # what came before this tick is timed before it
             if self._simulated or not self._hear():
                 break
         now_ns = self._now_ns()
         session = self._session
-        health = {} if session is None else session.monitor.health()
+        judged = {} if session is None else session.monitor.health()
         if session is not None:
-            self._watching.tick(session, health, now_ns)
-            session.note_removed(now_ns, self.get_logger().warning)
-        doubts = self._doubts()
+            self._watching.tick(session, judged, now_ns)
+            for part in session.recorder.removed():
+                self.get_logger().warning(part.text)
+                session.note(EventKind.FILES, part.text, now_ns)
+        # what is odd besides what became of readings, which nobody has judged while code compiles
+        doubts = {}
+        if session is not None and self._compiling_s is None:
+            doubts = session.monitor.doubts() | self._watching.doubts()
         facts = [
-            topic.facts(health.get(topic.name), doubts.get(topic.name, ''))
+            topic.facts(judged.get(topic.name), doubts.get(topic.name, ''))
             for topic in self._shown_topics
         ]
         states = self._input_states.tick(facts, simulated=self._simulated)
         self._rebind(states, now_ns)
         standing = self._standing(states, now_ns)
-        statuses = [state_status(standing, states), *(state.status for state in states)]
+        statuses = [health.state_status(standing, states), *(state.status for state in states)]
         if self._nmea is not None:
             statuses += self._nmea.statuses()
         if self._recorder is not None:
-            statuses.append(recording_status(self._recorder.status()))
+            statuses.append(health.recording_status(self._recorder.status()))
             self._announcer.status(statuses[-1])
         if session is not None:
-            statuses.append(estimate_status(session.latest, session.why_none))
+            statuses.append(health.estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
         if self._diagnosing is not None:
             found = self._diagnosing.status
             if session is not None and self._compiling is not None and self._compiling.done():
                 self._diagnosing.look_ahead(session.monitor)
-            statuses.append(diagnosis_status(found, self._diagnosing.ahead))
+            statuses.append(health.diagnosis_status(found, self._diagnosing.ahead))
             if found is not self._diagnosed:
                 self._diagnosed = found
                 self._publish_diagnosis(found, now_ns)
@@ -415,7 +383,7 @@ class CoastdownNode(LifecycleNode):
         else:
             self._session.note_diagnosis(message, now_ns)
 
-    def _rebind(self, states: Sequence[InputFacts], now_ns: int) -> None:
+    def _rebind(self, states: Sequence[health.InputFacts], now_ns: int) -> None:
         """Give up a type that is no use where another is published; said and recorded."""
         if self._session is None or self._compiling_s is not None:
             return  # nothing was judged yet
@@ -429,23 +397,9 @@ class CoastdownNode(LifecycleNode):
     def _shown_topics(self) -> list[InputTopic]:
         return [topic for topic in self._input_topics if topic.is_shown]
 
-    def _publish_first(self) -> None:
-        self.destroy_timer(self._first)
-        self._publish_diagnostics()
-
-    def _doubts(self) -> dict[str, str]:
-        """Say what is odd about inputs besides what became of their readings."""
-        if self._session is None or self._compiling_s is not None:
-            return {}
-        return self._session.monitor.doubts() | self._watching.doubts()
-
-    def _namesakes(self) -> int:
-        own = (self.get_name(), self.get_namespace())
-        return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
-
-    def _standing(self, states: Sequence[InputFacts], now_ns: int) -> Standing:
+    def _standing(self, states: Sequence[health.InputFacts], now_ns: int) -> health.Standing:
         session, settings = self._session, self._settings
-        hint = ''
+        hint, own = '', (self.get_name(), self.get_namespace())
         if not any(each.fresh for each in states if each.name in ALL_MOTION):
             name = self.get_fully_qualified_name()
             others = [
@@ -455,18 +409,16 @@ class CoastdownNode(LifecycleNode):
             ]
             taken = [topic.topic for topic in self._input_topics]
             by_nmea = '' if self._nmea is None else self._nmea.silence()
-            fitting = candidates_text(candidates(others, MOTION_INPUTS, taken=taken))
+            fitting = health.candidates(others, MOTION_INPUTS, taken=taken)
             hint = '; '.join(filter(None, [by_nmea, fitting]))
-        return Standing(
+        return health.Standing(
             self._state_machine.current_state[1],
-            None if session is None else session.monitor.state,
+            None if session is None else session.monitor,
             now_ns,
             self._simulated,
             candidates=hint,
-            progress=None if session is None else session.monitor.progress,
             compiling_s=self._compiling_s,
             waiting=0 if session is None else session.waiting,
-            namesakes=self._namesakes(),
-            steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
+            namesakes=max(self.get_node_names_and_namespaces().count(own) - 1, 0),
             steady_needed_s=0.0 if settings is None else settings.parameters.slope_window_s,
         )

@@ -60,7 +60,6 @@ class RawRing:
         self._segments: deque[_Segment] = deque()
         self._open: list[EncodedMessage] = []
         self._open_bytes = 0
-        self._packed_bytes = 0
         self.cut = False
 
     def add(self, message: EncodedMessage) -> None:
@@ -69,9 +68,18 @@ class RawRing:
         """
         self._open.append(message)
         self._open_bytes += len(message.payload)
-        if self._open_bytes >= SEGMENT_BYTES:
-            self._pack()
-            self._forget(message.log_ns)
+        if self._open_bytes < SEGMENT_BYTES:
+            return
+        plain = [tuple(each) for each in self._open]
+        packed = zlib.compress(pickle.dumps(plain, protocol=5), level=1)
+        self._segments.append(_Segment(message.log_ns, packed))
+        self._open.clear()
+        self._open_bytes = 0
+        excess = sum(len(segment.packed) for segment in self._segments) - LIMIT_BYTES
+        oldest_ns = message.log_ns - self._keep_ns
+        while self._segments and (excess > 0 or self._segments[0].newest_ns < oldest_ns):
+            self.cut = self.cut or excess > 0
+            excess -= len(self._segments.popleft().packed)
 
     def clear(self) -> None:
         """
@@ -79,29 +87,13 @@ class RawRing:
         """
         self._segments.clear()
         self._open.clear()
-        self._open_bytes = self._packed_bytes = 0
+        self._open_bytes = 0
         self.cut = False
 
     def __iter__(self) -> Iterator[EncodedMessage]:
         """Give the messages of this moment, whatever is added while they are read."""
         packed = map(_unpack, tuple(self._segments))  # one after the other, as they are read
         return chain(chain.from_iterable(packed), tuple(self._open))
-
-    def _pack(self) -> None:
-        plain = [tuple(message) for message in self._open]
-        packed = zlib.compress(pickle.dumps(plain, protocol=5), level=1)
-        self._segments.append(_Segment(self._open[-1].log_ns, packed))
-        self._packed_bytes += len(packed)
-        self._open.clear()
-        self._open_bytes = 0
-
-    def _forget(self, now_ns: int) -> None:
-        while self._segments:
-            too_many = self._packed_bytes > LIMIT_BYTES
-            if not too_many and now_ns - self._segments[0].newest_ns <= self._keep_ns:
-                return
-            self.cut = self.cut or too_many
-            self._packed_bytes -= len(self._segments.popleft().packed)
 
 
 def _unpack(segment: _Segment) -> Iterator[EncodedMessage]:
@@ -220,29 +212,25 @@ class RecordingStatus:
     @property
     def text(self) -> str:
         """One line for a log or for an operator."""
-        untidy = f'; old recordings cannot be removed: {self.untidy}' if self.untidy else ''
-        return f'{self._text}{untidy}'
-
-    @property
-    def _text(self) -> str:
-        if self.progress is None:
-            return 'not recording'
-        lost = f'{self.lost} message(s) lost'
-        if self.progress.vanished:
-            lost += f'; somebody removed {self.progress.vanished} file(s) that were being written'
-        if self.state is RecordingState.FAILED:
-            return (
-                f'recording failed, {lost}, {self.progress.waiting} kept in memory: '
-                f'{self.progress.error}; check output_directory'
-            )
-        if self.state is RecordingState.OFF:
+        progress = self.progress
+        lost = f', {self.lost} message(s) lost'
+        if progress is not None and progress.vanished:
+            lost += f'; somebody removed {progress.vanished} file(s) that were being written'
+        if progress is None:
             text = 'not recording'
-        elif self.slow:
-            text = f'the disk is slow, {self.progress.oldest_s:.0f} s are in memory only'
+        elif self.state is RecordingState.FAILED:
+            kept = f'{progress.waiting} kept in memory: {progress.error}; check output_directory'
+            text = f'recording failed{lost}, {kept}'
         else:
-            none_yet = f'{self.progress.directory}, where the first input makes a file'
-            text = f'recording to {self.progress.path or none_yet}'
-        return f'{text}, {lost}' if self.lost else text
+            none_yet = f'{progress.directory}, where the first input makes a file'
+            text = f'recording to {progress.path or none_yet}'
+            if self.state is RecordingState.OFF:
+                text = 'not recording'
+            elif self.slow:
+                text = f'the disk is slow, {progress.oldest_s:.0f} s are in memory only'
+            text += lost if self.lost else ''
+        untidy = f'; old recordings cannot be removed: {self.untidy}' if self.untidy else ''
+        return f'{text}{untidy}'
 
     @property
     def slow(self) -> bool:

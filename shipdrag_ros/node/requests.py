@@ -10,11 +10,13 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import pairwise
 from time import monotonic
 from types import SimpleNamespace
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -36,17 +38,6 @@ from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, about, sections
 
 LONGEST = 1000  # names or parameters of a request
-# whose requests begin with a sequence
-COUNTED = frozenset(
-    {
-        'DescribeParameters',
-        'GetParameters',
-        'GetParameterTypes',
-        'ListParameters',
-        'SetParameters',
-        'SetParametersAtomically',
-    }
-)
 _Convert = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
 _api = ctypes.pythonapi
 _api.PyCapsule_GetPointer.restype = ctypes.c_void_p
@@ -57,16 +48,6 @@ _api.PyCapsule_New.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p
 
 class TooLong:
     """Stands for a request that was not unpacked."""
-
-
-class _Sequence(ctypes.Structure):
-    """How C holds a sequence."""
-
-    _fields_ = (
-        ('data', ctypes.c_void_p),
-        ('size', ctypes.c_size_t),
-        ('capacity', ctypes.c_size_t),
-    )
 
 
 def unpack_no_giants(service: Service) -> None:
@@ -80,28 +61,26 @@ def unpack_no_giants(service: Service) -> None:
     Parameters
     ----------
     service
-        Of one of the kinds in `COUNTED`; others stay as they are.
+        One whose requests do not begin with a sequence stays as it is.
     """
     kind: Any = service.srv_type
     support: Any = type(kind.Request)
-    if kind.__name__ not in COUNTED or support._CONVERT_TO_PY is None:
+    first = next(iter(kind.Request.get_fields_and_field_types().values()), '')
+    if not first.startswith('sequence<') or support._CONVERT_TO_PY is None:
         return
     unpack = _Convert(_api.PyCapsule_GetPointer(support._CONVERT_TO_PY, None))
 
     def convert(message: int) -> Any:
-        few = _Sequence.from_address(message).size <= LONGEST
-        return unpack(message) if few else TooLong()
+        # C holds a sequence as its address, its size and its capacity
+        size = ctypes.c_size_t.from_address(message + ctypes.sizeof(ctypes.c_void_p)).value
+        return unpack(message) if size <= LONGEST else TooLong()
 
     called = _Convert(convert)
 
-    class Counted(type):
+    class Counted(support):
         """The type of a request, as rclpy looks for what to do with it."""
 
-        _CREATE_ROS_MESSAGE = support._CREATE_ROS_MESSAGE
-        _CONVERT_FROM_PY = support._CONVERT_FROM_PY
         _CONVERT_TO_PY = _api.PyCapsule_New(ctypes.cast(called, ctypes.c_void_p), None, None)
-        _TYPE_SUPPORT = support._TYPE_SUPPORT
-        _DESTROY_ROS_MESSAGE = support._DESTROY_ROS_MESSAGE
         keeps = called  # as long as it can be called
 
     request = Counted('Request', (), {})
@@ -120,8 +99,6 @@ _LIMITS = {
     'SetParametersAtomically': CHANGES,
 }
 INACTIVE = 'the node is not active'
-
-SessionAction = Callable[[Session], tuple[bool, str]]
 
 
 class RateLimit:
@@ -163,7 +140,7 @@ class RateLimit:
 
 def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
     """
-    Let each service refuse what comes too often or is too long.
+    Let each service refuse what comes too often, is too long, or is no transition.
 
     Parameters
     ----------
@@ -174,21 +151,14 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
     """
     for service in services:
         limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
+        if service.srv_type is ChangeState:
+            _refuse_illegal(service, warn)
         unpack_no_giants(service)
         service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
-def refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
-    """
-    Refuse transitions that are not there; rclpy would raise out of the executor.
-
-    Parameters
-    ----------
-    change_state
-        The service that is asked for transitions.
-    warn
-        Called with each refusal.
-    """
+def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
+    """Refuse transitions that are not there; rclpy would raise out of the executor."""
     change = change_state.callback
 
     def refuse_or_change(request: Any, response: Any) -> Any:
@@ -254,37 +224,27 @@ def add_services(node: Node, session: Callable[[], Session | None]) -> None:
         Returns that of the activation, None while there is none.
     """
 
-    def start_recording(active: Session) -> tuple[bool, str]:
-        active.recorder.start()
-        return _recording(active)
+    def answer(asked: str, request: Any, response: Any) -> Any:
+        active, now_ns = session(), int(node.get_clock().now().nanoseconds)
+        if active is None:
+            response.success, response.message = False, INACTIVE
+        elif asked == 'engine_stopped':
+            response.success, response.message = active.engine_stopped(now_ns)
+        elif asked == 'reset':
+            active.reset('asked for', now_ns)
+            response.success, response.message = True, 'all memory is dropped'
+        else:
+            if asked == 'start_recording':
+                active.recorder.start()
+            else:
+                active.recorder.stop()
+            status = active.recorder.status()
+            response.success = status.state is not RecordingState.FAILED
+            response.message = status.text
+        return response
 
-    def stop_recording(active: Session) -> tuple[bool, str]:
-        active.recorder.stop()
-        return _recording(active)
-
-    def engine_stopped(active: Session) -> tuple[bool, str]:
-        return active.engine_stopped(int(node.get_clock().now().nanoseconds))
-
-    def reset(active: Session) -> tuple[bool, str]:
-        active.reset('asked for', int(node.get_clock().now().nanoseconds))
-        return True, 'all memory is dropped'
-
-    def answered(action: SessionAction) -> Callable[[Any, Any], Any]:
-        def answer(request: Any, response: Any) -> Any:
-            active = session()
-            found = (False, INACTIVE) if active is None else action(active)
-            response.success, response.message = found
-            return response
-
-        return answer
-
-    for action in (start_recording, stop_recording, engine_stopped, reset):
-        node.create_service(Trigger, f'~/{action.__name__}', answered(action))
-
-
-def _recording(active: Session) -> tuple[bool, str]:
-    status = active.recorder.status()
-    return status.state is not RecordingState.FAILED, status.text
+    for name in ('start_recording', 'stop_recording', 'engine_stopped', 'reset'):
+        node.create_service(Trigger, f'~/{name}', partial(answer, name))
 
 
 ROS_OWN = ('use_sim_time', 'start_type_description_service')  # declared by rclpy itself
@@ -300,6 +260,8 @@ class NodeParameters:
     node
         Made with `automatically_declare_parameters_from_overrides`, so that unknown names and
         values without a type are seen.
+    arguments
+        Command line, to check its parameter files.
 
     Raises
     ------
@@ -307,7 +269,8 @@ class NodeParameters:
         Naming every unknown key and every bad value at once.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, arguments: Sequence[str]) -> None:
+        _check_sections(arguments, node)
         self._node = node
         self.fixed = False
         given = {name: each.value for name, each in node.get_parameters_by_prefix('').items()}
@@ -334,19 +297,16 @@ class NodeParameters:
     def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
         ours = {*KEYS, 'use_sim_time'}
         changed = {change.name: change.value for change in changes if change.name in ours}
-        if not changed:
-            return SetParametersResult(successful=True)
-        if self.fixed:
-            return SetParametersResult(
-                successful=False,
-                reason=f'{", ".join(changed)}: read-only while configured; clean up first',
-            )
-        changed.pop('use_sim_time', None)
-        try:
-            NodeSettings.from_mapping({**self._values(), **changed}, subject=SUBJECT)
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason='; '.join(error.problems))
-        return SetParametersResult(successful=True)
+        reason = ''
+        if changed and self.fixed:
+            reason = f'{", ".join(changed)}: read-only while configured; clean up first'
+        elif changed:
+            changed.pop('use_sim_time', None)
+            try:
+                NodeSettings.from_mapping({**self._values(), **changed}, subject=SUBJECT)
+            except ParameterError as error:
+                reason = '; '.join(error.problems)
+        return SetParametersResult(successful=not reason, reason=reason)
 
 
 def _descriptor(name: str) -> ParameterDescriptor:
@@ -374,7 +334,7 @@ def _descriptor(name: str) -> ParameterDescriptor:
     return descriptor
 
 
-def check_sections(arguments: Sequence[str], node: Node) -> None:
+def _check_sections(arguments: Sequence[str], node: Node) -> None:
     """
     Refuse a parameter file none of whose sections is for this node.
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any, Self
 
@@ -29,18 +31,7 @@ from std_srvs.srv import Trigger
 
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError, reason_of
-from shipdrag_ros.messages import (
-    DEFAULT_NODE,
-    OUTPUT_TOPICS,
-    TOPICS,
-    MalformedMessage,
-    Source,
-    decode,
-    encode,
-    input_type,
-    topics,
-)
-from shipdrag_ros.messages.topics import read_health as decode_health
+from shipdrag_ros.messages import MalformedMessage, decode, encode, input_type, topics
 from shipdrag_ros.messages.types import DIAGNOSTIC_ARRAY, stamp_ns
 from shipdrag_ros.node.inputs import LATCHED, is_installed, message_class
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
@@ -49,8 +40,19 @@ LOOK_S = 1.0
 SAID_S = 10.0  # a message that cannot be shown is said so often at most
 ANSWER_S = 5.0  # that a mark waits for the node
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
-_RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+_RELIABLE = QoSProfile(depth=100)
 _READINGS = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def _beside(name: str) -> tuple[rclpy.Context, Node, SingleThreadedExecutor]:
+    """Make a node on a context of its own, with what spins it."""
+    context = rclpy.Context()
+    # the caller has a process to end; Ctrl-C stays what it is there
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(name, context=context, start_parameter_services=False)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    return context, node, executor
 
 
 class Spectator:
@@ -81,26 +83,13 @@ class Spectator:
         self.others: tuple[str, ...] = ()
         self._hear = hear
         self._wanted = node
-        self._context = rclpy.Context()
-        # the caller has a process to end; Ctrl-C stays what it is there
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._ros = rclpy.create_node(
-            'shipdrag_watch', context=self._context, start_parameter_services=False
-        )
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._ros)
+        self._context, self._ros, self._executor = _beside('shipdrag_watch')
         self._marks = marks
         self._stopped: Any = None
         self._of_node: list[Any] = []
-        self._of_inputs: dict[str, tuple[str, str, Any]] = {}
+        self._of_inputs: dict[str, tuple[object, Any]] = {}
         self._last_s: dict[str, float] = {}
-        self._ros.create_subscription(
-            message_class(DIAGNOSTIC_ARRAY),
-            '/diagnostics',
-            self._on_diagnostics,
-            _RELIABLE,
-            raw=True,
-        )
+        self._subscribe(DIAGNOSTIC_ARRAY, '/diagnostics', self._on_diagnostics, _RELIABLE)
         self._ros.create_timer(LOOK_S, self._look)
         self._thread = threading.Thread(target=self._spin, name='spectator', daemon=True)
 
@@ -120,13 +109,13 @@ class Spectator:
         client = self._stopped
         if client is None or not client.service_is_ready():
             return 'no node is there to be told: the stop was not marked'
-        done = threading.Event()
-        asked = client.call_async(Trigger.Request())
-        asked.add_done_callback(lambda _: done.set())
-        if not done.wait(ANSWER_S):
-            asked.cancel()
+        answer = client.call(Trigger.Request(), timeout_sec=ANSWER_S)
+        if answer is None:
             return f'the node did not answer within {ANSWER_S:.0f} s: the stop may not be marked'
-        return str(asked.result().message)
+        return str(answer.message)
+
+    def _subscribe(self, kind: str, topic: str, hear: Callable[..., None], qos: QoSProfile) -> Any:
+        return self._ros.create_subscription(message_class(kind), topic, hear, qos, raw=True)
 
     def _spin(self) -> None:
         while self._context.ok():
@@ -151,10 +140,8 @@ class Spectator:
             and topics.RESISTANCE_CURVE.type in kinds
             and self._ros.count_publishers(topic)
         )
-        if self._wanted:
-            chosen = self._wanted
-        else:
-            chosen = self.node if self.node in found or not found else found[0]
+        kept = self.node if self.node in found or not found else found[0]
+        chosen = self._wanted or kept
         self.others = tuple(name for name in found if name != chosen)
         if chosen and chosen != self.node:
             self._follow(chosen)
@@ -168,14 +155,13 @@ class Spectator:
                 self._ros.destroy_client(self._stopped)
             self._stopped = self._ros.create_client(Trigger, f'{node}/engine_stopped')
         self._of_node = [
-            self._ros.create_subscription(
-                message_class(topic.type),
+            self._subscribe(
+                topic.type,
                 topic.under(node),
                 lambda payload, name=topic.name: self._hear(topics.NodeMessage(name, payload)),
                 LATCHED if topic.latched else _RELIABLE,
-                raw=True,
             )
-            for topic in OUTPUT_TOPICS
+            for topic in topics.OUTPUT_TOPICS
         ]
         self._of_node.append(
             self._ros.create_subscription(
@@ -188,7 +174,7 @@ class Spectator:
 
     def _on_diagnostics(self, payload: bytes) -> None:
         try:
-            heard = decode_health(payload)
+            heard = topics.read_health(payload)
         except MalformedMessage:
             return  # of somebody else: nobody's health is known by it
         own = [health for health in heard if self._is_own(health)]
@@ -206,25 +192,19 @@ class Spectator:
         """Hear the topics that the node hears, in the types that it hears."""
         for status in health.inputs:
             topic, kind = status.values.get('topic', ''), status.values.get('type', '')
-            accepted = TOPICS.get(status.input, ())
+            accepted = topics.TOPICS.get(status.input, ())
             if not topic or kind not in accepted or not is_installed(kind):
                 continue
-            known = self._of_inputs.get(status.input)
-            if known is not None:
-                if known[:2] == (topic, kind):
-                    continue
-                self._ros.destroy_subscription(known[2])
-            source = Source(status.input, kind)
-            subscription = self._ros.create_subscription(
-                message_class(kind),
-                topic,
-                lambda payload, source=source: self._on_reading(source, payload),
-                _READINGS,
-                raw=True,
-            )
-            self._of_inputs[status.input] = (topic, kind, subscription)
+            known, subscription = self._of_inputs.get(status.input, (None, None))
+            if known == (topic, kind):
+                continue
+            if subscription is not None:
+                self._ros.destroy_subscription(subscription)
+            hear = partial(self._on_reading, topics.Source(status.input, kind))
+            subscription = self._subscribe(kind, topic, hear, _READINGS)
+            self._of_inputs[status.input] = (topic, kind), subscription
 
-    def _on_reading(self, source: Source, payload: bytes) -> None:
+    def _on_reading(self, source: topics.Source, payload: bytes) -> None:
         now_s = time.monotonic()
         if now_s - self._last_s.get(source.input, 0.0) < CLOSEST_S:
             return
@@ -256,7 +236,6 @@ class Player:
         self._node = node
         self._executor = executor
         self._topics: dict[str, Publisher] = {}
-        self._clock: Publisher | None = None
 
     def connect(self, block: Block, *, timeout_s: float = TIMEOUT_S) -> None:
         """
@@ -288,14 +267,13 @@ class Player:
         ShipdragError
             If nobody hears it.
         """
-        if self._clock is None:
-            self._clock = self._topics['/clock'] = self._node.create_publisher(
-                Clock, '/clock', QOS
-            )
+        first = '/clock' not in self._topics
+        clock = self._publisher('/clock', 'rosgraph_msgs/msg/Clock')
+        if first:
             self._wait_for_listeners(TIMEOUT_S)
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(int(time_ns), SECOND_NS)
-        self._clock.publish(message)
+        clock.publish(message)
 
     def play(
         self, block: Block, *, speed: float, progress: Callable[[float], None] = lambda _: None
@@ -378,24 +356,14 @@ class Rehearsal:
     def __init__(self, heard: Callable[[LiveEstimate], None]) -> None:
         self.estimates = 0
         self._heard = heard
-        self._speeds: dict[int, float] = {}
-        self._resistances: dict[int, tuple[float, float]] = {}
-        self._context = rclpy.Context()
-        # Ctrl-C stays what it is in Python; the caller has a process to end
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node('rehearsal', context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        self._figures: defaultdict[int, dict[str, Any]] = defaultdict(dict)
+        self._context, self._node, self._executor = _beside('rehearsal')
         self.player = Player(self._node, self._executor)
         self._ready = False
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
-        for topic, callback in (
-            (topics.SPEED, self._hear_speed),
-            (topics.RESISTANCE, self._hear_resistance),
-        ):
-            self._node.create_subscription(
-                message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
-            )
+        for topic in (topics.SPEED, topics.RESISTANCE):
+            kind, hear = message_class(topic.type), partial(self._hear_figure, topic.name)
+            self._node.create_subscription(kind, topic.under(topics.DEFAULT_NODE), hear, 1000)
 
     def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
         """
@@ -446,19 +414,13 @@ class Rehearsal:
             values = health.of('state').values
             self._ready = values['lifecycle'] == 'active' and 'compiling [s]' not in values
 
-    def _hear_speed(self, message: Any) -> None:
-        self._speeds[stamp_ns(message)] = message.twist.twist.linear.x
-        self._join(stamp_ns(message))
-
-    def _hear_resistance(self, message: Any) -> None:
-        variance = message.accel.covariance[0]
-        self._resistances[stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
-        self._join(stamp_ns(message))
-
-    def _join(self, stamp_ns: int) -> None:
+    def _hear_figure(self, name: str, message: Any) -> None:
         """Report a moment once both of its figures are there, whichever came first."""
-        if stamp_ns not in self._speeds or stamp_ns not in self._resistances:
-            return
-        resistance, sigma = self._resistances.pop(stamp_ns)
-        self.estimates += 1
-        self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))
+        at_ns = stamp_ns(message)
+        self._figures[at_ns][name] = message
+        if len(self._figures[at_ns]) == 2:
+            both = self._figures.pop(at_ns)
+            speed, r = both[topics.SPEED.name].twist, both[topics.RESISTANCE.name].accel
+            self.estimates += 1
+            figures = speed.twist.linear.x, r.accel.linear.x, r.covariance[0] ** 0.5
+            self._heard(LiveEstimate(at_ns, *figures))

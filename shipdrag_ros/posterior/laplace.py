@@ -26,9 +26,9 @@ from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.linear import (
     Families,
+    inverted,
     of_family,
     solve,
-    substitute,
     whitened_products,
 )
 from shipdrag_ros.inference.noise import Noise, NoisePosterior, Settings
@@ -225,7 +225,7 @@ def mix(
     for j in range(m):
         k, q = which[j]
         _, step[j], lower, scale = of_family(products[k], families.mean[q], families.precision[q])
-        covariance[j] = substitute(lower, scale, np.eye(p))
+        covariance[j] = inverted(lower, scale)
         kept[j] = weight[k, q]
     return weight, kept / kept.sum(), step, covariance
 

@@ -166,7 +166,7 @@ AIR_AREA = Declared(
 DEPTH_READ = Declared('h', 'relative error of an echo sounder', normal(0.03), '', _REALITY)
 DEPTH_FORMULA = Declared(
     '-',
-    'relative error of what a known depth adds, over all speeds',
+    'relative error of what a known depth adds, over all speeds; one in ten three times as wide',
     normal(0.3),
     '',
     'Lackenby (1963) has about half as much again as Raven (2016)',

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.inference.linear import Families
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
-from shipdrag_ros.parameter import WIDER, WIDER_CHANCE
+from shipdrag_ros.parameter import TAILS
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
@@ -477,15 +477,14 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     else:
         sds = max(base.relative_sd, EXACT), EXACT
     with_it = wave_with_friction(ship)  # what is more of friction alone is not of the waves
-    tails = (1.0, 1.0 - WIDER_CHANCE), (WIDER, WIDER_CHANCE)
-    for (wide, chance), (size, part) in product(tails, priors.HALF_NORMAL):
+    for (wide, chance), (size, part) in product(TAILS, priors.HALF_NORMAL):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
         yield _Hull(
             priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
         )
     share = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for (wide, chance), more, (size, part) in product(
-        tails, priors.LOG_UNIFORM, priors.HALF_NORMAL
+        TAILS, priors.LOG_UNIFORM, priors.HALF_NORMAL
     ):
         of_wave = 0.0 - with_it * more, math.hypot(with_it * more, wide * sds[1])
         scales = ((more, math.hypot(more, sds[0])), of_wave)

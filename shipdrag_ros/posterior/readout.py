@@ -20,6 +20,7 @@ _NORMAL = 1.959964  # sd of a normal distribution within which so much is
 _FARTHEST = (1.0 - _BAND) ** -0.5  # sd of any (Chebyshev)
 _BAND_AT = 8  # speeds at which the band of a mixture is sought
 _HALVINGS = 12
+_ROUNDING = 1e-12  # of a correlation
 
 
 @dataclass(frozen=True)
@@ -167,15 +168,18 @@ def _causes(found: RunPosterior) -> dict[str, list[int]]:
 
 
 def _parts(found: RunPosterior, cross: Float64, variance: Float64) -> dict[str, Float64]:
-    """Return the parts of sigma, one cause after the other."""
-    covariance, left, parts = found.covariance.copy(), variance.copy(), {}
-    for name, which in _causes(found).items():
-        block = np.linalg.pinv(covariance[np.ix_(which, which)], hermitian=True)
-        due = np.maximum(np.einsum('mi,ij,mj->m', cross[:, which], block, cross[:, which]), 0.0)
-        due = np.minimum(due, left)
-        parts[name] = np.sqrt(due)
-        left -= due
-        by = block @ covariance[which]
-        cross = cross - cross[:, which] @ by
-        covariance = covariance - covariance[:, which] @ by
-    return parts | {'noise': np.sqrt(left)}
+    """Return the parts of sigma, in the order of the causes (a Cholesky factor has them)."""
+    causes = _causes(found)
+    order = [which for each in causes.values() for which in each]
+    covariance = found.covariance[np.ix_(order, order)]
+    sd = np.sqrt(np.diag(covariance))
+    # unknowns that follow from others by all digits count where they stand first
+    lower = np.linalg.cholesky(covariance / np.outer(sd, sd) + _ROUNDING * np.eye(len(order)))
+    due = np.linalg.solve(lower, (cross[:, order] / sd).T) ** 2
+    ends = np.cumsum([len(each) for each in causes.values()])
+    each = np.diff(np.vstack([np.zeros(len(cross)), np.cumsum(due, axis=0)])[[0, *ends]], axis=0)
+    left = np.maximum(variance - each.sum(axis=0), 0.0)
+    return {
+        name: np.sqrt(np.minimum(part, variance))
+        for name, part in zip((*causes, 'noise'), (*each, left))
+    }

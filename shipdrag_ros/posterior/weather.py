@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 
-from shipdrag_ros.parameter import Prior
+from shipdrag_ros.parameter import TAILS, Prior
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.law import (
     ABOVE,
@@ -254,9 +254,12 @@ def _of_depth(depth_m: float | None, ship: Ship, speed: Float64) -> Influence:
         z, weight = _nodes(3, 3)
         depths = depth_m * (1.0 + priors.DEPTH_READ.sd * z[:, 0])
         forces, inertia = _shallow(ship, tuple(depths.tolist()), speed)
-        forces = forces * (1.0 + priors.DEPTH_FORMULA.sd * z[:, 1:])
+        ensembles = [
+            (chance, weight, forces * (1.0 + wide * priors.DEPTH_FORMULA.sd * z[:, 1:]))
+            for wide, chance in TAILS
+        ]
         # the most probable reading is the middle one
-        return _influence(DEPTH, [(1.0, weight, forces)], float(inertia[len(z) // 2]))
+        return _influence(DEPTH, ensembles, float(inertia[len(z) // 2]))
     effect = measured_by('depth')
     shallow = _chance(effect.odds / (1.0 + effect.odds), effect, ship)
     z, weight = _nodes(5, 3)

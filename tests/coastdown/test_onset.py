@@ -362,3 +362,14 @@ def test_a_log_that_reads_every_other_second_is_armed_again(watch, record, phase
     second = (block.stamp_ns - START_NS) // S
     (onset,) = onsets(watch(block[second % 2 == phase]))
     assert abs(after_s(onset.start_ns, 1200.0) - 1500.0) <= 15.0
+
+
+@pytest.mark.parametrize('sd', [4.0, 10.0])
+@pytest.mark.parametrize('lead_in_s', [200.0, 450.0])
+def test_a_stop_soon_after_the_record_begins_is_found_by_a_radar(
+    watch, record, sensors, sd, lead_in_s
+) -> None:
+    # errors of places are white: those of speeds from them cancel in a slope
+    block = record(sensors=(replace(sensors['radar'], sd=sd),), lead_in_s=lead_in_s)
+    onset = next(each for each in watch(block) if isinstance(each, Onset))
+    assert abs((onset.start_ns - START_NS) * 1e-9 - lead_in_s) < 30.0

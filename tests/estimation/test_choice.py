@@ -153,6 +153,30 @@ def test_a_log_beside_a_radar_in_a_wrong_scale_is_not_blamed_alone() -> None:
     assert shared[1] < 0.8 < 0.95 < shared[0]
 
 
+@pytest.mark.parametrize(
+    ('effect', 'parameter', 'what'),
+    [
+        ('log_offset', 'offset_m_s', 'with a wrong zero'),
+        ('log_scale', 'factor', 'in a wrong scale'),
+    ],
+)
+def test_a_log_that_is_wrong_beside_a_fix_is_said(effect, parameter, what) -> None:
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=900.0, duration_s=900.0)
+    effects = [StatedEffect(effect, {parameter: Parameter(0.25)})]
+    sound, wrong = (
+        sense(simulate(SHIP, scenario, effects=each), standard_sensors(), seed=3)
+        for each in ([], effects)
+    )
+    stop_ns, said = START_NS + 900 * 10**9, []
+    for block in (sound, wrong):
+        window = Window.from_block(block, stop_ns, stop_ns + 900 * 10**9, before_ns=START_NS)
+        of_earth = replace(window, geodetic=frozenset({'position'}))
+        notes = estimate_final(of_earth, SHIP, Parameters()).notes
+        said.append([note for note in notes if f'speed_through_water: {what}' in note])
+    assert not said[0]
+    assert len(said[1]) == 1
+
+
 def test_positions_show_the_scale_and_it_is_said() -> None:
     found = estimate_final(_window(0.02, position=True), BARE, Parameters())
     curve = found.valid_curve

@@ -19,7 +19,7 @@ from shipdrag_ros.estimation.distance import (
     refit,
 )
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.orthogonal import OrthogonalBasis
+from shipdrag_ros.studies.s1.motion import OrthogonalBasis
 
 LINE, MOST = 2, 8  # coefficients of a bend
 TIME = np.linspace(-1.0, 1.0, 400)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.linear import cholesky, products_of, solve, substitute
+from shipdrag_ros.inference.linear import cholesky, inverted, products_of, solve, substitute
 
 
 @pytest.mark.parametrize('n', [1, 128, 129, 1000])
@@ -24,6 +24,9 @@ def test_a_factor_solves() -> None:
     assert solved
     x = substitute(lower, scale, right)
     np.testing.assert_allclose(matrix @ x, right, atol=1e-9)
+    size = np.sqrt(np.diag(matrix))
+    unit = inverted(lower, scale) @ matrix * np.outer(size, 1.0 / size)
+    np.testing.assert_allclose(unit, np.eye(6), atol=1e-9)
 
 
 @pytest.mark.parametrize('third', [[2.0, 0.0, 4.0], [2.0, 0.0, 3.0], [np.nan, 0.0, 1.0]])

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -78,9 +78,10 @@ def test_no_option_that_a_message_of_the_library_names_is_left_over() -> None:
             assert left <= own, (path, line)
 
 
-def test_an_error_keeps_its_class_and_speaks_python() -> None:
+@pytest.mark.parametrize('door', [sd.estimate, sd.Record.coastdowns])
+def test_an_error_keeps_its_class_and_speaks_python(door: Callable[[sd.Record], object]) -> None:
     steady = pd.DataFrame({'t': np.arange(60.0), 'log': np.full(60, 6.0)})
     record = sd.read(steady, columns={'speed_through_water': 'log'}, time='t')
     with pytest.raises(sd.ShipdragError, match="give one with ship='FILE'") as refused:
-        sd.estimate(record)
+        door(record)
     assert type(refused.value).__name__ == 'BagError'

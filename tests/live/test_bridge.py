@@ -293,6 +293,20 @@ def test_where_the_first_log_is_silent_the_second_shows_the_speed(first_m_s: flo
     assert 'time_s' in bridge.parts(11.0)['if_stopped']
 
 
+def test_where_time_goes_back_the_course_and_the_page_are_of_the_new_time() -> None:
+    source = NodeSource(Ship.load(SHIP))
+    page = LivePage(source)
+    for start_s, yaw in ((2_000_000, 0.0), (1_000_000, 1.0)):
+        stamps = (start_s + np.arange(60)) * 10**9
+        source.hear(Samples(Block.of(Channel.SPEED_THROUGH_WATER, stamps, np.full(60, 5.0))))
+        source.hear(Samples(Block.of(Channel.HEADING, stamps, np.full(60, yaw))))
+        page.tick()
+    (course,) = [each for each in source.bridge.parts(0.0)['checks'] if each['name'] == 'Course']
+    assert course['text'].startswith('0° ')
+    _, data = page.frames.after(page.frames.number - 1)
+    assert data.startswith(b'event: whole')
+
+
 @pytest.mark.parametrize('of_first_s', [0, 40, 200])
 def test_the_map_shows_one_antenna_the_first_that_still_speaks(of_first_s: int) -> None:
     ahead = Ahead()

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.messages.topics import Health, Status
-from shipdrag_ros.node.main import line, terminal_line
+from shipdrag_ros.node.main import line, show
 from tests.recorded import attachments, rows, summary
 
 rclpy = pytest.importorskip('rclpy')
@@ -192,7 +192,9 @@ def test_an_input_that_is_not_well_hides_no_state() -> None:
 
 
 def test_without_a_terminal_there_is_no_line() -> None:
-    assert terminal_line(io.StringIO()) is None
+    stream = io.StringIO()
+    show(Health(()), stream)
+    assert stream.getvalue() == ''
 
 
 def test_stray_arguments_are_a_usage_error(capfd: pytest.CaptureFixture[str]) -> None:

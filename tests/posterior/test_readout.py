@@ -55,3 +55,13 @@ def test_the_band_holds_95_percent_of_draws_from_the_mixture(found, rare: float)
     np.testing.assert_allclose(inside, 0.95, atol=0.004)
     squares = np.sum([each**2 for each in part.parts_m_s2.values()], axis=0)
     np.testing.assert_allclose(squares, part.sigma_m_s2**2, rtol=1e-9)
+
+
+def test_the_first_part_is_what_would_go_if_n_r_were_known(found: RunPosterior) -> None:
+    at, k = found.problem.coefficients + motion.INERTIA, found.problem.coefficients
+    columns = motion.shapes_at(found.problem.forces, SPEED_M_S)[1][0]
+    with_n_r = columns.T @ found.covariance[:k, at]
+    part = read(found, SPEED_M_S)
+    variance = np.einsum('km,kl,lm->m', columns, found.covariance[:k, :k], columns)
+    due = with_n_r**2 / found.covariance[at, at] / variance
+    np.testing.assert_allclose(part.parts_m_s2['n_r'], np.sqrt(due) * part.sigma_m_s2, rtol=1e-6)

@@ -26,8 +26,15 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
-from shipdrag_ros.posterior.priors import HELD_FORCE, LEFT_S, THRUST_LEFT
-from shipdrag_ros.posterior.problem import LEFT_OPEN, RunModel, StopPrior
+from shipdrag_ros.posterior.priors import (
+    HELD_FORCE,
+    LEFT_S,
+    LOG_LAG,
+    LOG_OFFSET,
+    LOG_SCALE,
+    THRUST_LEFT,
+)
+from shipdrag_ros.posterior.problem import EXACT, RunModel, StopPrior
 from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.weather import MeasuredWind, Reference, Weather
 from shipdrag_ros.samples import Float64
@@ -39,6 +46,12 @@ _CALM = (HELD, WIND, DEPTH)
 _CURVE_POINTS = 129
 _WIND_POINTS = 25
 _WORTH_A_NOTE = 0.1  # probability
+_WRONG = {  # the sd of a sound instrument, and what another one is
+    motion.SCALE: (LOG_SCALE.sd, 'in a wrong scale', '%'),
+    motion.OFFSET: (LOG_OFFSET.sd, 'with a wrong zero', 'm/s'),
+    motion.LAG: (LOG_LAG.sd, 'behind a long filter', 's'),
+    motion.GROUND_SCALE: (EXACT, 'in a wrong scale', '%'),
+}
 
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
@@ -214,7 +227,7 @@ def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
         at = k + motion.own(code) + motion.SCALE
         which = 'log' if len(logs) == 1 else f'log {name}'
         yield _log_scale_note(float(found.mean[at]), float(sd[at]), which)
-    yield from _ground_scale_notes(found, record)
+    yield from _wrong_notes(found, record)
     if not logs:
         yield (
             f'a current is part of the speed: one of ± {2.0 * sd[k + motion.CURRENT]:.2g} m/s '
@@ -276,20 +289,24 @@ def _log_scale_note(scale: float, sd: float, which: str) -> str:
     )
 
 
-def _ground_scale_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
-    """Say which source over ground is in a wrong scale, where that is not unlikely."""
-    k, inputs = found.problem.coefficients, dict[int, list[str]]()
+def _wrong_notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
+    """Say what is wrong with an instrument, where that is not unlikely."""
+    k, inputs = found.problem.coefficients, dict[tuple[int, int], list[str]]()
     for name in record.stamps:
-        if CODES[name] % KIND_COUNT != LOG:
-            inputs.setdefault(motion.own(CODES[name]), []).append(name)
-    for own, names in inputs.items():
-        at = k + own + motion.GROUND_SCALE
-        chance = float(found.family[found.problem.families.precision[:, at] < LEFT_OPEN].sum())
+        is_log = CODES[name] % KIND_COUNT == LOG
+        for place in _WRONG:
+            if is_log == (place != motion.GROUND_SCALE):
+                inputs.setdefault((motion.own(CODES[name]), place), []).append(name)
+    for (own, place), names in inputs.items():
+        at, (sound_sd, what, unit) = k + own + place, _WRONG[place]
+        wider = found.problem.families.precision[:, at] < 0.9 / sound_sd**2
+        chance = float(found.family[wider].sum())
         if chance > _WORTH_A_NOTE:
-            scale, sd = float(found.mean[at]), float(np.sqrt(found.covariance[at, at]))
+            factor = 100.0 if unit == '%' else 1.0
+            size, sd = factor * found.mean[at], factor * np.sqrt(found.covariance[at, at])
             yield (
-                f'{" and ".join(names)}: in a wrong scale with probability {chance:.2g}, which is '
-                f'in the band ({100.0 * scale:+.2g} ± {200.0 * sd:.1g} %, two standard deviations)'
+                f'{" and ".join(names)}: {what} with probability {chance:.2g}, which is in the '
+                f'band ({size:+.2g} ± {2.0 * sd:.1g} {unit}, two standard deviations)'
             )
 
 

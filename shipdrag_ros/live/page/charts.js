@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three charts. Lines differ by dash and width, not by colour alone.
+// The three charts and the track. Lines differ by dash and width, not by colour alone.
+
+import { timeOfDay } from './units.js';
 
 /* global uPlot */
 
@@ -33,14 +35,17 @@ function axis(label, size) {
 
 const SVG = 'http://www.w3.org/2000/svg';
 
+function shape(name, attributes, text = '') {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.textContent = text;
+  return made;
+}
+
 /** A piece of a line as it is drawn, for the legend. */
 function sample({ stroke, width, dash = [] }) {
-  const svg = document.createElementNS(SVG, 'svg');
-  const line = document.createElementNS(SVG, 'line');
-  const attributes = { x1: 0, x2: 36, y1: 6, y2: 6, stroke, 'stroke-width': width, 'stroke-dasharray': dash.join(' ') };
-  for (const [name, value] of Object.entries({ width: 36, height: 12, 'aria-hidden': 'true' })) svg.setAttribute(name, value);
-  for (const [name, value] of Object.entries(attributes)) line.setAttribute(name, value);
-  svg.append(line);
+  const svg = shape('svg', { width: 36, height: 12, 'aria-hidden': 'true' });
+  svg.append(shape('line', { x1: 0, x2: 36, y1: 6, y2: 6, stroke, 'stroke-width': width, 'stroke-dasharray': dash.join(' ') }));
   return svg;
 }
 
@@ -128,13 +133,13 @@ export function drawCurve(chart, { curve, clean, past, units, mass }) {
   data.push(band(2), band(-2), band(0));
   for (const line of lines) data.push(at(x, line.x, line.y));
   const key = `${units.name} ${lines.map(line => line.name).join()}`;
-  const shown = (_, v) => (v == null ? '–' : v.toFixed(units.force === 'kN' ? (v < 10 ? 2 : 0) : 5));
+  const shown = said(v => v.toFixed(units.force === 'kN' ? (v < 10 ? 2 : 0) : 5));
   chart.draw(key, () => ({
     scales: { x: { time: false }, y: { range: (_, min, max) => [0, (max || 1) * 1.05] } },
     axes: [axis(`speed through water [${units.speed}]`, 34), axis(`resistance [${units.force}]`, 58)],
     bands: [{ series: [1, 2], fill: ink('--band') }],
     series: [
-      { label: units.speed === 'kn' ? 'at kn' : 'at m/s', value: (_, v) => (v == null ? '–' : v.toFixed(1)) },
+      { label: units.speed === 'kn' ? 'at kn' : 'at m/s', value: said(v => v.toFixed(1)) },
       { label: 'band', stroke: ink('--accent'), width: 0.5, value: shown, legend: false },
       { label: 'low', stroke: ink('--accent'), width: 0.5, value: shown, legend: false },
       { label: 'this run (shaded: band)', stroke: ink('--accent'), width: 3, value: shown },
@@ -146,8 +151,13 @@ export function drawCurve(chart, { curve, clean, past, units, mass }) {
 }
 
 function timeAxis(offset) {
-  return { ...axis('', 32), labelSize: 0, values: (u, ticks, _a, _s, step) => ticks.map(t => new Date((t + offset * 3600) * 1000).toISOString().slice(11, step < 60 ? 19 : 16)) };
+  return { ...axis('', 32), labelSize: 0, values: (u, ticks, _a, _s, step) => ticks.map(t => timeOfDay(t, offset, step < 60)) };
 }
+
+/** How a value is read off: – where there is none. */
+function said(say) { return (_, v) => (v == null ? '–' : say(v)); }
+
+function timeSeries(offset) { return { label: 'time', value: said(v => timeOfDay(v, offset)) }; }
 
 /** Speeds over time; rows are [second, log, ground, estimate, shaft]. */
 export function drawSpeeds(chart, rows, span, units, offset, forecast) {
@@ -162,14 +172,14 @@ export function drawSpeeds(chart, rows, span, units, offset, forecast) {
     axes: [timeAxis(offset), axis(`speed [${units.speed}]`, 58)],
     bands: [{ series: [6, 5], fill: ink('--band') }],
     series: [
-      { label: 'time', value: (_, v) => (v == null ? '–' : new Date((v + offset * 3600) * 1000).toISOString().slice(11, 19)) },
+      timeSeries(offset),
       { label: 'log', stroke: ink('--accent'), width: 2, points: { show: false } },
       { label: 'over ground', stroke: ink('--second'), width: 1.5, dash: [6, 4], points: { show: false } },
       { label: 'estimate', stroke: ink('--third'), width: 3, dash: [2, 3], spanGaps: true, points: { show: false } },
       { label: 'foretold (shaded: 90 %)', stroke: ink('--third'), width: 1.5, points: { show: false } },
       { label: 'low', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
       { label: 'high', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
-    ].map(each => (each.stroke ? { ...each, value: (_, v) => (v == null ? '–' : v.toFixed(2)) } : each)),
+    ].map(each => (each.stroke ? { ...each, value: said(v => v.toFixed(2)) } : each)),
   }), [[...cut, ...coming].map(row => row[0]), speed(1), speed(2), speed(3), ahead(1), ahead(2), ahead(3)]);
 }
 
@@ -180,8 +190,8 @@ export function drawShafts(chart, rows, span, offset) {
     scales: { x: { time: true }, y: { range: (_, min, max) => (min == null ? [0, 1] : pad(Math.min(min, 0), max)) } },
     axes: [timeAxis(offset), axis('shaft [rpm]', 58)],
     series: [
-      { label: 'time', value: (_, v) => (v == null ? '–' : new Date((v + offset * 3600) * 1000).toISOString().slice(11, 19)) },
-      { label: 'rpm', stroke: ink('--accent'), width: 2, points: { show: false }, value: (_, v) => (v == null ? '–' : v.toFixed(0)) },
+      timeSeries(offset),
+      { label: 'rpm', stroke: ink('--accent'), width: 2, points: { show: false }, value: said(v => v.toFixed(0)) },
     ],
   }), [cut.map(row => row[0]), rpm]);
 }
@@ -197,4 +207,41 @@ function since(rows, span) {
   let i = rows.length;
   while (i > 0 && rows[i - 1][0] >= first) i -= 1;
   return i ? rows.slice(i) : rows;
+}
+
+const [WIDE, HIGH, EDGE] = [640, 200, 26];
+const STEPS = [1, 2, 5];
+
+/** A round length that is at most so long. */
+function round(most) {
+  const ten = 10 ** Math.floor(Math.log10(most));
+  return Math.max(...STEPS.map(step => step * ten).filter(length => length <= most), ten / 2);
+}
+
+/** The track since the stop and the one to come, to scale; y of `position` is up: north, where it is latitude and longitude. `label` stands at the mark, `far` says a length. */
+export function drawTrack(box, { was, ahead, mark }, { label, far, unit }) {
+  const all = [...was, ...ahead, ...(mark ?? [])];
+  const [xs, ys] = [all.map(([x]) => x), all.map(([, y]) => y)];
+  const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+  const scale = Math.min((WIDE - 2 * EDGE) / Math.max(right - left, 1e-6), (HIGH - 2 * EDGE) / Math.max(high - low, 1e-6));
+  const at = ([x, y]) => [WIDE / 2 + (x - (left + right) / 2) * scale, HIGH / 2 - (y - (low + high) / 2) * scale];
+  const line = (points, look) => shape('polyline', { points: points.map(point => at(point).map(v => v.toFixed(1)).join()).join(' '), class: look });
+  const svg = shape('svg', { viewBox: `0 0 ${WIDE} ${HIGH}`, width: '100%', height: '100%', 'aria-hidden': 'true' });
+  svg.append(line(was, 'track-was'), line(ahead, 'track-ahead'));
+  const side = ([x, y]) => (x > WIDE / 2 ? { x: x - 8, y: y - 10, 'text-anchor': 'end' } : { x: x + 8, y: y - 10 });
+  if (mark) {
+    const [middle, ...band] = mark;
+    svg.append(line(band, 'track-band'));
+    const [x, y] = at(middle);
+    svg.append(shape('circle', { cx: x, cy: y, r: 5, class: 'track-mark' }), shape('text', side([x, y]), label));
+  }
+  const [x, y] = at([0, 0]);
+  const [before, after] = [at(ahead[0]), at(ahead[ahead.length - 1])];
+  const course = Math.atan2(after[1] - before[1], after[0] - before[0]) * 180 / Math.PI;
+  svg.append(shape('path', { d: 'M9 0 -6 -5 -6 5Z', transform: `translate(${x} ${y}) rotate(${course})`, class: 'track-ship' }));
+  const bar = round(WIDE / 4 / scale / unit);
+  const end = EDGE + bar * unit * scale;
+  svg.append(shape('path', { d: `M${EDGE} ${HIGH - 12}v5H${end}v-5`, class: 'track-bar' }), shape('text', { x: end + 6, y: HIGH - 6 }, far(bar * unit)));
+  svg.append(shape('text', { x: WIDE - EDGE, y: HIGH - 6, 'text-anchor': 'end' }, 'up: north (+y in a local frame)'));
+  box.replaceChildren(svg);
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: one picture, kept by frames from the server, drawn where it has changed.
 
-import { Chart, drawCurve, drawShafts, drawSpeeds } from './charts.js';
-import { drawTrack } from './track.js';
+import { Chart, drawCurve, drawShafts, drawSpeeds, drawTrack } from './charts.js';
 import { BRIDGE, SI, day, dayAndTime, figure, heading, length, percent, timeOfDay } from './units.js';
 
 const OLD_MS = 4000; // the server says something every second
@@ -174,7 +173,7 @@ function showFigures(part) {
 }
 
 /** A time as minutes and seconds. */
-function minutes(s) { return s == null ? '…' : `${Math.floor(Math.round(s) / 60)}:${String(Math.round(s) % 60).padStart(2, '0')}`; }
+function minutes(s) { return s == null ? '…' : length(Math.round(s)); }
 
 function speedOf(part) { return `${units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1)} ${units.speed}`; }
 

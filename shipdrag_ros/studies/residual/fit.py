@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A regression of residual resistance on shape, and the guard over it.
+A regression of residual resistance on shape, the guard over it, and a ship file made of it.
 
 S4 shows that such regressions meet the hulls they were made from and mislead
 for all others. So what leaves here says where it may be used. The
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
 from shipdrag_ros.studies.least_squares import LinearFit, least_squares
 from shipdrag_ros.studies.surface.fit import Domain, Prediction
 
@@ -101,13 +102,6 @@ class Hulls:
         """
         known = {name: column for name, column in vars(self).items() if column is not None}
         return replace(self, **{name: column[rows] for name, column in known.items()})
-
-    def at(self, froude: Float64) -> Hulls:
-        """
-        Return the first hull at other Froude numbers.
-        """
-        first = self.take(np.zeros(len(froude), np.intp))
-        return replace(first, Fr=froude)
 
     @property
     def contradictions(self) -> int:
@@ -310,8 +304,8 @@ class ResidualFit:
         return {
             'form': self.form.name,
             'terms': named(self.terms),
-            'coefficients': named(self.fit.coefficients.tolist()),
-            'coefficient_sd': named(self.coefficient_sd.tolist()),
+            'coefficients': named(self.fit.coefficients),
+            'coefficient_sd': named(self.coefficient_sd),
             'F': self.criterion,
             'left_out_rms': math.sqrt(self.left_out),
             'rank': self.fit.rank,
@@ -507,4 +501,94 @@ def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit
         spread=spread,
         left_out=left_out,
         notes=tuple(notes),
+    )
+
+
+_POINTS = 15  # Froude numbers tried
+_VAGUE = 1.0  # of the value: a larger sd makes it no baseline
+_LARGEST = 0.1  # a coefficient above this is one in other units
+
+
+def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship:
+    """
+    Return the ship with the fitted coefficient as her wave resistance.
+
+    Parameters
+    ----------
+    ship
+        With breadth, draught and a baseline of coefficients, of which friction
+        and allowance are kept.
+    fitted
+        To c_R on the wetted surface.
+    lcb
+        Centre of buoyancy over L, where the form needs it.
+
+    Raises
+    ------
+    DataError
+        If a particular is missing, the hull is outside the data, or the values
+        are no coefficients.
+
+    Notes
+    -----
+    c_R is what friction of a flat plate leaves, so the form factor becomes 0. The
+    table holds only Froude numbers at which the guard accepts this hull; the
+    largest relative standard deviation among them is stated for all.
+    """
+    base = ship.baseline
+    missing = [name for name in ('breadth_m', 'draught_m') if getattr(ship, name) is None]
+    problems = [f'{name}: missing, the hull is described by its ratios' for name in missing]
+    if not isinstance(base, CoefficientBaseline):
+        problems.append('baseline: expected one of coefficients, its friction is kept')
+    if fitted.form.needs_lcb and lcb is None:
+        problems.append(f'lcb: the form {fitted.form.name} needs it; give --lcb')
+    if problems:
+        raise DataError(ship.name or 'ship file', problems)
+    assert isinstance(base, CoefficientBaseline)
+    assert ship.breadth_m is not None
+    assert ship.draught_m is not None
+    ratios = {
+        'L_B': ship.length_m / ship.breadth_m,
+        'B_T': ship.breadth_m / ship.draught_m,
+        'slenderness': ship.slenderness,
+        **({} if lcb is None else {'lcb': lcb}),
+    }
+    froude = np.linspace(fitted.hulls.Fr.min(), fitted.hulls.Fr.max(), _POINTS)
+    rows = np.array([[*ratios.values(), each] for each in froude])
+    found = fitted.predict(Hulls.of(ship.name, (*ratios, 'Fr'), rows))
+    # the longest stretch that the guard accepts
+    changes = np.flatnonzero(np.diff([each.inside for each in found])) + 1
+    stretches = [part for part in np.split(np.arange(_POINTS), changes) if found[part[0]].inside]
+    used = max(stretches, key=len, default=np.arange(0))
+    if len(used) < 2:
+        # of the Froude number that comes nearest to being accepted
+        reasons = min((each.reasons for each in found), key=len)
+        raise DataError(f'{ship.name or "ship"}: the fit may not be used for this hull', reasons)
+    kept = [found[i] for i in used]
+    value = np.array([each.value for each in kept])
+    relative = float(np.max([each.sd / each.value for each in kept]))
+    if value.max() > _LARGEST:
+        problems.append(
+            f'wave_coefficient: {value.max():.3g}, expected at most {_LARGEST:g}; the target '
+            'must be c_R itself on the wetted surface, neither times 1000 nor a force'
+        )
+    elif relative > _VAGUE:
+        problems.append(
+            f'wave_coefficient: the sd is up to {relative:.2g} times the value, expected at '
+            f'most {_VAGUE:g}; the data do not determine it'
+        )
+    if problems:
+        raise DataError(ship.name or 'ship file', problems)
+    low, high = froude[used[0]], froude[used[-1]]
+    return replace(
+        ship,
+        baseline=replace(
+            base,
+            form_factor=0.0,
+            wave_froude=tuple(froude[used].tolist()),
+            wave_coefficient=tuple(value.tolist()),
+            relative_sd=CoefficientSd(friction=base.relative_sd.friction, wave=relative),
+            source=f'wave: form {fitted.form.name} fitted to {fitted.count} hulls, accepted for '
+            f'Fr {low:.3g} to {high:.3g}; friction: {base.source}',
+        ),
     )

@@ -27,10 +27,15 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.least_squares import inverse, triangle
-from shipdrag_ros.studies.order import OrderTable, fit_orders, rounding
-from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.studies.s1.motion import PolynomialMotion, at_end, resistance_curve
+from shipdrag_ros.studies.least_squares import OrderTable, inverse, rounding, triangle
+from shipdrag_ros.studies.s1.motion import (
+    OrthogonalBasis,
+    PolynomialMotion,
+    TimeScale,
+    at_end,
+    fit_orders,
+    resistance_curve,
+)
 
 
 @dataclass(frozen=True)
@@ -138,10 +143,12 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     """
     alone = solve_one(position), solve_one(speed)
     inputs = (position, speed)
+    # above 0 for data that a fit follows exactly, too
+    least = [float(np.finfo(np.float64).eps * np.abs(data.value).max()) for data in inputs]
     sigmas = np.array(
         [
-            data.known_sigma or max(solution.noise_sd[data.name], _least_sigma(data.value))
-            for data, solution in zip(inputs, alone)
+            data.known_sigma or max(solution.noise_sd[data.name], rounded) or 1.0
+            for data, solution, rounded in zip(inputs, alone, least)
         ]
     )
     scale = TimeScale.of(position.time_ns, speed.time_ns)
@@ -153,7 +160,7 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     # each input condensed once; weights and orders are then a matter of small matrices
     factors = np.concatenate(
         [
-            triangle(_with_values(rows, data.value)) / sigma
+            triangle(np.vstack([rows, data.value]).T) / sigma
             for rows, data, sigma in zip((basis.columns[:, : counts[0]], rates), inputs, sigmas)
         ]
     )
@@ -189,16 +196,6 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
         basis.reorthogonalised + sum(solution.reorthogonalised for solution in alone),
         notes,
     )
-
-
-def _with_values(rows: Float64, values: Float64) -> Float64:
-    """Return [H | z], (n, k + 1), from H' (k, n) and z (n,)."""
-    return np.concatenate([rows, values[None]]).T
-
-
-def _least_sigma(values: Float64) -> float:
-    """Return a standard deviation above 0 for data that a fit follows exactly."""
-    return float(np.finfo(np.float64).eps * np.abs(values).max()) or 1.0
 
 
 def _choose(table: OrderTable, known: float) -> tuple[int, bool, tuple[str, ...]]:

@@ -18,23 +18,8 @@ import numpy as np
 from shipdrag_ros.errors import SensitivityError, ShipdragError
 from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import Channel, Float64
-from shipdrag_ros.ship import (
-    AddedMass,
-    CoefficientBaseline,
-    ConstantAddedMass,
-    Ship,
-    StatedEffect,
-    TableAddedMass,
-    TableBaseline,
-)
-from shipdrag_ros.simulation import (
-    STANDARD_SD,
-    Action,
-    Effect,
-    Frame,
-    Scenario,
-    simulate_columns,
-)
+from shipdrag_ros.ship import CoefficientBaseline, Ship, TableAddedMass, TableBaseline
+from shipdrag_ros.simulation import STANDARD_SD, Action, Effect, Frame, Scenario, simulate_columns
 from shipdrag_ros.simulation.effects import effects_of
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Selection, vary
 
@@ -137,13 +122,8 @@ def _field(name: str, ship: Ship, *, section: str = '', sd: float = np.nan) -> P
 
 def _added_mass(ship: Ship, factor: float) -> Ship:
     model = ship.added_mass
-    changed: AddedMass
-    if isinstance(model, ConstantAddedMass):
-        changed = replace(model, value=factor * model.value)
-    else:
-        rows = tuple(tuple(factor * c for c in row) for row in model.coefficients)
-        changed = TableAddedMass(coefficients=rows, sd=model.sd)
-    return replace(ship, added_mass=changed)
+    rows = tuple(tuple(factor * c for c in row) for row in model.coefficients)
+    return replace(ship, added_mass=TableAddedMass(coefficients=rows, sd=model.sd))
 
 
 def _viscous(ship: Ship, factor: float) -> Ship:
@@ -159,14 +139,12 @@ def _viscous(ship: Ship, factor: float) -> Ship:
 
 def _effect(name: str, parameter: str) -> _Change:
     def scaled(ship: Ship, factor: float) -> Ship:
-        return replace(ship, effects=tuple(_stated(one, factor) for one in ship.effects))
-
-    def _stated(effect: StatedEffect, factor: float) -> StatedEffect:
-        if effect.name != name:
-            return effect
+        effect = next(one for one in ship.effects if one.name == name)
         stated = effect.parameters[parameter]
         values = {**effect.parameters, parameter: Parameter(factor * stated.value, stated.sd)}
-        return replace(effect, parameters=values)
+        changed = replace(effect, parameters=values)
+        others = (changed if one is effect else one for one in ship.effects)
+        return replace(ship, effects=tuple(others))
 
     return scaled
 
@@ -422,8 +400,7 @@ def _usual(prior: Prior) -> float:
 
 
 _CHECK_FRACTION = 0.85  # of the speed, in the check
-_SMALL, _FOUR = slice(0, 2), slice(0, 4)  # columns of CHANGES
-_SD = slice(4, 6)  # and the stated sd behind them
+_SMALL, _SD = slice(0, 2), slice(4, 6)  # of CHANGES, and the stated sd behind them
 
 
 @dataclass(frozen=True)
@@ -503,10 +480,7 @@ class CoastStudy:
         check = self.check
         return {
             'manoeuvre': self.coast.name,
-            'loss': {
-                name: {**row, 'mean': mean}
-                for (name, row), mean in zip(self.losses.to_dict().items(), self.mean.tolist())
-            },
+            'loss': self.losses.to_dict(),
             **asdict(self.selection),
             'check': {
                 'manoeuvre': check.coast.name,
@@ -524,11 +498,6 @@ class CoastStudy:
             },
             'mimics': [asdict(mimic) for mimic in self.mimics],
         }
-
-    @property
-    def mean(self) -> Float64:
-        """Mean loss of each value over `CHANGES`, by which it is kept."""
-        return Losses(self.losses.names, self.losses.table[:, _FOUR]).mean
 
 
 def study_coast(ship: Ship, coast: Coast, *, keep: int | None = None) -> CoastStudy:
@@ -552,10 +521,9 @@ def study_coast(ship: Ship, coast: Coast, *, keep: int | None = None) -> CoastSt
     whole = _respond(ship, coast, listed)
     coasting = replace(whole, differences=whole.differences[:, :, coast.after_stop])
     losses = coasting.losses()
-    four = Losses(losses.names, losses.table[:, _FOUR])
     if keep is None:
         keep = max(1, int(np.sum(_mean(losses.table[:, _SMALL]) >= 1.0)))
-    selection = four.select(keep)
+    selection = losses.select(keep)
     return CoastStudy(
         ship,
         coast,

@@ -77,11 +77,12 @@ class Losses:
 
     @property
     def mean(self) -> Float64:
-        """Mean loss of each parameter (p,), over the changes that all of them bear."""
-        common = np.isfinite(self.table).all(axis=0)
+        """Mean loss of each parameter (p,), over those of `CHANGES` that all of them bear."""
+        table = self.table[:, : len(CHANGES)]
+        common = np.isfinite(table).all(axis=0)
         if not common.any():
             return np.full(len(self.names), np.nan)
-        return np.asarray(self.table[:, common].mean(axis=1))
+        return np.asarray(table[:, common].mean(axis=1))
 
     def to_dict(self) -> dict[str, dict[str, float]]:
         """
@@ -93,9 +94,15 @@ class Losses:
         }
 
     @property
+    def order(self) -> list[int]:
+        """Places of the parameters, the largest mean loss first."""
+        found: list[int] = np.argsort(-self.mean, kind='stable').tolist()
+        return found
+
+    @property
     def ranking(self) -> tuple[str, ...]:
         """Names, the largest mean loss first."""
-        return tuple(self.names[i] for i in np.argsort(-self.mean, kind='stable'))
+        return tuple(self.names[i] for i in self.order)
 
     def select(self, count: int) -> Selection:
         """

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
-from shipdrag_ros.studies.manoeuvring.simulate import (
+from shipdrag_ros.studies.manoeuvring import (
+    FORM,
     Manoeuvre,
     Motions,
+    SteeredShip,
     overshoots_rad,
     steer,
     turn,
@@ -41,9 +42,7 @@ DESIGN = (
     *(zigzag(angle) for angle in (5.0, 10.0, 15.0, 20.0, 25.0, 35.0)),
     *(turn(angle) for angle in (10.0, 20.0, 35.0)),
 )
-_UP, _DOWN = slice(0, None, 2), slice(1, None, 2)  # columns of CHANGES
-_SMALL, _LARGE = slice(0, 2), slice(2, 4)
-_TEN, TINY = (0.1, -0.1), (1e-3, -1e-3)  # tiny ones: what is not linear would look like no other
+TINY = (1e-3, -1e-3)  # what is not linear would look like no other
 
 
 @dataclass(frozen=True)
@@ -69,8 +68,8 @@ class Observations:
         Look at the losses of `CHANGES`.
         """
         table = losses.table
-        unlike = np.abs(table[:, _UP] / table[:, _DOWN] - 1.0)
-        growth = table[:, _LARGE].mean(axis=1) / table[:, _SMALL].mean(axis=1)
+        unlike = np.abs(table[:, ::2] / table[:, 1::2] - 1.0)
+        growth = table[:, 2:].mean(axis=1) / table[:, :2].mean(axis=1)
         small, large = np.nanmedian(unlike, axis=0).tolist()
         return cls((small, large), float(np.nanmedian(growth)))
 
@@ -300,7 +299,7 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
     """
     Find which manoeuvre makes which derivative visible.
     """
-    changes = (*_TEN, *TINY)
+    changes = (*CHANGES[:2], *TINY)
     responses = [respond(ship, manoeuvre, changes=changes) for manoeuvre in manoeuvres]
     slopes = [one.slopes(2, 3) for one in responses]
     return Experiment(

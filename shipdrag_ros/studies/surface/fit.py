@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.least_squares import LinearFit, least_squares
-from shipdrag_ros.studies.order import OrderTable, rounding
+from shipdrag_ros.studies.least_squares import LinearFit, OrderTable, least_squares, rounding
 
 Powers = NDArray[np.int64]
 _BLOCK = 64

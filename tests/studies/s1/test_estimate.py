@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipdrag_ros.studies.orthogonal import OrthogonalBasis, TimeScale
 from shipdrag_ros.studies.s1.estimate import ScalarInput, Solution, solve_joint, solve_one
-from shipdrag_ros.studies.s1.motion import sigma
+from shipdrag_ros.studies.s1.motion import OrthogonalBasis, TimeScale, sigma
 
 START_NS = 1_700_000_000_123_456_789
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.manoeuvring.simulate import zigzag
+from shipdrag_ros.studies.manoeuvring import mariner, zigzag
 from shipdrag_ros.studies.sensitivity.coasting import coast_from, study_coast
 from shipdrag_ros.studies.sensitivity.steering import study
 from tests.runs import CARGO

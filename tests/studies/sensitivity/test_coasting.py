@@ -249,7 +249,7 @@ def test_too_large_a_change_is_left_out_and_so_is_its_share_of_all_means():
     coasted = study_coast(CARGO, coast_from(CARGO, 8.2))
     length = of(coasted, 'length_m')
     assert np.isnan(length[3])  # half as long, the Froude number leaves the baseline
-    np.testing.assert_allclose(coasted.mean, coasted.losses.table[:, :3].mean(axis=1))
+    np.testing.assert_allclose(coasted.losses.mean, coasted.losses.table[:, :3].mean(axis=1))
 
 
 def test_a_table_of_resistance_and_a_ship_without_sd():

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SensitivityError
-from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import Manoeuvre, steer, turn, zigzag
-from shipdrag_ros.studies.sensitivity.face import coasting, steering
-from shipdrag_ros.studies.sensitivity.face import steering as words
+from shipdrag_ros.studies.manoeuvring import FORM, Manoeuvre, mariner, steer, turn, zigzag
+from shipdrag_ros.studies.sensitivity.face import coasting
+from shipdrag_ros.studies.sensitivity.face import verb as steering
+from shipdrag_ros.studies.sensitivity.face import verb as words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     DESIGN,

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.studies.manoeuvring.ship import FORM
+from shipdrag_ros.studies.manoeuvring import FORM
 
 CHANGES = {'+10', '-10', '+50', '-50', 'mean'}
 

@@ -31,24 +31,10 @@ from shipdrag_ros.cli.arguments import add, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, one_axis, styled
-from shipdrag_ros.studies.cable.drag import (
-    LONGEST,
-    PUBLISHED_RANGE,
-    SHORTEST,
-    Cable,
-    CableSurface,
-    Tangent,
-    compare_errors,
-    drag_coefficient,
-    naive_error,
-    naive_range_m_s,
-    tangent_error,
-    tangent_range,
-)
+from shipdrag_ros.studies.cable import drag
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LINES: dict[str, dict[str, Any]] = {
@@ -56,24 +42,24 @@ LINES: dict[str, dict[str, Any]] = {
     'C V': {'color': GREEN, 'linestyle': ':'},
     'tangent': {'color': VERMILION, 'linestyle': '--'},
 }
-SURFACES: dict[CableSurface, dict[str, Any]] = {
-    CableSurface.SMOOTH: {'color': BLUE, 'linestyle': '-'},
-    CableSurface.ROUGH: {'color': VERMILION, 'linestyle': '--'},
+SURFACES: dict[drag.CableSurface, dict[str, Any]] = {
+    drag.CableSurface.SMOOTH: {'color': BLUE, 'linestyle': '-'},
+    drag.CableSurface.ROUGH: {'color': VERMILION, 'linestyle': '--'},
 }
 RANGE_COLOR = '#eef3f7'
 _HIGHEST_U = 2.5
 
 
-def coefficient_picture(cable: Cable) -> Figure:
+def coefficient_picture(cable: drag.Cable) -> Figure:
     """
     Draw C0 against l/d, with the place of a cable in it.
     """
     with one_axis(9.0, 3.4) as (figure, axis):
-        slenderness = np.geomspace(SHORTEST, LONGEST, 200)
+        slenderness = np.geomspace(drag.SHORTEST, drag.LONGEST, 200)
         for surface, style in SURFACES.items():
             axis.semilogx(
                 slenderness,
-                drag_coefficient(slenderness, surface),
+                drag.drag_coefficient(slenderness, surface),
                 label=f'{surface} cylinder',
                 **style,
             )
@@ -83,27 +69,27 @@ def coefficient_picture(cable: Cable) -> Figure:
     return figure
 
 
-def tangent_picture(tangent: Tangent, tolerance: float) -> Figure:
+def tangent_picture(tangent: drag.Tangent, tolerance: float) -> Figure:
     """
     Draw drag and lines over the speed, and below it what the lines err.
     """
     v0 = tangent.speed_m_s
-    low, high = tangent_range(tolerance)
+    low, high = drag.tangent_range(tolerance)
     u = np.linspace(0.0, _HIGHEST_U, 251)
     speed = u * v0
     with styled():
         figure = new_figure(9.0, 6.0)
         top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        drag = tangent.drag.force_n(speed)
+        force = tangent.drag.force_n(speed)
         per_unit = tangent.drag.force_n(np.ones(1))  # C of C V: its force at 1 m/s
-        top.plot(speed, drag, label='drag, C V²', **LINES['C V²'])
+        top.plot(speed, force, label='drag, C V²', **LINES['C V²'])
         top.plot(speed, tangent.force_n(speed), label='tangent at V0', **LINES['tangent'])
         top.plot(speed, per_unit * speed, label='C V', **LINES['C V'])
         top.plot([v0], [tangent.drag_n], 'o', color='#1a1a1a', label=f'V0 = {v0:g} m/s')
-        top.set(ylim=(-1.1 * tangent.drag_n, 1.05 * float(drag[-1])), ylabel='force [N]')
+        top.set(ylim=(-1.1 * tangent.drag_n, 1.05 * float(force[-1])), ylabel='force [N]')
         moving, its_u = speed[1:], u[1:]
-        bottom.plot(moving, 100.0 * tangent_error(its_u), **LINES['tangent'])
-        bottom.plot(moving, 100.0 * naive_error(moving), **LINES['C V'])
+        bottom.plot(moving, 100.0 * drag.tangent_error(its_u), **LINES['tangent'])
+        bottom.plot(moving, 100.0 * drag.naive_error(moving), **LINES['C V'])
         bottom.axhline(0.0, color=BLUE, linewidth=1.0)
         bottom.set(
             ylim=(-105.0, 105.0),
@@ -112,13 +98,10 @@ def tangent_picture(tangent: Tangent, tolerance: float) -> Figure:
             xlim=(0.0, speed[-1]),
         )
         for axis in (top, bottom):
-            _shade(axis, low * v0, min(high * v0, speed[-1]))
+            span = low * v0, min(high * v0, speed[-1])
+            axis.axvspan(*span, color=RANGE_COLOR, zorder=0, label='where the tangent may be used')
         top.legend(loc='upper left')
     return figure
-
-
-def _shade(axis: Axes, low: float, high: float) -> None:
-    axis.axvspan(low, high, color=RANGE_COLOR, zorder=0, label='where the tangent may be used')
 
 
 _FORMULAS = (
@@ -149,8 +132,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     surface.add_argument(
         '--rough',
         action='store_const',
-        const=CableSurface.ROUGH,
-        default=CableSurface.SMOOTH,
+        const=drag.CableSurface.ROUGH,
+        default=drag.CableSurface.SMOOTH,
         dest='drag',
     )
     surface.add_argument('--c0', type=number(0.0, 10.0, above=True), metavar='X', dest='drag')
@@ -168,27 +151,22 @@ def run(options: argparse.Namespace) -> int:
     Compute and show it.
     """
     output = Output(options.json)
-    cable = Cable(options.length, options.diameter, options.drag)
-    tangent = Tangent(cable.in_water(options.density), options.speed)
+    cable = drag.Cable(options.length, options.diameter, options.drag)
+    tangent = drag.Tangent(cable.in_water(options.density), options.speed)
     show(output, shown(cable, tangent, options.tolerance), options.report)
-    output.json(document(cable, tangent, options.tolerance))
+    output.json(
+        {  # ranges and rows are in u = V/V0
+            'c0': cable.c0,
+            'drag_n': tangent.drag_n,
+            'linear_gain_n_per_m_s': tangent.gain_n_per_m_s,
+            'linear_range': drag.tangent_range(options.tolerance),
+            'errors': drag.compare_errors(tangent.speed_m_s, options.tolerance),
+        }
+    )
     return 0
 
 
-def document(cable: Cable, tangent: Tangent, tolerance: float) -> dict[str, Any]:
-    """
-    Return the document of a cable; ranges and rows are in u = V/V0.
-    """
-    return {
-        'c0': cable.c0,
-        'drag_n': tangent.drag_n,
-        'linear_gain_n_per_m_s': tangent.gain_n_per_m_s,
-        'linear_range': tangent_range(tolerance),
-        'errors': compare_errors(tangent.speed_m_s, tolerance),
-    }
-
-
-def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
+def shown(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Presentation:
     """
     Return what is printed, and shown on a page.
 
@@ -218,7 +196,7 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
     on_a_ship = f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...'
     return Presentation(
         'Drag of a towed cable, and a line in place of it',
-        f'{sentence(cable, tangent)} {line(tangent, tolerance)}',
+        sentence(cable, tangent, tolerance),
         [
             Section(_LINES, tables=tables),
             Section('Before it is used', lines=(*notes(cable), on_a_ship)),
@@ -229,39 +207,33 @@ def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
     )
 
 
-def sentence(cable: Cable, tangent: Tangent) -> str:
+def sentence(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> str:
     """
-    Say what the drag is.
+    Say what the drag is, which line may replace it, and where.
     """
     kind = (
-        f'{cable.drag} cable' if isinstance(cable.drag, CableSurface) else 'cable with a stated C0'
+        f'{cable.drag} cable'
+        if isinstance(cable.drag, drag.CableSurface)
+        else 'cable with a stated C0'
     )
-    return (
-        f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
-        f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N.'
-    )
-
-
-def line(tangent: Tangent, tolerance: float) -> str:
-    """
-    Say which line may replace the drag, and where.
-    """
-    low, high = tangent_range(tolerance)
+    low, high = drag.tangent_range(tolerance)
     upward = f'to {high * tangent.speed_m_s:.4g} m/s (u = V/V0 from {low:.4f} to {high:.4f})'
     if not math.isfinite(high):
         upward = f'on (u = V/V0 from {low:.4f}, without upper end)'
     return (
+        f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
+        f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N. '
         f'The tangent R = {tangent.gain_n_per_m_s:.4g} N/(m/s) V - {tangent.drag_n:.4g} N is '
         f'within {100.0 * tolerance:.3g} % of it from {low * tangent.speed_m_s:.4g} m/s {upward}; '
         'it is never above it.'
     )
 
 
-def facts(cable: Cable, tangent: Tangent, tolerance: float) -> Table:
+def facts(cable: drag.Cable, tangent: drag.Tangent, tolerance: float) -> Table:
     """
     Show the figures of a cable.
     """
-    low, high = tangent_range(tolerance)
+    low, high = drag.tangent_range(tolerance)
     v0, percent = tangent.speed_m_s, f'{100.0 * tolerance:.3g} %'
     return Table(
         ('', ''),
@@ -274,16 +246,16 @@ def facts(cable: Cable, tangent: Tangent, tolerance: float) -> Table:
             ('slope of the tangent', f'{tangent.gain_n_per_m_s:.5g} N/(m/s)'),
             (f'tangent within {percent}, u = V/V0', _between(low, high)),
             (f'tangent within {percent}, V', f'{_between(low * v0, high * v0)} m/s'),
-            (f'C V within {percent}, V', f'{_between(*naive_range_m_s(tolerance))} m/s'),
+            (f'C V within {percent}, V', f'{_between(*drag.naive_range_m_s(tolerance))} m/s'),
         ),
     )
 
 
-def errors(tangent: Tangent, tolerance: float) -> Table:
+def errors(tangent: drag.Tangent, tolerance: float) -> Table:
     """
     Show what the lines err at speeds about V0.
     """
-    u, naive, touching = compare_errors(tangent.speed_m_s, tolerance).T
+    u, naive, touching = drag.compare_errors(tangent.speed_m_s, tolerance).T
     return by_columns(
         {
             'u = V/V0': (f'{each:.4f}' for each in u),
@@ -294,12 +266,14 @@ def errors(tangent: Tangent, tolerance: float) -> Table:
     )
 
 
-def notes(cable: Cable) -> tuple[str, ...]:
+def notes(cable: drag.Cable) -> tuple[str, ...]:
     """
     Say what has to be known before the figures are used.
     """
-    low, high = PUBLISHED_RANGE
-    at_low, at_high = (f'{100.0 * float(tangent_error(u)):.1f} %' for u in PUBLISHED_RANGE)
+    low, high = drag.PUBLISHED_RANGE
+    at_low, at_high = (
+        f'{100.0 * float(drag.tangent_error(u)):.1f} %' for u in drag.PUBLISHED_RANGE
+    )
     return (
         *(f'WARNING: {warning}' for warning in cable.warnings),
         f'The source states 10 % for u from {low:g} to {high:g}; by its own formula the tangent '

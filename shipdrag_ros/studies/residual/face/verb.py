@@ -43,10 +43,10 @@ from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.sources.formats.csv.table import read_numbers
+from shipdrag_ros.sources.formats.csv.table import Numbers, read_numbers
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.residual import fit
-from shipdrag_ros.studies.residual.baseline import with_residual
+from shipdrag_ros.studies.residual.fit import with_residual
 from shipdrag_ros.studies.surface.face import verb
 from shipdrag_ros.studies.surface.fit import Prediction
 
@@ -54,6 +54,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FIT = 'The fit'
+_ABOUT = (
+    'is residual resistance, in the measure of the data: what is left when friction '
+    'is taken away, mostly waves. It is a sum of the terms in the table below, each times its '
+    'coefficient. L, B and T are length, breadth and draught, C_B is the block coefficient, '
+    'lcb the place of the centre of buoyancy, psi the slenderness L / V^(1/3), Fr the Froude '
+    'number of the length (Fr_V: of V^(1/3), V the displaced volume).'
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,19 +89,17 @@ def run(options: argparse.Namespace) -> int:
             '--lcb', ['is of the ship of --ship FILE; give it too, or leave --lcb out']
         )
     ship = None if options.ship is None else Ship.load(options.ship)
-    needed: tuple[str, ...] = fit.REQUIRED
-    if options.form != fit.AUTO and fit.FORMS[options.form].needs_lcb:
-        needed = (*fit.REQUIRED, 'lcb')
     if options.target in (*fit.REQUIRED, *fit.OPTIONAL):
         raise DataError(
             '--target',
             [f'{options.target!r} is a ratio of the hull; name the column of its resistance'],
         )
-    table = read_numbers(options.data, (*needed, options.target), optional=fit.OPTIONAL)
-    hulls = fit.Hulls.of(str(options.data), table.names, table.values)
+    table, hulls = _read(options.data, fit.FORMS.get(options.form), options.target)
     values = table.column(options.target)
     found = fit.fit_residual(hulls, values, form=options.form)
-    predictions = [] if options.predict is None else _predictions(options.predict, found)
+    predictions = []
+    if options.predict is not None:
+        predictions = found.predict(_read(options.predict, found.form)[1])
     source = f'{options.data.name}, {len(values)} rows'
     seen = shown(found, predictions, values, target=options.target, source=source)
     show(output, seen, options.report)
@@ -106,10 +111,11 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _predictions(path: Path, found: fit.ResidualFit) -> list[Prediction]:
-    needed = (*fit.REQUIRED, 'lcb') if found.form.needs_lcb else fit.REQUIRED
-    table = read_numbers(path, needed, optional=fit.OPTIONAL)
-    return found.predict(fit.Hulls.of(str(path), table.names, table.values))
+def _read(path: Path, form: fit.RegressionForm | None, *more: str) -> tuple[Numbers, fit.Hulls]:
+    """Read hulls with all that a form needs of them."""
+    needed = (*fit.REQUIRED, 'lcb') if form is not None and form.needs_lcb else fit.REQUIRED
+    table = read_numbers(path, (*needed, *more), optional=fit.OPTIONAL)
+    return table, fit.Hulls.of(str(path), table.names, table.values)
 
 
 def shown(
@@ -159,7 +165,7 @@ def shown(
         f'{target} by ratios of the hull',
         sentence(found, target, predictions),
         [
-            Section(text=(technical(found), what_it_is(target))),
+            Section(text=(technical(found), f'{target} {_ABOUT}')),
             Section(
                 'What these data can and cannot show' if found.notes else '', lines=found.notes
             ),
@@ -195,24 +201,6 @@ def technical(found: fit.ResidualFit) -> str:
     return (
         f'Residual criterion F = {found.criterion:.4g}; the data determine {rank} of {count} '
         f'terms{open_ones}; condition {found.fit.condition:.2g}.'
-    )
-
-
-def what_it_is(target: str) -> str:
-    """
-    Say what is fitted, and what the terms are made of.
-
-    Parameters
-    ----------
-    target
-        Name of what was measured.
-    """
-    return (
-        f'{target} is residual resistance, in the measure of the data: what is left when friction '
-        'is taken away, mostly waves. It is a sum of the terms in the table below, each times its '
-        'coefficient. L, B and T are length, breadth and draught, C_B is the block coefficient, '
-        'lcb the place of the centre of buoyancy, psi the slenderness L / V^(1/3), Fr the Froude '
-        'number of the length (Fr_V: of V^(1/3), V the displaced volume).'
     )
 
 

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_PALE = '#c3d3df'
+PALE = '#c3d3df'
 
 
 def particulars_picture(found: CoastStudy) -> Figure:
     """
     Draw the change of the record by each value, the largest on top.
     """
-    order = (*found.selection.kept, *found.selection.dropped)
-    table = found.losses.table[[found.losses.names.index(name) for name in order]]
+    order = found.losses.ranking
+    table = found.losses.table[found.losses.order]
     places = np.arange(len(order))[::-1]
     with one_axis(9.0, 0.8 + 0.28 * len(order)) as (figure, axis):
         axis.barh(
-            places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
+            places, table[:, :2].mean(axis=1), color=PALE, height=0.7, label='10 per cent wrong'
         )
         axis.barh(
             places,
@@ -167,10 +167,9 @@ def loss_table(found: CoastStudy) -> Table:
     """
     Show what each value does, the most important first.
     """
-    order = [*found.selection.kept, *found.selection.dropped]
-    places = [found.losses.names.index(name) for name in order]
-    changed = found.losses.table[places]
-    ranked = [found.importance[place] for place in places]
+    order = found.losses.ranking
+    changed = found.losses.table[found.losses.order].T
+    ranked = [found.importance[place] for place in found.losses.order]
     stated = [one.particular for one in ranked]
     heads = ('+10 %', '-10 %', '+50 %', '-50 %', '+1 sd')
     return by_columns(
@@ -178,7 +177,7 @@ def loss_table(found: CoastStudy) -> Table:
             '': order,
             'value': ('-' if math.isnan(one.value) else f'{one.value:.4g}' for one in stated),
             'sd': ('-' if math.isnan(one.sd) else f'{one.sd:.1%}' for one in stated),
-            **{head: map(_number, column) for head, column in zip(heads, changed.T)},
+            **{head: map(_number, column) for head, column in zip(heads, changed)},
             'estimated r': (f'{one.estimated:.2%}' for one in ranked),
             'stated r': (f'{one.stated:.2%}' for one in ranked),
             'know within': (_tolerable(one.tolerable) for one in ranked),

@@ -26,23 +26,319 @@ Options
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.face import Presentation, show
-from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.manoeuvring.simulate import parse
+from shipdrag_ros.studies.face import Presentation, by_columns, show
+from shipdrag_ros.studies.manoeuvring import Motions, mariner, meaning, parse
 from shipdrag_ros.studies.sensitivity.coasting import (
     KIND,
     SPEED_FRACTION,
     parse_coast,
     study_coast,
 )
-from shipdrag_ros.studies.sensitivity.face import coasting, steering
-from shipdrag_ros.studies.sensitivity.steering import experiment, study
+from shipdrag_ros.studies.sensitivity.face import coasting
+from shipdrag_ros.studies.sensitivity.steering import (
+    APPROACH_S,
+    CONTROL_S,
+    Experiment,
+    Observations,
+    ReducedModelCheck,
+    SteeringStudy,
+    experiment,
+    study,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def ranking_picture(found: SteeringStudy) -> Figure:
+    """
+    Draw the mean losses of all derivatives, the largest first.
+    """
+    losses, order = found.losses, found.losses.ranking
+    places = np.arange(len(order))[::-1]
+    with one_axis(9.0, 0.8 + 0.2 * len(order)) as (figure, axis):
+        count = len(found.selection.kept)
+        for part, color, label in (
+            (slice(0, count), BLUE, 'kept'),
+            (slice(count, None), coasting.PALE, 'set to 0'),
+        ):
+            axis.barh(places[part], losses.mean[losses.order][part], color=color, label=label)
+        axis.plot(
+            found.mean_norms.mean[losses.order],
+            places,
+            linestyle='none',
+            marker='|',
+            color=VERMILION,
+            label='by the mean norm',
+        )
+        if found.selection.threshold > 0.0:
+            axis.axvline(found.selection.threshold, color='#555555', linewidth=0.8)
+        axis.set_xscale('log')
+        axis.set_yticks(places, [f'{meaning(name)}  {name}' for name in order], fontsize=8)
+        axis.set(ylim=(-0.7, len(order) - 0.3), xlabel='mean loss [of the speed: 0.1 is a tenth]')
+        axis.grid(visible=False, axis='y')
+        axis.legend(loc='lower right')
+    return figure
+
+
+def check_picture(found: SteeringStudy) -> Figure:
+    """
+    Draw heading and rudder, speeds and yaw rate of the full and the reduced models.
+    """
+    full, kept = found.check.full, found.check.reduced
+    by_group = found.group_check.reduced
+    lines: Sequence[tuple[Motions, str, str, str]] = (
+        (full, 'full', '#444444', '-'),
+        (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
+        (by_group, f'{found.independent} measurements kept', BLUE, ':'),
+    )
+    with styled():
+        figure = new_figure(9.0, 5.2)
+        axes = figure.subplots(2, 2, sharex=True)
+        for motion, label, color, style in lines:
+            surge, sway, yaw = motion.speeds.T
+            for axis, name, values in (
+                (axes[0, 0], 'heading [deg]', np.degrees(motion.heading_rad)),
+                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(yaw)),
+                (axes[1, 0], 'speed ahead u [m/s]', surge),
+                (axes[1, 1], 'sway v [m/s]', sway),
+            ):
+                axis.plot(motion.time_s, values, color=color, linestyle=style, label=label)
+                axis.set_ylabel(name)
+        for axis in axes[1]:
+            axis.set_xlabel('time after the first order [s]')
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc='outside upper center', ncols=len(labels))
+    return figure
+
+
+def design_picture(shown: Experiment) -> Figure:
+    """
+    Draw the losses of all derivatives in all manoeuvres as a map.
+    """
+    from matplotlib.colors import LogNorm
+
+    manoeuvres = [manoeuvre.name for manoeuvre in shown.manoeuvres]
+    with one_axis(9.0, 3.0, {'axes.grid': False}) as (figure, axis):
+        largest = float(np.max(shown.loss))
+        image = axis.imshow(
+            np.maximum(shown.loss.T, 1e-5 * largest),
+            norm=LogNorm(1e-4 * largest, largest),
+            cmap='Blues',
+            aspect='auto',
+        )
+        best = np.argmax(shown.loss, axis=1)
+        axis.plot(
+            np.arange(len(best)), best, linestyle='none', marker='o', color=ORANGE, markersize=4
+        )
+        axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
+        axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
+        axis.set(xlabel='derivative', ylabel='manoeuvre')
+        figure.colorbar(image, label='loss of 10 %\n[of the speed]')
+    return figure
+
+
+LOSSES = (
+    'Loss by a derivative that is 10 or 50 per cent wrong: root mean square of the differences in '
+    'u, v and r, times 1000'
+)
+CHECK = (
+    f'The check; rudder amidships for {APPROACH_S:g} s, then first to starboard, the helmsman '
+    f'looks every {CONTROL_S:g} s; differences over the whole manoeuvre'
+)
+DESIGN = (
+    'Which manoeuvre shows which derivative: loss of 10 per cent, times 1000. Partial '
+    'contribution: the part of it that is orthogonal to the responses of all others'
+)
+
+MEANINGS = 'What the derivatives are: which force, and what it grows with'
+
+_RANKING, _CHECKED, _SAILED = (
+    'How much each matters',
+    'The model without the others',
+    'Which manoeuvre to sail',
+)
+
+
+def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    found
+        The losses and the reduced model.
+    sailed
+        Of several manoeuvres.
+    """
+
+    def pictures() -> Iterator[tuple[str, Figure, str]]:
+        ranking = (
+            'How much the motion changes when a derivative is wrong: the longer the bar, the '
+            'better it must be known. Pale bars, short of the line, may be left out of the model.'
+        )
+        yield _RANKING, ranking_picture(found), ranking
+        checked = (
+            f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
+            'on each other show that what was left out is not missed.'
+        )
+        yield _CHECKED, check_picture(found), checked
+        design = (
+            'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better it '
+            'is seen. Dot: the manoeuvre that shows it best.'
+        )
+        yield _SAILED, design_picture(sailed), design
+
+    order = found.losses.ranking
+    meanings = {'derivative': order, 'what it is': map(meaning, order)}
+    return Presentation(
+        f'Which derivatives matter: {found.ship.name}',
+        sentence(found),
+        [
+            Section(lines=notes(found)),
+            Section(_RANKING, tables=((LOSSES, loss_table(found)),)),
+            Section(_CHECKED, tables=((CHECK, check_table(found)),)),
+            Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
+            Section('What the names mean', tables=((MEANINGS, by_columns(meanings)),)),
+        ],
+        pictures(),
+        source=found.ship.source,
+    )
+
+
+def sentence(found: SteeringStudy) -> str:
+    """
+    Say what is kept.
+    """
+    kept, dropped = found.selection.kept, found.selection.dropped
+    return (
+        f'{found.ship.name}, {found.manoeuvre.name}: of {len(kept) + len(dropped)} derivatives '
+        f'{len(kept)} have a mean loss above {found.selection.threshold:.3g} and are kept; '
+        f'{kept[0]} ({meaning(kept[0])}) matters most.'
+    )
+
+
+def notes(found: SteeringStudy) -> tuple[str, ...]:
+    """
+    Say what was done, what the losses look like, and what the number kept means.
+    """
+    root, mean = Observations.of(found.losses), Observations.of(found.mean_norms)
+    agree = 'the same' if found.norms_agree else 'not quite the same'
+    ship, kept = found.ship, found.selection.kept
+    after = sum(ship.multiples.get(name) in kept for name in found.selection.dropped)
+    return (
+        'A derivative says how much of a force or moment (X ahead, Y sideways, N turning) comes '
+        'with a motion (u change of speed, v sway, r yaw) or with the rudder (d). The loss is how '
+        'far the manoeuvre moves when it is wrong, as a part of the speed.',
+        'One derivative is changed at a time, all simulations in one call: from steady sailing, '
+        'first to starboard, the rudder reversed at the very heading, 1200 samples 0.5 s apart; '
+        f'u and v over {ship.speed_m_s:g} m/s, r over speed per length.',
+        f'+10 and -10 % differ by {root.unlike[0]:.1%} (median), +50 and -50 % by '
+        f'{root.unlike[1]:.1%}; 50 % costs {root.growth:.2f} times 10 %. Of the mean norm: '
+        f'{mean.unlike[0]:.1%}, {mean.unlike[1]:.1%}, {mean.growth:.2f}; it keeps {agree} '
+        f'{len(kept)}.',
+        f'{len(ship.multiples)} of the {len(ship.viscous)} derivatives are exact multiples of '
+        f'others, so that the model is {len(ship.groups)} measurements: the {len(kept)} kept hold '
+        f'{found.independent} of them, and {after} of the dropped ones follow from a kept one.',
+        f'Chosen by measurement, with all that follows from each, the same {found.independent} '
+        f'are {len(found.group_derivatives)} derivatives; the check shows which of the two models '
+        'is closer.',
+    )
+
+
+def loss_table(found: SteeringStudy) -> Table:
+    """
+    Show the losses, the most important derivative first.
+    """
+    order = found.losses.ranking
+    table = np.column_stack([found.losses.table, found.losses.mean, found.mean_norms.mean])
+    heads = ('+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm')
+    return by_columns(
+        {
+            '': order,
+            **{
+                head: [f'{1e3 * value:.3f}' for value in column]
+                for head, column in zip(heads, table[found.losses.order].T)
+            },
+            'kept': ('yes' if name in found.selection.kept else 'no' for name in order),
+            'multiple of': (found.ship.multiples.get(name, '-') for name in order),
+        }
+    )
+
+
+def check_table(found: SteeringStudy) -> Table:
+    """
+    Show how close the reduced models come.
+    """
+    ship, kept = found.ship, found.selection.kept
+    rows = [
+        ('full', f'{len(ship.viscous)}', f'{len(ship.groups)}', *_degrees(found.check, 0)),
+        ('kept', f'{len(kept)}', f'{found.independent}', *_degrees(found.check, 1)),
+        (
+            'kept by measurement',
+            f'{len(found.group_derivatives)}',
+            f'{found.independent}',
+            *_degrees(found.group_check, 1),
+        ),
+    ]
+    heads = (
+        found.check.manoeuvre.name,
+        'derivatives',
+        'measurements',
+        'overshoot 1 [deg]',
+        'overshoot 2 [deg]',
+        'rms u [m/s]',
+        'v [m/s]',
+        'r [deg/s]',
+        'heading [deg]',
+    )
+    return Table(heads, tuple(rows))
+
+
+def _degrees(check: ReducedModelCheck, model: int) -> tuple[str, ...]:
+    over = [f'{value:.2f}' for value in np.degrees(check.overshoots_rad[model])]
+    over += ['-'] * (2 - len(over))
+    if model == 0:
+        return (*over, '-', '-', '-', '-')
+    surge, sway, yaw, heading = check.rms_difference.values()
+    return (
+        *over,
+        f'{surge:.3f}',
+        f'{sway:.3f}',
+        f'{np.degrees(yaw):.3f}',
+        f'{np.degrees(heading):.2f}',
+    )
+
+
+def design_table(shown: Experiment) -> Table:
+    """
+    Show which manoeuvre makes which derivative visible.
+    """
+    there = shown.partial_contribution[np.arange(len(shown.names)), np.argmax(shown.loss, axis=1)]
+    return by_columns(
+        {
+            '': shown.names,
+            **{
+                manoeuvre.name: [f'{1e3 * value:.2f}' for value in column]
+                for manoeuvre, column in zip(shown.manoeuvres, shown.loss.T)
+            },
+            'shown most by': (manoeuvre.name for manoeuvre in shown.best),
+            'partial contribution there': (f'{value:.1%}' for value in there),
+            'in all together': (f'{value:.1%}' for value in shown.partial_contribution_together),
+        }
+    )
+
 
 _MODELS = {'mariner': mariner}
 _MODEL, _MANOEUVRE, _KEEP, _FRACTION = 'mariner', 'zigzag:15', 24, SPEED_FRACTION
@@ -66,22 +362,18 @@ def run(options: argparse.Namespace) -> int:
     Analyse and show it.
     """
     output = Output(options.json)
-    shown, document = (_steering if options.ship is None else _coasting)(options)
-    show(output, shown, options.report)
+    asked, keep = options.manoeuvre, options.keep
+    if options.ship is None:
+        model = _MODELS[options.model or _MODEL]()
+        manoeuvre = parse(_MANOEUVRE if asked is None else asked)
+        steered = study(model, manoeuvre, keep=_KEEP if keep is None else keep)
+        sailed = experiment(model)
+        seen = shown(steered, sailed)
+        document = {**steered.to_dict(), 'experiment': sailed.to_dict()}
+    else:
+        ship = Ship.load(options.ship)
+        coasted = study_coast(ship, parse_coast(ship, KIND if asked is None else asked), keep=keep)
+        seen, document = coasting.shown(coasted), coasted.to_dict()
+    show(output, seen, options.report)
     output.json(document)
     return 0
-
-
-def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
-    ship = _MODELS[options.model or _MODEL]()
-    manoeuvre = parse(_MANOEUVRE if options.manoeuvre is None else options.manoeuvre)
-    found = study(ship, manoeuvre, keep=_KEEP if options.keep is None else options.keep)
-    sailed = experiment(ship)
-    return steering.shown(found, sailed), {**found.to_dict(), 'experiment': sailed.to_dict()}
-
-
-def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
-    ship = Ship.load(options.ship)
-    asked = KIND if options.manoeuvre is None else options.manoeuvre
-    found = study_coast(ship, parse_coast(ship, asked), keep=options.keep)
-    return coasting.shown(found), found.to_dict()

@@ -144,8 +144,14 @@ def run(options: argparse.Namespace) -> int:
     inputs, target = options.inputs, options.target
     if target in inputs:
         raise DataError('--target', [f'{target!r} is one of the inputs too; name another column'])
-    if options.export is not None:
-        _check_names((*inputs, target))
+    if options.export is not None and (
+        problems := [
+            f'{name!r} is no name in Python; rename the column'
+            for name in (*inputs, target)
+            if not name.isidentifier() or keyword.iskeyword(name)
+        ]
+    ):
+        raise DataError('--export', problems)
     data = read_numbers(options.data, (*inputs, target))
     points, values = data.values[:, :-1], data.values[:, -1]
     found = fit_surface(points, values, inputs=inputs, max_degree=options.max_degree)
@@ -159,7 +165,7 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'function in {options.export}')
     content = document(found)
     if asked is not None:
-        slopes = found.polynomial.gradient(asked).tolist()
+        slopes = found.polynomial.gradient(asked)
         content['predictions'] = [
             {**each, 'gradient': dict(zip(inputs, slope))}
             for each, slope in zip(prediction_documents(predictions), slopes)
@@ -173,22 +179,13 @@ def document(found: Surface) -> dict[str, Any]:
     Return the document of a surface.
     """
     table = found.table
-    columns = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
+    tried = (table.coefficients, table.sse, np.sqrt(table.variance), table.f, table.p)
+    terms = (found.polynomial.powers, found.coefficients, found.sd)
+    heads = ('degree', 'terms', 'sse', 'rmse', 'f', 'p')
     return {
         'degree': found.degree,
-        'table': [
-            dict(zip(('degree', 'terms', 'sse', 'rmse', 'f', 'p'), row))
-            for row in zip(
-                found.degrees,
-                *(each.tolist() for each in columns),
-            )
-        ],
-        'coefficients': [
-            {'powers': powers, 'value': value, 'sd': sd}
-            for powers, value, sd in zip(
-                found.polynomial.powers.tolist(), found.coefficients.tolist(), found.sd.tolist()
-            )
-        ],
+        'table': [dict(zip(heads, row)) for row in zip(found.degrees, *tried)],
+        'coefficients': [dict(zip(('powers', 'value', 'sd'), row)) for row in zip(*terms)],
         'domain': found.domain.ranges,
         'notes': found.notes,
     }
@@ -198,15 +195,8 @@ def prediction_documents(found: Sequence[Prediction]) -> list[dict[str, Any]]:
     """
     Return the documents of predictions.
     """
-    return [
-        {
-            'value': each.value,
-            'sd': each.sd,
-            'inside': each.inside,
-            'reasons': list(each.reasons),
-        }
-        for each in found
-    ]
+    keys = ('value', 'sd', 'inside', 'reasons')
+    return [{key: getattr(each, key) for key in keys} for each in found]
 
 
 def shown(
@@ -269,16 +259,6 @@ def _names(text: str) -> tuple[str, ...]:
             f'{text!r}, expected different columns separated by commas'
         )
     return names
-
-
-def _check_names(names: Sequence[str]) -> None:
-    problems = [
-        f'{name!r} is no name in Python; rename the column'
-        for name in names
-        if not name.isidentifier() or keyword.iskeyword(name)
-    ]
-    if problems:
-        raise DataError('--export', problems)
 
 
 def degrees_table(surface: Surface) -> Table:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.live.trace import COARSE_S, FINE_S, LONGEST_S, Trace, TraceRow
+from shipdrag_ros.live.figures import COARSE_S, FINE_S, LONGEST_S, Trace, TraceRow
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 START_S = 1_700_000_000

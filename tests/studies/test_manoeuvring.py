@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Batched manoeuvres against an integration that shares no code with them."""
+"""Ships that are steered: values, published figures, and an integration of their own."""
 
 from __future__ import annotations
 
+import csv
+import os
 from dataclasses import replace
 from math import isinf
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +16,117 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
-from shipdrag_ros.studies.manoeuvring.simulate import Side, steer, turn, zigzag
+from shipdrag_ros.studies.manoeuvring import (
+    FORM,
+    Side,
+    mariner,
+    overshoots_rad,
+    parse,
+    steer,
+    turn,
+    zigzag,
+)
+
+
+def test_the_form_has_forty_derivatives_and_the_file_a_value_of_each():
+    ship = mariner()
+    assert [sum(name[0] == axis for name in FORM) for axis in 'XYN'] == [10, 15, 15]
+    assert set(ship.viscous) == set(FORM)
+    np.testing.assert_array_equal(ship.values, [ship.viscous[name] for name in FORM])
+
+
+def test_fourteen_are_exact_multiples_of_others_and_belong_to_the_same_force():
+    ship = mariner()
+    assert len(ship.multiples) == 14
+    for name, other in ship.multiples.items():
+        ratio = ship.viscous[name] / ship.viscous[other]
+        assert name[0] == other[0]
+        assert ratio == pytest.approx(round(ratio), rel=1e-12)
+    assert len(ship.groups) == 26
+    assert sorted(sum(ship.groups, ())) == sorted(FORM)
+
+
+def test_a_published_table_has_the_same_values():
+    folder = os.environ.get('SHIPDRAG_DATA')
+    if not folder:
+        pytest.skip('SHIPDRAG_DATA is not set')
+    ship = mariner()
+    stated = {**ship.viscous, **vars(ship.inertial)}
+    with (Path(folder) / 'mariner_derivatives.csv').open(encoding='utf-8') as file:
+        table = {
+            row['derivative']: float(row['value']) * float(row['unit_factor'])
+            for row in csv.DictReader(file)
+        }
+    assert set(table) == set(stated)
+    for name, value in table.items():
+        assert stated[name] == pytest.approx(value, rel=1e-12), name
+
 
 SHIP = mariner()
+
+
+APPROACH_S = 10.0  # rudder amidships, then the first order: as the published figures count
+
+
+@pytest.mark.parametrize(
+    ('angle', 'to_starboard', 'to_port'), [(15, 6.79, 5.61), (20, 7.79, 6.35), (25, 8.85, 7.01)]
+)
+def test_zigzags_overshoot_as_published_to_the_last_digit(angle, to_starboard, to_port):
+    # first to starboard, the helmsman looks every 0.1 s; the largest to each side is meant: of
+    # 15/15 to starboard the third
+    manoeuvre = zigzag(angle)
+    motion = steer(SHIP, manoeuvre, approach_s=APPROACH_S)[0]
+    over = np.degrees(overshoots_rad(motion, manoeuvre))
+    assert max(over[::2]) == pytest.approx(to_starboard, abs=0.006)
+    assert max(over[1::2]) == pytest.approx(to_port, abs=0.006)
+    # without the approach the looks fall otherwise, and one look is worth 0.1 degrees
+    prompt = np.degrees(overshoots_rad(steer(SHIP, manoeuvre)[0], manoeuvre))
+    assert 0.001 < abs(prompt[0] - over[0]) < 0.1
+
+
+def circle(motion):
+    """Advance at a change of heading by 90 degrees, tactical diameter at one by 180 [m]."""
+    turned = np.degrees(np.abs(motion.heading_rad))
+    return [
+        float(np.interp(at, turned, np.abs(way)))
+        for at, way in zip((90.0, 180.0), motion.position_m.T)
+    ]
+
+
+def test_a_turning_circle_is_as_wide_as_published():
+    motion = steer(SHIP, turn(35.0), approach_s=APPROACH_S)[0]
+    assert circle(motion) == pytest.approx([566.0, 1029.0], abs=0.5)
+    np.testing.assert_array_equal(motion.position_m[0], 0.0)
+    assert motion.rudder_rad[0] == 0.0
+    # the propeller turns her before the order
+    assert 0.0 < motion.heading_rad[0] < np.radians(1.0)
+
+
+def test_to_port_the_ship_turns_wider():
+    wide = turn(35.0, first=Side.PORT)
+    motion = steer(SHIP, wide)[0]
+    assert motion.position_m[100, 1] < 0.0
+    advance_m, diameter_m = circle(motion)
+    assert 566.0 < advance_m < 620.0
+    assert 1029.0 < diameter_m < 1100.0
+
+
+def test_overshoots_are_of_the_motion_between_its_samples():
+    manoeuvre = zigzag(20.0)
+    coarse = overshoots_rad(steer(SHIP, manoeuvre)[0], manoeuvre)
+    fine = overshoots_rad(steer(SHIP, manoeuvre, sample_s=0.1, samples=6000)[0], manoeuvre)
+    np.testing.assert_allclose(coarse, fine[: len(coarse)], rtol=0, atol=1e-5)
+
+
+def test_a_ship_that_does_not_turn_as_far_has_no_overshoot():
+    assert len(overshoots_rad(steer(SHIP, zigzag(15.0), samples=20)[0], zigzag(15.0))) == 0
+
+
+@pytest.mark.parametrize('manoeuvre', [zigzag(15.0), zigzag(7.5), turn(35.0)])
+def test_names_are_read_back(manoeuvre):
+    assert parse(manoeuvre.name) == manoeuvre
+
+
 U, L = SHIP.speed_m_s, SHIP.length_m
 EVEN = [i for i, name in enumerate(FORM) if name[1] == '0']  # alike to both sides
 

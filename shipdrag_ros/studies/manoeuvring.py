@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Manoeuvres of many ships in one compiled call."""
+"""
+Manoeuvres of many ships that are steered, in one compiled call: after Abkowitz.
+
+The values of a ship are data: derivatives of her hull, and her rudder machine. Which derivatives
+there are is the form of the model and stands in `FORM`, in the order in which the compiled
+integration takes them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
 from math import inf, isinf, radians
 from typing import NamedTuple
 
@@ -13,9 +22,142 @@ import numpy as np
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
+from shipdrag_ros.strict_yaml import load
 
-KINDS = ('zigzag', 'turn')
+# powers of the change of speed u, sway v, yaw rate r and rudder d, as the names spell them
+FORM = (
+    *('Xu', 'Xuu', 'Xuuu', 'Xvv', 'Xrr', 'Xdd', 'Xudd', 'Xrv', 'Xvd', 'Xuvd'),
+    *('Yv', 'Yr', 'Yvvv', 'Yvvr', 'Yvu', 'Yru', 'Yd', 'Yddd', 'Yud', 'Yuud', 'Yvdd', 'Yvvd'),
+    *('Y0', 'Y0u', 'Y0uu'),
+    *('Nv', 'Nr', 'Nvvv', 'Nvvr', 'Nvu', 'Nru', 'Nd', 'Nddd', 'Nud', 'Nuud', 'Nvdd', 'Nvvd'),
+    *('N0', 'N0u', 'N0uu'),
+)
+
+
+@dataclass(frozen=True)
+class RudderMachine:
+    """
+    How the rudder follows an order.
+
+    Attributes
+    ----------
+    limit_rad, rate_rad_s
+        Largest angle and rate.
+    lag_s
+        Time constant below that rate.
+    """
+
+    limit_rad: float
+    rate_rad_s: float
+    lag_s: float
+
+
+@dataclass(frozen=True)
+class AddedMasses:
+    """
+    The five inertial derivatives: surge, sway force and yaw moment by accelerations.
+    """
+
+    Xudot: float
+    Yvdot: float
+    Yrdot: float
+    Nvdot: float
+    Nrdot: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteeredShip:
+    """
+    Abkowitz's whole-ship model in surge, sway and yaw.
+
+    Attributes
+    ----------
+    name, source
+        Of the ship, and where the values come from.
+    length_m
+    speed_m_s
+        That the derivatives are about.
+    mass, yaw_inertia
+    gravity_centre
+        Ahead of amidships.
+    rudder, inertial
+    viscous
+        Forces on the hull and the rudder, by the names of `FORM`.
+    multiples
+        Derivatives that are exact multiples of another.
+
+    Notes
+    -----
+    S3; Fossen (1994). All but length, speed and rudder machine are pure numbers of the prime
+    system.
+    """
+
+    name: str
+    source: str
+    length_m: float
+    speed_m_s: float
+    mass: float
+    yaw_inertia: float
+    gravity_centre: float
+    rudder: RudderMachine
+    inertial: AddedMasses
+    viscous: Mapping[str, float]
+    multiples: Mapping[str, str]
+
+    @property
+    def values(self) -> Float64:
+        """The viscous derivatives (40,), in the order of `FORM`."""
+        return np.array([self.viscous[name] for name in FORM])
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Derivatives that are one measurement, under the first of each."""
+        return tuple(
+            (name, *(other for other in FORM if self.multiples.get(other) == name))
+            for name in FORM
+            if name not in self.multiples
+        )
+
+
+_FORCES = {'X': 'surge force', 'Y': 'sway force', 'N': 'yaw moment'}
+_MOTIONS = {'u': 'change of speed', 'v': 'sway', 'r': 'yaw', 'd': 'rudder'}
+
+
+def meaning(name: str) -> str:
+    """
+    Say in words what a derivative of the form is.
+
+    Parameters
+    ----------
+    name
+        One of `FORM`: the force, and the powers of the motions that it grows with.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.studies.manoeuvring import meaning
+    >>> meaning('Yvvr')
+    'sway force by sway² x yaw'
+    """
+    force, motions = _FORCES[name[0]], name[1:].removeprefix('0')
+    powers = {letter: motions.count(letter) for letter in dict.fromkeys(motions)}
+    product = ' x '.join(
+        _MOTIONS[letter] + {1: '', 2: '²', 3: '³'}[power] for letter, power in powers.items()
+    )
+    if name[1:2] != '0':
+        return f'{force} by {product}'
+    straight = f'{force} with the rudder amidships, sailing straight'
+    return f'{straight}, by {product}' if product else straight
+
+
+@cache
+def mariner() -> SteeredShip:
+    """
+    Return the Mariner-class ship that comes with the package.
+    """
+    file = files('shipdrag_ros').joinpath('data', 'mariner.yaml')
+    data = load(file.read_text(encoding='utf-8'))
+    rudder, inertial = RudderMachine(**data.pop('rudder')), AddedMasses(**data.pop('inertial'))
+    return SteeredShip(rudder=rudder, inertial=inertial, **data)
 
 
 class Side(StrEnum):
@@ -112,17 +254,18 @@ def parse(text: str) -> Manoeuvre:
     SimulationError
         If it is neither; how far the rudder goes is the ship's, see `steer`.
     """
-    kind, separator, size = text.partition(':')
+    kind, _, size = text.partition(':')
+    make = {'zigzag': zigzag, 'turn': turn}.get(kind)
     try:
         angle = float(size)
     except ValueError:
         angle = np.nan
-    if kind not in KINDS or not separator or not np.isfinite(angle):
+    if make is None or not np.isfinite(angle):
         raise SimulationError(
             f'manoeuvre {text!r}, expected zigzag:ANGLE or turn:ANGLE with the degrees of rudder; '
             'write zigzag:15, for instance'
         )
-    return zigzag(angle) if kind == 'zigzag' else turn(angle)
+    return make(angle)
 
 
 def overshoots_rad(motion: Motions, manoeuvre: Manoeuvre) -> Float64:
@@ -153,7 +296,7 @@ def overshoots_rad(motion: Motions, manoeuvre: Manoeuvre) -> Float64:
 
 STATES = 7  # of a path: u, v, r, x, y, heading, rudder
 # of each derivative: the force that it is of, and the motions that it is multiplied by
-_FORCES = np.array(['XYN'.index(name[0]) for name in FORM])
+_FORCE_OF = np.array(['XYN'.index(name[0]) for name in FORM])
 _FACTORS = np.array(
     [['uvrd0'.index(letter) for letter in name[1:].ljust(3, '0')] for name in FORM]
 )
@@ -212,7 +355,7 @@ def _rates(hull: HullModel, c: Float64, state: Float64, rudder: float) -> Float6
     forces = np.zeros(3)
     for i in range(len(c)):
         factors = of[_FACTORS[i, 0]] * of[_FACTORS[i, 1]] * of[_FACTORS[i, 2]]
-        forces[_FORCES[i]] += c[i] * factors
+        forces[_FORCE_OF[i]] += c[i] * factors
     rates = np.zeros(STATES - 1)
     for i in range(3):
         for j in range(3):
@@ -373,12 +516,9 @@ def steer(
 
     Examples
     --------
-    >>> import math
-    >>> from shipdrag_ros.studies.manoeuvring.simulate import turn
-    >>> from shipdrag_ros.studies.manoeuvring.ship import mariner
-    >>> from shipdrag_ros.studies.manoeuvring.simulate import steer
+    >>> from shipdrag_ros.studies.manoeuvring import mariner, steer, turn
     >>> ship = mariner()
-    >>> motions = steer(ship, turn(math.radians(20.0)))
+    >>> motions = steer(ship, turn(20.0))
     >>> motions.position_m.shape
     (1, 1200, 2)
     """
