@@ -34,8 +34,7 @@ from shipdrag_ros.estimation.result import (
 from shipdrag_ros.fleet.store import FROUDE, BagResult, Store, bag_schema, coastdown_schema
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import InputCounts, Recorded
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.run_result import RunResult, TrueCurve
 from shipdrag_ros.ship import Ship
 from tests.runs import seen
 

@@ -47,8 +47,7 @@ from shipdrag_ros.imports import need, what_to_install
 from shipdrag_ros.library import simulated
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.replay import replay, words
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.run_result import RunResult, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 

@@ -271,16 +271,21 @@ def speeds_kept(bins: Bins, source: int, last: int, width: int, speeds: Float64)
     return count
 
 
-def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Float64]:
+def mean_speeds(bins: Bins, source: int, edges: Int64) -> tuple[Int64, Float64]:
     """
-    Return times [s], from the beginning of bin `last`, and speeds [m/s].
+    Return of each span between two edges the bins that are there, and the mean speed [m/s].
+
+    Parameters
+    ----------
+    edges : (n + 1,)
+        Bins with which the spans end, ascending or descending.
     """
     totals = bins.speeds[source]
-    before, newest = span(bins, source, last, last - first + 1)
-    each = np.diff(totals[np.arange(before, newest + 1) & (len(totals) - 1)], axis=0)
-    there = each[:, COUNT] != 0
-    time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
-    return time, each[there, SPEED] / PER_UNIT
+    edges = np.minimum(edges, int(bins.closed[source])) & (len(totals) - 1)
+    each = np.diff(totals[edges], axis=0)
+    count = each[:, COUNT]
+    with np.errstate(invalid='ignore'):
+        return np.abs(count), each[:, SPEED] / (PER_UNIT * count)
 
 
 def unread(bins: Bins, which: NDArray[np.bool_] | list[int]) -> Bins:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
-from shipdrag_ros.coastdown.regimes.binned import shaft_revs
 from shipdrag_ros.coastdown.regimes.given import (
     BRAKES,
     ENGINES,
@@ -27,6 +26,7 @@ from shipdrag_ros.coastdown.regimes.given import (
     WindowRegimes,
     most_revs,
     read,
+    shaft_revs,
 )
 from shipdrag_ros.coastdown.regimes.read_out import stretches
 from shipdrag_ros.errors import EstimationError

@@ -38,7 +38,6 @@ from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LATE_S, LEAD_S, Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
-from shipdrag_ros.coastdown.shafts import ShaftWatch
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set
 from shipdrag_ros.coastdown.vouching import LOOK_S, Craft, Vouching
@@ -114,8 +113,7 @@ class Monitor:
         self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._craft = Craft(ship.length_m, self._tuning.speed_min)
-        self._vouching = Vouching(self._craft)
-        self._shafts = ShaftWatch(parameters.frozen_s)
+        self._vouching = Vouching(self._craft, parameters.frozen_s)
         self._running: RunningCoastdown | None = None
         self._regimes: RegimeFilter | None = None  # while awake
         self._silent = False  # it goes on unread, as the glide of which the readings ceased may
@@ -179,22 +177,14 @@ class Monitor:
         """
         Say which inputs contradict each other: a speed another speed, a heading its course.
         """
-        bins = self._memory.bins
-        heading = heading_doubt(bins, self._parameters.heading_convention)
-        found = self._vouching.texts
-        shafts = self._shafts.text
-        return (
-            found
-            | ({'heading': heading} if heading else {})
-            | ({'shaft': shafts} if shafts else {})
-        )
+        heading = heading_doubt(self._memory.bins, self._parameters.heading_convention)
+        return self._vouching.texts | ({'heading': heading} if heading else {})
 
     def contradictions(self) -> dict[str, str]:
         """
         Say which inputs contradicted another at any time.
         """
-        shafts = {'shaft': self._shafts.ever} if self._shafts.ever else {}
-        return self._vouching.ever | shafts
+        return self._vouching.ever
 
     def left_out(self) -> dict[str, str]:
         """
@@ -267,8 +257,7 @@ class Monitor:
         self._memory = self._fresh(self._memory.tally)
         self._reported_s = self._followed_s = self._dismissed_s = -np.inf
         self._ended_by = None
-        self._vouching = Vouching(self._craft)
-        self._shafts = ShaftWatch(self._parameters.frozen_s)
+        self._vouching = Vouching(self._craft, self._parameters.frozen_s)
         return [*events, Reset(receive_ns, reason)]
 
     def engine_stopped(self, receive_ns: int) -> str:
@@ -354,12 +343,12 @@ class Monitor:
             self._memory.steadiness.forget(source)
         watch.look = (number // LOOK_S + 1) * LOOK_S
         lie = math.nan if self._regimes is None or self._silent else self._regimes.shafts_lie
-        self._shafts.look(bins, number - LATE_S, lie)
+        self._vouching.look_at_shafts(bins, number - LATE_S, lie)
         newly = (self._vouching.until > number) & (watch.doubted <= number)
         watch.doubted[:] = self._vouching.until
         if watched != NEVER and watch.doubted[watched] > number:
             self._fall_back(now_ns)
-        if watched != NEVER and newly.any() and self._running is None:
+        if watched != NEVER and newly[SOURCES].any() and self._running is None:
             self._wake(int(watch.source), number)  # the record is judged without it
 
     def _make_room(self) -> None:
@@ -375,8 +364,7 @@ class Monitor:
         """Let the regimes take the record, from some minutes before a second on."""
         self._watch.source = source
         width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
-        self._shafts.look(self._memory.bins, number, math.nan)
-        bins = self._shafts.sound(self._vouching.sound(self._memory.bins))
+        bins = self._vouching.sound(self._memory.bins)
         self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
@@ -391,9 +379,8 @@ class Monitor:
     def _judged(self, until: int, number: int) -> list[Event]:
         """Let the regimes take all bins that are whole by a second, and decide after each."""
         events: list[Event] = []
-        bins = self._vouching.sound(self._memory.bins)
-        if self._regimes is not None and not self._regimes.hears_shafts:
-            bins = self._shafts.sound(bins)
+        heard = self._regimes is not None and self._regimes.hears_shafts
+        bins = self._vouching.sound(self._memory.bins, shafts=heard)
         while (regimes := self._regimes) is not None and regimes.advance(bins, until):
             events += self._decide(regimes, number)
         return events
@@ -600,14 +587,10 @@ class Monitor:
             capacity=CAPACITY,
         )
         kept = self._vouching.kept(kept)
-        shafts = self._shafts.doubt
-        if shafts:
-            kept = kept[~np.isin(kept.channel, self._shafts.unused)]
         window = Window.from_block(
             kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
         )
         notes = (*window.notes, *self._vouching.notes(start_ns))
-        notes += (f'without shaft: {shafts}',) if shafts else ()
         log, doubt = self._vouching.log_doubt
         told_ns = None if self._regimes is None else self._regimes.told_ns
         return replace(window, notes=notes, doubted_log=log, log_doubt=doubt, told_ns=told_ns)

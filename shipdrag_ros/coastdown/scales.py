@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import COUNT, PER_UNIT, SPEED, Bins
+from shipdrag_ros.coastdown.bins import Bins, mean_speeds
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import UNIT_RATIOS
 from shipdrag_ros.samples import Float64, Int64
@@ -191,9 +191,7 @@ def means(bins: Bins, source: int, last: int) -> Float64:
     last
         The second with which the newest ends.
     """
-    totals, newest = bins.speeds[source], int(bins.closed[source])
-    edges = last - EDGES[len(totals) > EDGES]
-    each = -np.diff(totals[np.minimum(edges, newest) & (len(totals) - 1)], axis=0)
-    there = 2 * each[:, COUNT] > -np.diff(edges)
-    count = len(there) if there.all() else int(np.argmin(there))
-    return np.asarray(each[:count, SPEED] / (PER_UNIT * each[:count, COUNT]), np.float64)
+    edges = last - EDGES[bins.speeds.shape[1] > EDGES]
+    count, speed = mean_speeds(bins, source, edges)
+    there = 2 * count > -np.diff(edges)
+    return speed if there.all() else speed[: int(np.argmin(there))]

@@ -6,6 +6,9 @@ The last minute of every speed is compared under these hypotheses, by Bayes' rul
 the sources measure one ship, and log and ground differ by a current; the others say nothing
 about her, or she is in them in a wrong scale, which the whole record shows. Each is a mixture of
 Gaussians of fixed covariance, so that an evidence is a sum.
+
+Shafts that the regimes find to contradict the motion, that stick or that cease are told here too:
+in steady sailing, in which no regimes follow them.
 """
 
 from __future__ import annotations
@@ -24,17 +27,30 @@ from shipdrag_ros.coastdown.bins import (
     PER_UNIT,
     RANK,
     SOURCES,
-    SPEED,
+    A,
     Bins,
+    mean_speeds,
+    mean_turning,
     smoothing,
     unread,
 )
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
 from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
+from shipdrag_ros.coastdown.regimes.numbers import SHAFT_SD
 from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, log_sum, means, scaled
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import mistaken_units, utc
-from shipdrag_ros.samples import KIND, SECOND_NS, Block, Channel, Float64, Int64
+from shipdrag_ros.estimation.run_down import STANDS_RAD_S
+from shipdrag_ros.samples import (
+    KIND,
+    PITCHES,
+    SECOND_NS,
+    SHAFTS,
+    Block,
+    Channel,
+    Float64,
+    Int64,
+)
 
 LOOK_S = 10  # from one look to the next
 _LASTS_S = 70  # a contradiction that lasts so long: its source is no longer used ...
@@ -65,6 +81,8 @@ _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
 _FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 _TOGETHER = 0.5  # share of those of a kind that have one driver, setting or aerial
 _STILL = 0.5  # share of minutes of a source that was wrong just before
+_STUCK_LOOK_S = 60
+_DISTINCT = 0.9  # of the readings of a shaft whose sensor has no coarse levels
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
@@ -326,14 +344,16 @@ class Vouching:
     ----------
     craft
         Below her slow speed nothing is compared.
+    still_s
+        A shaft that repeats, or is not heard, for longer says nothing.
 
     Attributes
     ----------
     until : (channels,) int64
-        Second up to which each source is not used; what it read before then never is.
+        Second up to which each channel is not used; what it read before then never is.
     """
 
-    def __init__(self, craft: Craft) -> None:
+    def __init__(self, craft: Craft, still_s: float) -> None:
         self.until: Int64 = np.full(len(Channel), NEVER)
         self._craft = craft
         self._since: Int64 = np.full(len(Channel), NEVER)  # of a contradiction that goes on
@@ -342,6 +362,9 @@ class Vouching:
         self._said: dict[str, Contradiction] = {}
         # when it was last known of each log whether it is, and how probable
         self._scaled: dict[int, tuple[int, float]] = {}
+        self._still_s = round(still_s)
+        self._stuck: dict[int, str] = {}  # what is said of shafts that stick
+        self._lied: dict[int, float] = {}  # revs that contradict the motion, when that was found
 
     @property
     def texts(self) -> dict[str, str]:
@@ -350,8 +373,10 @@ class Vouching:
 
     @property
     def ever(self) -> dict[str, str]:
-        """The last that was said of each input that was not used; of none: of all."""
-        return self.left_out or {name: one.text for name, one in self._said.items()}
+        """The last that was said of each source that was not used; of none: of all; of shafts."""
+        left, shaft = set(self.left_out), Channel.SHAFT.input
+        told = {shaft} | left if left - {shaft} else self._said
+        return {name: one.text for name, one in self._said.items() if name in told}
 
     @property
     def log_doubt(self) -> tuple[str, float]:
@@ -403,9 +428,15 @@ class Vouching:
 
         return [of(event) for event in events]
 
-    def sound(self, bins: Bins) -> Bins:
-        """Return bins in which the sources that are not used were never read."""
+    def sound(self, bins: Bins, *, shafts: bool = False) -> Bins:
+        """
+        Return bins in which the channels that are not used were never read.
+
+        Those `shafts` are, of which the regimes judge themselves that they contradict the motion.
+        """
         doubted = self.until > self._now
+        if shafts:
+            doubted[_with_pitch(self._lied)] = False
         return unread(bins, doubted) if doubted.any() else bins
 
     def kept(self, block: Block) -> Block:
@@ -435,7 +466,7 @@ class Vouching:
         """
         if hold:
             self.until[self.until > self._now] = number + LOOK_S + 1
-        back = np.flatnonzero((self.until > self._now) & (self.until <= number))
+        back = SOURCES[(self.until > self._now)[SOURCES] & (self.until <= number)[SOURCES]]
         self._now = number
         self._compare(bins, number, smoothing(width))
         return [int(source) for source in back if self.until[source] <= number]
@@ -487,6 +518,97 @@ class Vouching:
                     one = _doubt(source, speeds, found, used, scales, number)
                 self._said[name] = one._replace(until=number + _HOLD_S)
 
+    def look_at_shafts(self, bins: Bins, last: int, lie: float) -> None:
+        """
+        Look at the last seconds of the shafts.
+
+        Parameters
+        ----------
+        bins
+            What the monitor keeps.
+        last
+            The last second that all are read in.
+        lie
+            Probability that they say nothing true, by the regimes; NaN where these follow none.
+        """
+        heard = [int(each) for each in SHAFTS if bins.closed[each] != NEVER]
+        if not heard:
+            return
+        turning = {}
+        if lie > 0.5 or self._lied:
+            turning = {each: mean_turning(bins, each, last, LOOK_S)[0] for each in heard}
+        why = ''
+        if lie > 0.5:
+            self._lied = turning
+            why = (
+                'the motion is not that of a ship whose shafts turn as they say (probability '
+                f'{lie:.2f}); they are not used'
+            )
+        elif lie <= 0.5:
+            self.until[_with_pitch(self._lied)] = NEVER
+            self._lied = {}
+        elif any(
+            abs(turning[each] - level) > max(STANDS_RAD_S, SHAFT_SD[0] * abs(level))
+            for each, level in self._lied.items()
+        ):
+            self._lied = {}
+        if self._stuck or self._now % _STUCK_LOOK_S < LOOK_S:
+            self._stuck = {
+                each: said for each in heard if (said := self._sticks(bins, each, last))
+            }
+        unused = self._lied or self._stuck
+        until = self._now + LOOK_S + 1
+        self.until[_with_pitch(unused)] = until
+        if not unused:
+            why = '; '.join(
+                f'{_shaft(each)} ceased at {utc(int(bins.filling[each]) * SECOND_NS)}'
+                for each in heard
+                if bins.filling[each] < last - self._still_s
+            )
+        elif not self._lied:
+            why = '; '.join(self._stuck.values())
+        elif not why:  # as it was found
+            why = self._said[Channel.SHAFT.input].why
+        if why:
+            self._said[Channel.SHAFT.input] = Contradiction(until, why, 'check the sensor')
+
+    def _sticks(self, bins: Bins, shaft: int, last: int) -> str:
+        """Say that a sensor repeats itself which does not by its nature; '' where it does not."""
+        still = _readings(bins, shaft, last, self._still_s)
+        if len(still) < 2 or (still != still[-1]).any():
+            return ''
+        if shaft in self._stuck:
+            return self._stuck[shaft]
+        before = _readings(bins, shaft, last, len(bins.places[shaft]))
+        before = before[: np.flatnonzero(before != still[-1])[-1:].sum() + 1]
+        turning = still[-1] / PER_UNIT
+        coarse = len(np.unique(before)) < _DISTINCT * len(before)
+        if abs(turning) < STANDS_RAD_S or coarse or len(before) < len(still):
+            return ''
+        return (
+            f'{_shaft(shaft)} has read {turning:.4g} rad/s to the last digit for '
+            f'{self._still_s} s and more, as it never did before; it is not used'
+        )
+
+
+def _shaft(channel: int) -> str:
+    return f'shaft {SHAFTS.index(Channel(channel)) + 1}'
+
+
+def _with_pitch(shafts: Collection[int]) -> list[int]:
+    """Return the channels of some shafts."""
+    both = zip(SHAFTS, PITCHES, strict=True)
+    return [int(each) for pair in both if pair[0] in shafts for each in pair]
+
+
+def _readings(bins: Bins, channel: int, last: int, seconds: int) -> Int64:
+    """Return the means of the seconds up to one, of those that are kept and were read in."""
+    totals, newest = bins.places[channel], int(bins.closed[channel])
+    until = min(last, newest)
+    first = max(until - seconds, newest - len(totals) + 1)
+    each = np.diff(totals[np.arange(first, until + 1) & (len(totals) - 1)], axis=0)
+    return np.asarray(each[each[:, COUNT] == 1, A])
+
 
 def _scales(
     bins: Bins, sources: Collection[int], last: int, lag: int, nothing: Int64
@@ -517,14 +639,10 @@ def _scales(
 
 def _means(bins: Bins, source: int, last: int) -> Float64:
     """Return means of the speed [m/s] up to a second; none where one is missing."""
-    totals, newest = bins.speeds[source], int(bins.closed[source])
-    if newest < last - LOOK_S:
+    if bins.closed[source] < last - LOOK_S:
         return np.empty(0)
-    edges = np.minimum(last - _MEAN_S * np.arange(_MEANS, -1, -1), newest)
-    each = np.diff(totals[edges & (len(totals) - 1)], axis=0)
-    if not each[:, COUNT].all():
-        return np.empty(0)
-    return np.asarray(each[:, SPEED] / (PER_UNIT * each[:, COUNT]), np.float64)
+    count, speed = mean_speeds(bins, source, last - _MEAN_S * np.arange(_MEANS, -1, -1))
+    return speed if count.all() else np.empty(0)
 
 
 def _doubt(

@@ -30,9 +30,8 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
 from shipdrag_ros.replay.playback import SHIP_FILE, StopTime
-from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve
 from shipdrag_ros.replay.together import together
-from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 

@@ -21,7 +21,7 @@ from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.shown import says_it_in_python
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.replay.run_result import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STANDARD_INPUTS, START_NS, Scenario, sense, standard_sensors

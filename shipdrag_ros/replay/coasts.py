@@ -2,12 +2,16 @@
 """
 The samples of coastdowns that a replay has found, with the steady record before each.
 
-Also the sound samples of a whole run, whatever was done in it.
+Also the sound samples of a whole run, whatever was done in it, and why none was found, as far as
+a replay and the speed itself show.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +25,7 @@ from shipdrag_ros.coastdown.events import (
     NotCoastdown,
     WholeGlide,
 )
+from shipdrag_ros.display import duration
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -30,9 +35,11 @@ from shipdrag_ros.replay.playback import ReplayResult, feed, recorded_parameters
 from shipdrag_ros.samples import (
     ALL_MOTION,
     KIND,
+    MOTION_INPUTS,
     SECOND_NS,
     Block,
     Channel,
+    Float64,
     Reason,
     concatenate,
 )
@@ -45,6 +52,12 @@ DISMISSED = (
 _CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
 _SHORTEST_M = 1.0  # a craft, where no ship is known
 _MOST = 0.5  # of the messages of an input
+_BINS = 6  # of a slope window, which is shorter for small craft
+_GLIDE_WINDOWS = 10.0  # of them; within it a ship that glides has slowed
+_SLOWED = 0.1  # of the speed; what falls less is the sea
+_STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
+_STILL_READINGS = 60  # ... so often, is none
+_SHOWN = 3  # of the stretches that were dismissed
 
 
 def clocks_apart(result: ReplayResult) -> tuple[str, ...]:
@@ -249,3 +262,165 @@ def accepted_samples(
         of_log = KIND[block.channel] == Channel.SPEED_THROUGH_WATER
         accepted |= (reason == Reason.FROZEN) & of_log & (block.value[:, 0] == 0.0)
     return block[np.flatnonzero(accepted)], parameters
+
+
+class _SpeedLoss(NamedTuple):
+    """The largest loss of speed within `_GLIDE_WINDOWS`."""
+
+    start_s: float
+    end_s: float
+    from_m_s: float
+    to_m_s: float
+
+    @property
+    def lost(self) -> float:
+        return 1.0 - self.to_m_s / self.from_m_s
+
+
+def why_no_coastdown(result: ReplayResult) -> str:
+    """
+    Say why a replay has found no coastdown, and what to do.
+
+    Parameters
+    ----------
+    result
+        From `replay`, without a coastdown.
+
+    Returns
+    -------
+    str
+        Part of a sentence.
+    """
+    still, why = _stood_still(result), _why(result)
+    left_out = [
+        f'the {name.replace("_", " ")} is left out: {text}'
+        for name, text in result.left_out.items()
+        if text not in why
+    ]
+    return '; '.join([*left_out, still, why] if still else [*left_out, why])
+
+
+def _why(result: ReplayResult) -> str:
+    """Say why by what was given or dismissed, or else by what the speed did."""
+    for one in result.coastdowns:
+        if one.failure and not one.cuts:
+            return one.failure
+    if result.not_coastdowns:
+        return _dismissed(result)
+    block, _ = accepted_samples(result.run, result.ship)
+    if not len(block):
+        return f'no message of {", ".join(MOTION_INPUTS)} could be used'
+    names = [each for each in ALL_MOTION if each not in result.left_out]
+    window_s = result.parameters.slope_window_s
+    name, fall = _largest_fall(block, names, window_s)
+    if not name:
+        return f'no message of {", ".join(MOTION_INPUTS)} could be used'
+    if fall is None:
+        return f'there is too little of {name} to know what steady sailing is'
+    if fall.lost < _SLOWED:
+        return (
+            f'by {name} nothing slowed: the speed never fell by more than {fall.lost:.0%} within '
+            f'{duration(_GLIDE_WINDOWS * window_s)}'
+        )
+    fell = (
+        f'the speed by {name} fell most from {fall.from_m_s:.2f} to {fall.to_m_s:.2f} m/s, at '
+        f'{fall.start_s:.0f} to {fall.end_s:.0f} s of the record'
+    )
+    if fall.start_s < window_s:
+        return (
+            f'{fell}, with only {fall.start_s:.0f} s before it where at least {window_s:.0f} s of '
+            'steady sailing are needed; if the engine was stopped there, say so with --window '
+            'START END'
+        )
+    return (
+        f'{fell}, but not as after an engine stop from steady sailing (less power, a turn, '
+        'unsteady speed before); if it was one, say so with --window START END'
+    )
+
+
+def _stood_still(result: ReplayResult) -> str:
+    """Say that a speed sent one value for long, as no ship at sea does; '' where none did."""
+    said = []
+    blocks = [item for item in result.run.inputs() if isinstance(item, Block)]
+    speeds = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
+    for channel in (each for each in Channel if each.kind in speeds):
+        read = [block[block.channel == channel] for block in blocks]
+        stamp_ns = np.concatenate([block.stamp_ns for block in read]) if read else np.empty(0)
+        if not len(stamp_ns):
+            continue
+        value = np.concatenate([block.value[:, 0] for block in read])
+        edges = np.concatenate([[0], np.flatnonzero(value[1:] != value[:-1]) + 1, [len(value)]])
+        for first, after in pairwise(edges.tolist()):
+            lasts_s = float(stamp_ns[after - 1] - stamp_ns[first]) * 1e-9
+            # a ship may well lie still
+            if value[first] and after - first >= _STILL_READINGS and lasts_s >= _STILL_S:
+                since_s = float(stamp_ns[first] - stamp_ns[0]) * 1e-9
+                said.append(
+                    f'{channel.input} stood still at {value[first]:.3g} m/s for '
+                    f'{lasts_s / 60.0:.0f} min, from {since_s:.0f} s of it on'
+                )
+    return '; '.join(said[:_SHOWN])
+
+
+def _dismissed(result: ReplayResult) -> str:
+    """Say what was nearly a coastdown, and why it is none."""
+    first_ns = result.run.span_ns[0] if result.run.span_ns else 0
+    parts = [
+        f'from {(one.start_ns - first_ns) * 1e-9:.0f} to {(one.end_ns - first_ns) * 1e-9:.0f} s '
+        f'it was none ({one.reason.value}): {one.text}'
+        for one in result.not_coastdowns[:_SHOWN]
+    ]
+    more = len(result.not_coastdowns) - _SHOWN
+    if more > 0:
+        parts.append(f'and {more} more, which `shipdrag replay` lists')
+    return '; '.join(parts)
+
+
+def _largest_fall(
+    block: Block, names: Iterable[str], window_s: float
+) -> tuple[str, _SpeedLoss | None]:
+    """Return by which input, and the largest fall of its speed; '' where there is no input."""
+    try:
+        window = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
+    except ValueError:  # a clock was set within the record
+        return 'a clock that was set', None
+    for name in names:
+        series = window.series(name)
+        if not len(series):
+            continue
+        time_s = (series.time_ns - window.start_ns) * 1e-9
+        bins = _binned(np.asarray(time_s, np.float64), series.value, window_s / _BINS)
+        return name, _fall(*bins, _GLIDE_WINDOWS * window_s)
+    return '', None
+
+
+def _binned(time_s: Float64, value: Float64, bin_s: float) -> tuple[Float64, Float64]:
+    """Return times and speeds in bins, of speeds or of places; medians bear bad readings."""
+    number = (time_s // bin_s).astype(np.int64)
+    edges = np.flatnonzero(np.diff(number)) + 1
+    times = np.array([part.mean() for part in np.split(time_s, edges)])
+    medians = np.array([np.median(part, axis=0) for part in np.split(value, edges)])
+    if value.ndim == 1:
+        return times, np.abs(medians)
+    gone = np.hypot(*np.diff(medians, axis=0).T)
+    return 0.5 * (times[1:] + times[:-1]), gone / np.diff(times)
+
+
+def _fall(time_s: Float64, speed_m_s: Float64, within_s: float) -> _SpeedLoss | None:
+    """Return the largest fall, of medians over three bins; None where the bins are few."""
+    if len(speed_m_s) < 4:
+        return None
+    smooth = np.median(np.lib.stride_tricks.sliding_window_view(speed_m_s, 3), axis=1)
+    time_s = time_s[1:-1]
+    best: _SpeedLoss | None = None
+    for first, fast in enumerate(smooth):
+        last = first + int(np.searchsorted(time_s[first:], time_s[first] + within_s, side='right'))
+        slow = first + int(np.argmin(smooth[first:last]))
+        if fast <= 0.0:
+            continue
+        found = _SpeedLoss(
+            float(time_s[first]), float(time_s[slow]), float(fast), float(smooth[slow])
+        )
+        if best is None or found.lost > best.lost:
+            best = found
+    return best

@@ -146,8 +146,8 @@ class Comparison:
         message = recorded or replayed
         if found.first_difference is None and message is not None:
             found.first_difference = (
-                f'{message.topic} at {message.stamp_ns} ns: recorded {_content(recorded)}, '
-                f'replayed {_content(replayed)}'
+                f'{message.topic} at {message.stamp_ns} ns: recorded {_read(recorded)[1]}, '
+                f'replayed {_read(replayed)[1]}'
             )
 
 
@@ -167,24 +167,33 @@ def _relative_difference(one: OutputMessage | None, other: OutputMessage | None)
 
 def _figures(message: OutputMessage | None) -> Float64:
     """Return the figures of a message; none where it cannot be read."""
+    return _read(message)[0]
+
+
+def _read(message: OutputMessage | None) -> tuple[Float64, str]:
+    """Return the figures of a message, and describe it so that it can be known from another."""
+    none = np.empty(0)
     if message is None:
-        return np.empty(0)
+        return none, 'nothing'
     try:
         content = types.deserialize(message.type, message.payload)
     except MalformedMessage:
-        return np.empty(0)
+        return none, f'{len(message.payload)} bytes that are no {message.type}'
     match message.type:
         case SPEED.type:
-            return np.array([content.twist.twist.linear.x, content.twist.covariance[0]])
+            value, variance = content.twist.twist.linear.x, content.twist.covariance[0]
+            return np.array([value, variance]), f'{value!r} m/s (variance {variance})'
         case RESISTANCE.type:
-            return np.array([content.accel.accel.linear.x, content.accel.covariance[0]])
+            value, variance = content.accel.accel.linear.x, content.accel.covariance[0]
+            return np.array([value, variance]), f'{value!r} m/s^2 (variance {variance})'
         case FORECAST_PATH.type:
             places = [each.pose.position for each in content.poses]
-            return np.array([axis for place in places for axis in (place.x, place.y)])
-        case _ if content.data.nbytes % 8:  # no whole figures
-            return np.empty(0)
+            axes = np.array([axis for place in places for axis in (place.x, place.y)])
+            return axes, f'{len(places)} positions'
         case _:
-            return np.frombuffer(content.data.tobytes(), '<f8')
+            text = f'{content.width} points (sum of bytes {np.sum(content.data, dtype=np.int64)})'
+            whole = content.data.nbytes % 8 == 0
+            return np.frombuffer(content.data.tobytes(), '<f8') if whole else none, text
 
 
 def _sigmas(one: OutputMessage | None, other: OutputMessage | None) -> float:
@@ -204,25 +213,3 @@ def _estimates(message: OutputMessage | None) -> dict[float, tuple[float, float]
         table = figures[: len(figures) // 4 * 4].reshape(-1, 4).tolist()
         return {speed: (value, sigma) for speed, value, sigma, _ in table}
     return {0.0: (figures[0], math.sqrt(max(figures[1], 0.0)))} if len(figures) == 2 else {}
-
-
-def _content(message: OutputMessage | None) -> str:
-    """Describe a message so that it can be known from another."""
-    if message is None:
-        return 'nothing'
-    try:
-        content = types.deserialize(message.type, message.payload)
-    except MalformedMessage:
-        return f'{len(message.payload)} bytes that are no {message.type}'
-    match message.type:
-        case SPEED.type:
-            return f'{content.twist.twist.linear.x!r} m/s (variance {content.twist.covariance[0]})'
-        case RESISTANCE.type:
-            return (
-                f'{content.accel.accel.linear.x!r} m/s^2 (variance {content.accel.covariance[0]})'
-            )
-        case FORECAST_PATH.type:
-            return f'{len(content.poses)} positions'
-        case _:
-            total = np.sum(content.data, dtype=np.int64)
-            return f'{content.width} points (sum of bytes {total})'

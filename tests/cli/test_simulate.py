@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from shipdrag_ros.cli import main
 from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.run_result import TrueCurve
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 

@@ -6,7 +6,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown.bins import Bins, displacement, line, mean_place, mean_turning, speeds
+from shipdrag_ros.coastdown.bins import (
+    COUNT,
+    PER_SECOND,
+    TIME,
+    Bins,
+    displacement,
+    line,
+    mean_place,
+    mean_speeds,
+    mean_turning,
+    span,
+)
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.samples import Channel
 
@@ -14,6 +25,17 @@ SECOND_NS = 1_000_000_000
 FIRST = 1_700_000_000
 LOG = int(Channel.SPEED_THROUGH_WATER)
 WIDTH = 60
+
+
+def speeds(bins: Bins, source: int, first: int, last: int):
+    """Return times [s], from the beginning of bin `last`, and speeds [m/s]."""
+    totals = bins.speeds[source]
+    before, newest = span(bins, source, last, last - first + 1)
+    each = np.diff(totals[np.arange(before, newest + 1) & (len(totals) - 1)], axis=0)
+    there = each[:, COUNT] != 0
+    time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
+    speed = mean_speeds(bins, source, np.arange(before, newest + 1))[1]
+    return time, speed[there]
 
 
 def binned(channel: int, time_s, a, b=None, *, size: int = 1000) -> Bins:

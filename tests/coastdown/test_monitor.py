@@ -489,7 +489,7 @@ def test_a_shaft_sensor_that_dies_makes_no_coastdown(ship, record, sensors, stop
     monitor = Monitor(ship, Parameters())
     early = block.stamp_ns < block.stamp_ns[0] + 1_800_000_000_000
     events = monitor.update(block[early])
-    assert 'not used; check the sensor' in monitor.doubts()['shaft']
+    assert 'not used: check the sensor' in monitor.doubts()['shaft']
     events += monitor.update(block[~early]) + monitor.finish()
     told = [each for each in ended(events) if not each.withdrawn]
     assert len(told) == stops

@@ -79,3 +79,15 @@ def test_a_coarse_shaft_in_a_calm_is_not_stuck(quiet, record, sensors, quantum) 
     value[shaft] = np.round(value[shaft] / quantum) * quantum
     fed(quiet, dies(replace(block, value=value), 'stuck'), STOP_S)
     assert 'shaft' not in quiet.doubts()
+
+
+@pytest.mark.parametrize('seed', [3, 5])
+def test_a_shaft_that_reads_anything_hides_no_coastdown(quiet, record, sensors, seed) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), lead_in_s=STOP_S, seed=seed)
+    value, shaft = block.value.copy(), block.channel == Channel.SHAFT
+    rows = shaft & (block.stamp_ns > START_NS + int(DIES_S * 1e9))
+    value[rows, 0] = np.random.default_rng(seed).uniform(0.0, 10.0, np.count_nonzero(rows))
+    events, _ = fed(quiet, replace(block, value=value), 2.0 * STOP_S)
+    (onset,) = [each for each in events if isinstance(each, Onset)]
+    assert abs(onset.start_ns - START_NS - STOP_S * 1e9) < 20e9
+    assert SAID['zero'] in quiet.contradictions()['shaft']

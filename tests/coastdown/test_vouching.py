@@ -201,7 +201,7 @@ def test_a_current_beside_a_sound_log_is_no_contradiction(fault: str, ground: Ch
 
 
 def test_where_a_log_is_left_out_that_is_the_reason_that_is_given_and_what_to_do() -> None:
-    sound = Vouching(CRAFT)
+    sound = Vouching(CRAFT, 120.0)
     was = NotCoastdown(0, 1, Dismissal.THRUST, 'the shaft slowed down, yet the speed did not')
     assert sound.explained([was]) == [was]
     monitor = Monitor(ship_of(60.0), Parameters(), estimate=None)

@@ -10,7 +10,7 @@ import numpy as np
 from shipdrag_ros.estimation import tables
 from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
-from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.run_result import TrueCurve
 from shipdrag_ros.ship import Ship, TableBaseline
 
 

@@ -17,7 +17,7 @@ from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Ev
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, coast_windows, replay
-from shipdrag_ros.replay.no_coastdown import why_no_coastdown
+from shipdrag_ros.replay.coasts import why_no_coastdown
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from tests.runs import write_run

@@ -127,20 +127,14 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     return Spans(what, at, date, gone, end, weight, after, again).part(there)
 
 
-def _over_time(
-    weight: Float64, begin_s: Float64, end_s: Float64, bins: int, step_s: float
-) -> Float64:
-    edges = np.zeros(bins + 1)
-    np.add.at(edges, np.clip(np.rint(begin_s / step_s).astype(int), 0, bins), weight)
-    np.add.at(edges, np.clip(np.rint(end_s / step_s).astype(int), 0, bins), -weight)
-    return np.cumsum(edges)[:-1]
-
-
 def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
     """
     Return the probability of some spans in each bin since the start.
     """
-    return _over_time(found.weight, found.begin_s, found.end_s, bins, step_s)
+    edges = np.zeros(bins + 1)
+    np.add.at(edges, np.clip(np.rint(found.begin_s / step_s).astype(int), 0, bins), found.weight)
+    np.add.at(edges, np.clip(np.rint(found.end_s / step_s).astype(int), 0, bins), -found.weight)
+    return np.cumsum(edges)[:-1]
 
 
 def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
@@ -148,19 +142,16 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
     Return the probability of each regime in each bin since the start, given all that came.
     """
     engaged = (found.what == s.LEVEL) & found.again
-    chosen = {
-        P_DRIVEN: np.isin(found.what, (s.DRIVEN, s.LEVEL, s.AMID)) & ~engaged,
-        P_BRAKED: found.what == s.BRAKE,
-        P_TURNING: (found.what == s.TURN) | (found.what == s.GLIDE_TURN),
-        P_ENGAGED: engaged,
-    }
     glide = found.part(found.what == s.GLIDE)
     of = {
-        number: probability_of(found.part(which), bins, step_s) for number, which in chosen.items()
+        P_DRIVEN: found.part(np.isin(found.what, (s.DRIVEN, s.LEVEL, s.AMID)) & ~engaged),
+        P_RUN_DOWN: glide._replace(end_s=glide.gone_s),
+        P_GLIDING: glide._replace(begin_s=glide.gone_s),
+        P_BRAKED: found.part(found.what == s.BRAKE),
+        P_TURNING: found.part((found.what == s.TURN) | (found.what == s.GLIDE_TURN)),
+        P_ENGAGED: found.part(engaged),
     }
-    of[P_RUN_DOWN] = _over_time(glide.weight, glide.begin_s, glide.gone_s, bins, step_s)
-    of[P_GLIDING] = _over_time(glide.weight, glide.gone_s, glide.end_s, bins, step_s)
-    return {name: of[number] for number, name in enumerate(OUT)}
+    return {name: probability_of(of[number], bins, step_s) for number, name in enumerate(OUT)}
 
 
 def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
@@ -175,7 +166,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         Mean speed in each bin [m/s]: a ship that keeps it glides no more.
     """
     found, step_s = found.part(found.what == s.GLIDE), setting.step_s
-    likely = _over_time(found.weight, found.gone_s, found.end_s, len(speed), step_s)
+    likely = probability_of(found._replace(begin_s=found.gone_s), len(speed), step_s)
     all_of: list[SmoothedGlide] = []
     for first, last in stretches(likely > n.HOLD[0]):
         peak = float(likely[first:last].max())

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.run_result import TrueCurve
 
 
 @given(st.lists(st.floats(0.0, 40.0), min_size=1, max_size=9, unique=True).map(sorted), st.data())
