@@ -547,9 +547,10 @@ class Vouching:
         elif lie <= 0.5:
             self.until[_with_pitch(self._lied)] = NEVER
             self._lied = {}
-        elif any(
-            abs(turning[each] - level) > max(STANDS_RAD_S, SHAFT_SD[0] * abs(level))
+        elif any(  # or reads again, where it read nothing when that was found
+            not abs(turning[each] - level) <= max(STANDS_RAD_S, SHAFT_SD[0] * abs(level))
             for each, level in self._lied.items()
+            if not math.isnan(turning[each])
         ):
             self._lied = {}
         if self._stuck or self._now % _STUCK_LOOK_S < LOOK_S:

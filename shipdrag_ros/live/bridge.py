@@ -293,7 +293,7 @@ class Bridge:
         self._noted = note.kind
         self._notes.append((note.stamp_ns, note.text))
         if note.kind is EventKind.ONSET:
-            self._begin(int(note.values['start_ns']))
+            self._begin(outputs.time_ns(note.values['start_ns']))
         elif note.kind is EventKind.COASTDOWN:
             run = outputs.PastRun.of(note, self._curve, bag=self._bag)
             self.add_past(run)

@@ -77,7 +77,7 @@ def read_figure(topic: topics.OutputTopic, payload: bytes) -> Figure:
     Raises
     ------
     MalformedMessage
-        If it is none.
+        If it is not within 64 bits, from 0 on.
     """
     message = types.deserialize(topic.type, payload)
     held = message.twist if topic is topics.SPEED else message.accel
@@ -93,7 +93,7 @@ def read_curve(payload: bytes) -> Curve | None:
     Raises
     ------
     MalformedMessage
-        If it is none.
+        If it is not within 64 bits, from 0 on.
     """
     stamp_ns, points = _points(topics.RESISTANCE_CURVE, CURVE_FIELDS, payload)
     if len(points) < 2:
@@ -145,7 +145,7 @@ def read_forecast(payload: bytes) -> ComingGlide | None:
     Raises
     ------
     MalformedMessage
-        If it is none.
+        If it is not within 64 bits, from 0 on.
     """
     stamp_ns, points = _points(topics.FORECAST, FORECAST_FIELDS, payload)
     return ComingGlide(stamp_ns, points) if len(points) >= 2 else None
@@ -177,7 +177,7 @@ def read_path(payload: bytes) -> ComingPath | None:
     Raises
     ------
     MalformedMessage
-        If it is none.
+        If it is not within 64 bits, from 0 on.
     """
     message = types.deserialize(topics.FORECAST_PATH.type, payload)
     stamp_ns = types.stamp_ns(message)
@@ -206,6 +206,21 @@ def _points(
 
 _OPPOSITE_DEG = 30.0  # by which a reciprocal heading may be off
 ONE_DAY_S = 12 * 3600.0  # in which two runs are a pair
+
+
+def time_ns(said: str | int) -> int:
+    """
+    Read a time that a peer sends [ns].
+
+    Raises
+    ------
+    ValueError
+        If it is not within 64 bits, from 0 on.
+    """
+    found = int(said)
+    if not 0 <= found < 2**63:
+        raise ValueError('no time since the epoch')
+    return found
 
 
 @dataclass(frozen=True)
@@ -248,8 +263,8 @@ class PastRun:
         _, _, why_not = note.text.partition('no estimate: ')
         return cls(
             bag,
-            int(values.get('start_ns', note.stamp_ns)),
-            int(values.get('end_ns', note.stamp_ns)),
+            time_ns(values.get('start_ns', note.stamp_ns)),
+            time_ns(values.get('end_ns', note.stamp_ns)),
             values.get('ended_by', 'end'),
             None if yaw is None else (90.0 - math.degrees(float(yaw))) % 360.0,
             own,

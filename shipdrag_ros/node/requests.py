@@ -92,6 +92,8 @@ TRIGGERS = (0.2, 10.0)  # each may make a file, or drop an hour of memory
 READS = (50.0, 200.0)
 TOO_LONG = f'refused: more than {LONGEST} entries'
 REFUSED = 'refused: asked too often; ask again in some seconds'
+NO_TYPE = 'refused: a parameter of an unknown type'
+_TYPES = frozenset(kind.value for kind in Parameter.Type)
 _LIMITS = {
     'Trigger': TRIGGERS,
     'ChangeState': CHANGES,
@@ -190,7 +192,11 @@ def _limited(
             return _refuse(request, response, TOO_LONG)
         if limit.allows():
             refusing = False
-            return answer(request, response)
+            # of another type rclpy would raise out of the executor
+            if all(each.value.type in _TYPES for each in getattr(request, 'parameters', ())):
+                return answer(request, response)
+            warn(f'{name}: {NO_TYPE}')
+            return _refuse(request, response, NO_TYPE)
         if not refusing:
             refusing = True
             warn(f'{name}: asked too often, requests are refused')

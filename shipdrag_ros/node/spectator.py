@@ -137,6 +137,7 @@ class Spectator:
             topic.removesuffix(ending)
             for topic, kinds in self._ros.get_topic_names_and_types()
             if topic.endswith(ending)
+            and topic != ending  # at the root there is no node
             and topics.RESISTANCE_CURVE.type in kinds
             and self._ros.count_publishers(topic)
         )

@@ -63,6 +63,19 @@ def test_a_shaft_that_lives_again_is_believed_again(quiet, record, sensors, how)
     assert 'shaft' not in quiet.doubts()
 
 
+def test_a_shaft_that_lies_and_then_ceases_is_believed_when_it_comes_again(
+    quiet, record, sensors
+) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), lead_in_s=STOP_S)
+    lied = dies(block, 'zero')
+    second = (block.stamp_ns - START_NS) / 1e9
+    gone = (block.channel == Channel.SHAFT) & (second >= 1260.0) & (second < 1900.0)
+    fed(quiet, lied[~gone & (second < 1900.0)], STOP_S)
+    assert SAID['zero'] in quiet.doubts()['shaft']
+    fed(quiet, block[second >= 1900.0], 2000.0)
+    assert 'shaft' not in quiet.doubts()
+
+
 def test_the_one_of_two_shafts_that_sticks_is_named(quiet, record, sensors) -> None:
     block = record(sensors=(sensors['log'], sensors['shaft']), lead_in_s=STOP_S)
     shaft = block[block.channel == Channel.SHAFT]

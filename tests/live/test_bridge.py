@@ -424,6 +424,17 @@ def test_what_a_peer_says_in_the_name_of_the_node_stops_no_page() -> None:
     assert said.count('events brings what is not understood (KeyError') == 1
 
 
+@pytest.mark.parametrize('kind', [EventKind.ONSET, EventKind.COASTDOWN])
+@pytest.mark.parametrize('time', ['9' * 400, '-5', str(2**63)])
+def test_a_time_outside_the_epoch_stops_no_page(kind: EventKind, time: str) -> None:
+    note = EventNote(kind, 5, 'of a peer', {'start_ns': time, 'end_ns': time})
+    bridge = Bridge()
+    bridge.hear(Samples(Block.of(Channel.SPEED_THROUGH_WATER, np.array([10**18]), [5.0])), 0.0)
+    bridge.hear(NodeMessage('events', event_message(note).payload), 0.0)
+    assert 'no time since the epoch' in str(bridge.parts(1.0)['notes'])
+    assert not bridge.past
+
+
 def test_a_coastdown_of_a_peer_with_a_heading_that_is_none_is_not_taken() -> None:
     note = EventNote(EventKind.COASTDOWN, 5, 'a coastdown has ended', {'heading_rad': 'nan'})
     bridge = Bridge()

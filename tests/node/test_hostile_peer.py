@@ -104,3 +104,13 @@ def test_a_health_that_names_no_topic_stops_no_page(peer: Any) -> None:
                 peer.spin_until(again)
             else:
                 again()
+
+
+def test_a_curve_at_the_root_hides_no_node(peer: Any) -> None:
+    from shipdrag_ros.messages.topics import RESISTANCE_CURVE
+    from shipdrag_ros.node.spectator import Spectator
+
+    for node in ('', '/a_node'):
+        peer.advertise(f'{node}/resistance_curve', RESISTANCE_CURVE.type)
+    with Spectator(lambda heard: None) as spectator:
+        peer.spin_until(lambda: spectator.node == '/a_node')

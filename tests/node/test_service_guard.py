@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import Parameter
+from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     GetParameters,
     ListParameters,
@@ -19,7 +19,7 @@ from rcl_interfaces.srv import (
 )
 from std_srvs.srv import Trigger
 
-from shipdrag_ros.node.requests import CHANGES, TRIGGERS, RateLimit, limit_services
+from shipdrag_ros.node.requests import CHANGES, NO_TYPE, TRIGGERS, RateLimit, limit_services
 
 
 def test_a_burst_and_then_so_many_a_second() -> None:
@@ -79,3 +79,16 @@ def test_what_only_reads_may_be_asked_more_often() -> None:
             last = service.callback(kind.Request(), kind.Response())
             assert service.answered <= 5000
         assert last == kind.Response()  # nothing, which can be sent
+
+
+@pytest.mark.parametrize('kind', [SetParameters, SetParametersAtomically])
+def test_a_parameter_of_no_type_never_comes_to_rclpy_which_would_end_the_node(kind: type) -> None:
+    service, warned = Served(kind), []
+    limit_services([service], warned.append)
+    odd = Parameter(name='window_s', value=ParameterValue(type=99))
+    request = kind.Request(parameters=[Parameter(name='a'), odd])
+    response = service.callback(request, kind.Response())
+    assert service.answered == 0
+    results = response.results if kind is SetParameters else [response.result]
+    assert {(each.successful, each.reason) for each in results} == {(False, NO_TYPE)}
+    assert warned == [f'/asked: {NO_TYPE}']
