@@ -15,6 +15,7 @@ so that no hull is too far from the prior's for the first step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -108,7 +109,7 @@ def _integral(value: Float64, time_s: Float64) -> Float64:
 
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
-_ROUNDS = 20  # linearisations about the mean of the mixture
+_ROUNDS = 60  # linearisations about the mean of the mixture
 _CLOSE = 0.05  # of chi^2, from one step to the next
 _STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
 _UNLIKELY, _QUICK = -7.0, -5.0  # log odds to the likeliest family; less is left out
@@ -116,6 +117,7 @@ _LEAST = 1e-3  # of the weight of the likeliest model; less is left out of mean 
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
 _SHORTEST = 1.0 / 32.0  # part of a step to the mean of the mixture
+_ASTRAY = 2  # steps that lead farther away, before a shorter one is tried
 _RUNS_AWAY = (
     'the motion is not finite under what the readings ask for: give a window that lies in one '
     'coastdown, or the time of the stop'
@@ -387,6 +389,45 @@ def _moved(problem: RunModel, found: _Averaged) -> float:
         return float(np.max(np.abs(found.step[:k] @ columns) / np.sqrt(variance)))
 
 
+def _settled(
+    problem: RunModel, taught: FamilySet, now: Float64, settings: Settings
+) -> tuple[Float64, _Averaged]:
+    """
+    Return the mean of the mixture about which it is taken, and the mixture.
+
+    Raises
+    ------
+    EstimationError
+        If no step leads there.
+    """
+    found = _mixed(problem, taught, now, settings)
+    best = away, now, found = _moved(problem, found), now, found
+    part, astray = 1.0, 0
+    for _ in range(_ROUNDS):
+        if best[0] < _STILL or part < _SHORTEST:
+            break
+        now = now + part * found.step
+        try:
+            found = _mixed(problem, taught, now, settings)
+            away = _moved(problem, found)
+        except EstimationError:  # the motion runs away
+            away, astray = math.inf, _ASTRAY
+        if away < best[0]:
+            best, part, astray = (away, now, found), min(2.0 * part, 1.0), 0
+        elif astray < _ASTRAY:  # the way there may lead farther away first
+            astray += 1
+        else:
+            (away, now, found), part, astray = best, 0.5 * part, 0
+    away, now, found = best
+    if not away < _SETTLED:
+        raise EstimationError(
+            'the fit of the motion does not settle: the record allows motions that are too '
+            'different; give a longer window, one without a turn or thrust, or a ship file with a '
+            'baseline'
+        )
+    return now + part * found.step, found
+
+
 def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False) -> RunPosterior:
     """
     Return the posterior of a run.
@@ -416,29 +457,11 @@ def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False
         problem.taught,
         _likely(problem, now, noise.typical, _QUICK if quick else _UNLIKELY),
     )
-    found = _mixed(problem, taught, now, noise.settings)
-    away, part = _moved(problem, found), 1.0
-    for _ in range(_ROUNDS):
-        if away < _STILL or part < _SHORTEST:
-            break
-        trial = now + part * found.step
-        there = _mixed(problem, taught, trial, noise.settings)
-        nearer = _moved(problem, there)
-        if nearer < away:
-            now, away, found = trial, nearer, there
-            part = min(2.0 * part, 1.0)
-        else:  # it leads astray, or the motion runs away
-            part *= 0.5
-    if not away < _SETTLED:
-        raise EstimationError(
-            'the fit of the motion does not settle: the record allows motions that are too '
-            'different; give a longer window, one without a turn or thrust, or a ship file with a '
-            'baseline'
-        )
+    mean, found = _settled(problem, taught, now, noise.settings)
     settings = noise.settings._replace(weight=found.weight.sum(axis=1))
     return RunPosterior(
         problem,
-        now + part * found.step,
+        mean,
         found.covariance,
         _of_force(problem, found),
         found.weight.sum(axis=0),
