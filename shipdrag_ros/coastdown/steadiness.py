@@ -251,9 +251,9 @@ def white_sd_of_slopes(
             at -= 1
         scratch[at] = change
     reading = _sd_of_changes(scratch, count)
-    used = line(bins, source, last, width)[2]
     if averaged > 0:
         # errors of means within the window cancel but for those at its ends
         part = averaged / width
         return float(reading * part * math.sqrt(24.0 + 72.0 * part) / width)
+    used = line(bins, source, last, width)[2]
     return float(reading * math.sqrt(12.0 / max(used, 1.0)) / width)

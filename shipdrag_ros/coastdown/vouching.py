@@ -81,7 +81,7 @@ _REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
 _FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 _TOGETHER = 0.5  # share of those of a kind that have one driver, setting or aerial
 _STILL = 0.5  # share of minutes of a source that was wrong just before
-_STUCK_LOOK_S = 60
+_STUCK_LOOK_S = 60  # from one look for a shaft that sticks to the next
 _DISTINCT = 0.9  # of the readings of a shaft whose sensor has no coarse levels
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
@@ -373,7 +373,7 @@ class Vouching:
 
     @property
     def ever(self) -> dict[str, str]:
-        """The last that was said of each source that was not used; of none: of all; of shafts."""
+        """What was last said of shafts and of unused sources; of all where there is none."""
         left, shaft = set(self.left_out), Channel.SHAFT.input
         told = {shaft} | left if left - {shaft} else self._said
         return {name: one.text for name, one in self._said.items() if name in told}
@@ -432,7 +432,7 @@ class Vouching:
         """
         Return bins in which the channels that are not used were never read.
 
-        Those `shafts` are, of which the regimes judge themselves that they contradict the motion.
+        With `shafts`, those that contradict the motion stay in: the regimes judge that themselves.
         """
         doubted = self.until > self._now
         if shafts:
