@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, InputCounts
 from shipdrag_ros.estimation import estimators
 from shipdrag_ros.estimation.result import (
     Estimate,
@@ -33,7 +33,7 @@ from shipdrag_ros.estimation.result import (
 )
 from shipdrag_ros.fleet.store import FROUDE, BagResult, Store, bag_schema, coastdown_schema
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import InputCounts, Recorded
+from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.run_result import RunResult, TrueCurve
 from shipdrag_ros.ship import Ship
 from tests.runs import seen

@@ -28,7 +28,7 @@ from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Onset
 from shipdrag_ros.messages.topics import OK
-from shipdrag_ros.node.health import Counts, InputFacts, InputStates
+from shipdrag_ros.node.health import InputFacts, InputStates
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     MOTION_INPUTS,
@@ -162,10 +162,10 @@ def well(monitor: Monitor, states: InputStates, second: int) -> bool:
             type=name,
             age_s=0.0,
             doubt=doubts.get(name, ''),
-            total=Counts(health.messages, health.used, health.rejected),
+            total=counts,
         )
-        for name, health in monitor.health().items()
-        if health.messages
+        for name, counts in monitor.counts().items()
+        if counts.messages
     ]
     found = states.tick(facts, simulated=True, now_s=float(second))
     return all(each.finding.level == OK for each in found)

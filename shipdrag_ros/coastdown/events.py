@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -27,6 +28,85 @@ NOT_ALL = (
     'may have slowed her there; r(v) is from the coastdown alone'
 )
 """What is said of a coastdown that is part of a `WholeGlide`, and in which nothing acted."""
+
+
+@dataclass(frozen=True)
+class InputCounts:
+    """
+    What became of the messages of an input, up to a moment or over some time.
+
+    Attributes
+    ----------
+    messages
+        Heard.
+    used, rejected
+        Readings that were used, and those that were not by reason. A message holds one
+        reading, but of shafts and pitches one a joint; one that cannot be read counts
+        as a reading rejected.
+    lost
+        Messages sent and not heard.
+    unstamped
+        Readings whose header holds no time.
+    """
+
+    messages: int = 0
+    used: int = 0
+    rejected: Mapping[str, int] = field(default_factory=dict)
+    lost: int = 0
+    unstamped: int = 0
+
+    @property
+    def readings(self) -> int:
+        """Used and rejected."""
+        return self.used + sum(self.rejected.values())
+
+    def since(self, before: InputCounts) -> InputCounts:
+        """
+        Return what was added since an earlier moment.
+        """
+        return InputCounts(
+            self.messages - before.messages,
+            self.used - before.used,
+            Counter(self.rejected) - Counter(before.rejected),  # without what is not above 0
+            self.lost - before.lost,
+            self.unstamped - before.unstamped,
+        )
+
+
+@dataclass(frozen=True)
+class MonitorProgress:
+    """
+    How far the monitor is.
+
+    Attributes
+    ----------
+    steady_s
+        Since when the ship is steady; 0 where she is not.
+    used_s
+        The longest steady record that is of use.
+    coastdown_since_ns
+        Stamp of the stop; None where no coastdown runs.
+    probability
+        Of each regime now, by its name; empty while they sleep, in steady sailing.
+    """
+
+    steady_s: float
+    used_s: float
+    coastdown_since_ns: int | None
+    probability: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The same as texts by key, the unit in the key."""
+        figures = {
+            'steady lead [s]': f'{self.steady_s:.0f}',
+            'steady lead used at most [s]': f'{self.used_s:.0f}',
+        }
+        if self.coastdown_since_ns is not None:
+            figures['coastdown since [ns]'] = str(self.coastdown_since_ns)
+        for name, share in self.probability.items():
+            figures[f'probability of {name.replace("_", " ")} [1]'] = f'{share:.2f}'
+        return figures
 
 
 class State(Enum):

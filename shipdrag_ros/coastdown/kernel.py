@@ -24,7 +24,7 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
 )
 from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.memory import InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.ring import REFUSED, append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
@@ -163,9 +163,7 @@ def _look_at_shaft(bins: Bins, watch: np.record, tuning: Tuning, channel: int, n
 @compiled(inline=True, uncounted=True)
 def _count(tally: InputTally, channel: int, stamp: int, arrival: int) -> None:
     """Count an accepted sample."""
-    recent = tally.reasons[channel, Reason.ACCEPTED] % RECENT
-    tally.stamp_ns[channel, recent] = stamp
-    tally.arrival_ns[channel, recent] = arrival
+    tally.clock_ns[channel] = stamp - arrival
     tally.reasons[channel, Reason.ACCEPTED] += 1
 
 

@@ -14,16 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.events import InputCounts
 from shipdrag_ros.coastdown.past import CHANNELS, NEVER
 from shipdrag_ros.coastdown.ring import FIRST_CAPACITY, RingBuffer
 from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
 from shipdrag_ros.coastdown.validate import CheckMemory, Limits
-from shipdrag_ros.samples import Int64, Reason
+from shipdrag_ros.samples import FURTHER, INPUTS, Channel, Int64, Reason
 
 ALWAYS = 2**62  # a stamp after all stamps
-RECENT = 16  # samples of each channel that its rate and clock offset are taken from
-
-
 WATCH = np.dtype(
     [
         ('source', 'i8'),  # that the regimes follow; NEVER while they sleep
@@ -58,30 +56,39 @@ def fresh_watch() -> NDArray[np.void]:
 
 class InputTally(NamedTuple):
     """
-    What the health of the inputs is known from; a reset of the clock spares it.
+    What became of the samples; a reset of the clock spares it.
 
     Attributes
     ----------
     reasons : (channels, reasons) int64
         Samples by `Reason`.
-    stamp_ns, arrival_ns : (channels, RECENT) int64
-        Of the last accepted samples.
+    clock_ns : (channels,) int64
+        Stamp less arrival of the last accepted sample.
     """
 
     reasons: Int64
-    stamp_ns: Int64
-    arrival_ns: Int64
+    clock_ns: Int64
 
     @classmethod
     def fresh(cls) -> InputTally:
         """
         Return the counts before the first sample.
         """
-        return cls(
-            np.zeros((CHANNELS, len(Reason)), np.int64),
-            np.full((CHANNELS, RECENT), NEVER),
-            np.full((CHANNELS, RECENT), NEVER),
-        )
+        return cls(np.zeros((CHANNELS, len(Reason)), np.int64), np.zeros(CHANNELS, np.int64))
+
+    def counts(self) -> dict[str, InputCounts]:
+        """
+        Return what became of the samples of every input; of further instruments, of those heard.
+        """
+        found = {}
+        for name in INPUTS:
+            channels = [channel for channel in Channel if channel.input == name]
+            times = self.reasons[channels].sum(axis=0).tolist()
+            if any(times) or name not in FURTHER:
+                why = {r.name.lower(): n for r, n in zip(Reason, times, strict=True) if n}
+                used = why.pop(Reason.ACCEPTED.name.lower(), 0)
+                found[name] = InputCounts(sum(times), used, why)
+        return found
 
 
 class Memory(NamedTuple):

@@ -23,6 +23,8 @@ from shipdrag_ros.coastdown.events import (
     EndedBy,
     EndedCoastdown,
     Event,
+    InputCounts,
+    MonitorProgress,
     NotCoastdown,
     Onset,
     Reset,
@@ -30,9 +32,8 @@ from shipdrag_ros.coastdown.events import (
     WholeGlide,
 )
 from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, heading_doubt, mean_heading
-from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LATE_S, LEAD_S, Dated, RegimeFilter
@@ -45,7 +46,7 @@ from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.choice import averaged
 from shipdrag_ros.estimation.estimators import WindowEstimator, shielded
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block, Reason
+from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
 
 _SILENT = (EndedBy.DATA_STOP, EndedBy.SILENCE)
@@ -192,11 +193,11 @@ class Monitor:
         """
         return self._vouching.left_out
 
-    def health(self) -> dict[str, InputHealth]:
+    def counts(self) -> dict[str, InputCounts]:
         """
-        Say how every input is doing, by its name.
+        Return what became of the samples of every input, by its name.
         """
-        return input_health(self._memory.tally)
+        return self._memory.tally.counts()
 
     def update(self, block: Block) -> list[Event]:
         """
@@ -282,9 +283,7 @@ class Monitor:
         if self._regimes is None or self._silent:
             self._wake(source, int(self._watch.seen))
         assert self._regimes is not None
-        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
-        clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
-        self._regimes.tell((receive_ns + clock_ns) / SECOND_NS)
+        self._regimes.tell((receive_ns + int(tally.clock_ns[source])) / SECOND_NS)
         return ''
 
     def fall_silent(self) -> list[Event]:

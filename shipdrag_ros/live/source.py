@@ -22,7 +22,7 @@ from shipdrag_ros.live.outputs import PastRun
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.messages.topics import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.node.background import Diagnosing
-from shipdrag_ros.node.health import Counts, InputFacts, InputStates, Standing, state_status
+from shipdrag_ros.node.health import InputFacts, InputStates, Standing, state_status
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import feed, settings_of
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
@@ -177,9 +177,9 @@ class Timeline:
                 senders=('the record',),
                 age_s=(now_ns - last_ns[name]) * 1e-9,
                 doubt=doubts.get(name, ''),
-                total=Counts(health.messages, health.used, health.rejected),
+                total=counts,
             )
-            for name, health in monitor.health().items()
+            for name, counts in monitor.counts().items()
             if name in last_ns
         ]
         states = inputs.tick(facts, simulated=True, now_s=now_ns * 1e-9)

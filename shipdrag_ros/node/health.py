@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import State
+from shipdrag_ros.coastdown.events import InputCounts, State
 from shipdrag_ros.display import printable
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import conditions
@@ -44,56 +44,13 @@ class Finding:
     text: str
 
 
-@dataclass(frozen=True)
-class Counts:
-    """
-    What became of the messages of an input, up to a moment or over some time.
-
-    Attributes
-    ----------
-    messages
-        Heard.
-    used
-        Readings accepted.
-    rejected
-        Readings that were not, by reason; those that could not be read too.
-    lost
-        Messages sent and not heard.
-    unstamped
-        Readings whose header holds no time.
-    """
-
-    messages: int = 0
-    used: int = 0
-    rejected: Mapping[str, int] = field(default_factory=dict)
-    lost: int = 0
-    unstamped: int = 0
-
-    @property
-    def readings(self) -> int:
-        """Used and rejected."""
-        return self.used + sum(self.rejected.values())
-
-    def since(self, before: Counts) -> Counts:
-        """
-        Return what was added since an earlier moment.
-        """
-        return Counts(
-            self.messages - before.messages,
-            self.used - before.used,
-            Counter(self.rejected) - Counter(before.rejected),  # without what is not above 0
-            self.lost - before.lost,
-            self.unstamped - before.unstamped,
-        )
-
-
 class Recently:
     """The counts of an input over the last `RECENT_S`."""
 
     def __init__(self) -> None:
-        self._past: deque[tuple[float, Counts]] = deque()
+        self._past: deque[tuple[float, InputCounts]] = deque()
 
-    def add(self, now_s: float, counts: Counts) -> None:
+    def add(self, now_s: float, counts: InputCounts) -> None:
         """
         Take the counts of a moment on a steady clock [s].
         """
@@ -109,9 +66,9 @@ class Recently:
         return self._past[-1][0] - self._past[0][0] if self._past else 0.0
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> InputCounts:
         """What was added over that time."""
-        return self._past[-1][1].since(self._past[0][1]) if self._past else Counts()
+        return self._past[-1][1].since(self._past[0][1]) if self._past else InputCounts()
 
     @property
     def rate_hz(self) -> float:
@@ -179,8 +136,8 @@ class InputFacts:
     misfit: str | None = None
     active: bool = True
     age_s: float | None = None
-    total: Counts = Counts()
-    recent: Counts = Counts()
+    total: InputCounts = field(default_factory=InputCounts)
+    recent: InputCounts = field(default_factory=InputCounts)
     seconds: float = 0.0
     offset_s: float | None = None
     behind: tuple[str, float] | None = None

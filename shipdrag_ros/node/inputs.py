@@ -32,12 +32,12 @@ from rclpy.qos import (
 )
 from rclpy.subscription import Subscription
 
-from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.coastdown.events import InputCounts
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
-from shipdrag_ros.node.health import Counts, InputFacts
+from shipdrag_ros.node.health import InputFacts
 from shipdrag_ros.samples import FURTHER, SECOND_NS
 
 
@@ -374,13 +374,13 @@ class InputTopic:
         """Median of arrival minus stamp of the last readings, used or not [s]."""
         return median(self._offsets_s) if self._offsets_s else None
 
-    def facts(self, health: InputHealth | None, doubt: str) -> InputFacts:
+    def facts(self, judged: InputCounts | None, doubt: str) -> InputFacts:
         """
         Return what the input is judged by.
 
         Parameters
         ----------
-        health
+        judged
             By the monitor; None while the node is not active.
         doubt
             What is odd about it besides.
@@ -398,8 +398,8 @@ class InputTopic:
             'not used, node inactive or without clock': self.unused,
             **{f'unreadable {reason}': times for reason, times in self.unreadable.items()},
         }
-        used = 0 if health is None else health.used
-        rejected = dict(self.unreadable) | ({} if health is None else health.rejected)
+        used = 0 if judged is None else judged.used
+        rejected = dict(self.unreadable) | dict({} if judged is None else judged.rejected)
         return InputFacts(
             self.name,
             type=self.type or self.fed_by or None,
@@ -411,9 +411,9 @@ class InputTopic:
             absent=self.absent,
             senders=self.senders,
             misfit=self.incompatible_qos,
-            active=health is not None,
+            active=judged is not None,
             age_s=self.age_s,
-            total=Counts(self.received, used, rejected, self.lost, self.unstamped),
+            total=InputCounts(self.received, used, rejected, self.lost, self.unstamped),
             offset_s=self.clock_offset_s,
             doubt=doubt,
             about=about,

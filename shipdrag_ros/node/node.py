@@ -319,7 +319,7 @@ class CoastdownNode(LifecycleNode):
                 break
         now_ns = self._now_ns()
         session = self._session
-        judged = {} if session is None else session.monitor.health()
+        judged = {} if session is None else session.monitor.counts()
         if session is not None:
             self._watching.tick(session, judged, now_ns)
             for part in session.recorder.removed():

@@ -23,10 +23,11 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.coastdown import InputHealth, Monitor
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
     EndedCoastdown,
     Event,
+    InputCounts,
     NoEstimate,
     OnCoastdown,
     State,
@@ -423,7 +424,7 @@ class Watching:
         self._tick_s = -math.inf
         self._stepped: dict[str, tuple[float, str]] = {}
 
-    def tick(self, session: Session, health: Mapping[str, InputHealth], now_ns: int) -> None:
+    def tick(self, session: Session, judged: Mapping[str, InputCounts], now_ns: int) -> None:
         """
         Look, and inform the session.
 
@@ -437,7 +438,7 @@ class Watching:
         self.watch_clock(session, now_ns)
         session.watch_clock(now_ns)  # also while nothing arrives
         self._watch_sensors(session, now_ns)
-        self._watch_silence(session, health, now_ns)
+        self._watch_silence(session, judged, now_ns)
         for topic in self._topics:
             if topic.lost > self._lost[topic.name]:
                 more, self._lost[topic.name] = topic.lost - self._lost[topic.name], topic.lost
@@ -484,12 +485,12 @@ class Watching:
             session.clock_was_set(f'{topic.name}: {text}', now_ns, ends=topic.name in ALL_MOTION)
 
     def _watch_silence(
-        self, session: Session, health: Mapping[str, InputHealth], now_ns: int
+        self, session: Session, judged: Mapping[str, InputCounts], now_ns: int
     ) -> None:
         steady_s = time.monotonic()
         now = (steady_s, now_ns)
         ages = [topic.age_s for topic in self._topics if topic.name in ALL_MOTION]
-        used = sum(health[name].used for name in ALL_MOTION if name in health)
+        used = sum(judged[name].used for name in ALL_MOTION if name in judged)
         last_s, self._tick_s = steady_s - self._tick_s, steady_s
         away = last_s > AWAY_S
         if away or any(age is not None and age <= last_s for age in ages):

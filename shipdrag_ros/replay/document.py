@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, InputCounts, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.replay import InputCounts, Recorded
+from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.tables import COLUMNS, OF_CONDITIONS
 from shipdrag_ros.replay.together import Ranking, together

@@ -7,7 +7,6 @@ Also one window of it, given by hand, through the same estimator.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -22,11 +21,13 @@ from shipdrag_ros.coastdown.events import (
     Dismissal,
     EndedCoastdown,
     Event,
+    InputCounts,
     NoEstimate,
     NotCoastdown,
     Update,
     WholeGlide,
 )
+from shipdrag_ros.coastdown.memory import InputTally
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
@@ -36,7 +37,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Reason, concatenate
+from shipdrag_ros.samples import SECOND_NS, Block, concatenate
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import checked
 
@@ -45,26 +46,6 @@ PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
 StopTime = float | datetime
 """In s from the start of the bag, or as a time of day with its zone."""
-
-
-@dataclass(frozen=True)
-class InputCounts:
-    """
-    What became of one input.
-
-    Attributes
-    ----------
-    messages
-        Messages that came, in the window where one is given.
-    used, rejected
-        Readings that were used, and those that were not by reason. A message holds one
-        reading, but of shafts and pitches one a joint; one that cannot be read counts
-        as a reading rejected.
-    """
-
-    messages: int
-    used: int
-    rejected: Mapping[str, int]
 
 
 class HeardSpan(NamedTuple):
@@ -317,16 +298,13 @@ def _as_on_board(
         if progress is not None:
             progress(inputs.messages.total(), total)
     take(monitor.finish())
-    health = monitor.health()
-    used = {name: one.used for name, one in health.items()}
-    rejected = {name: one.rejected for name, one in health.items()}
     return ReplayResult(
         run,
         ship,
         parameters,
         tuple(coastdowns),
         tuple(kept),
-        _counts(run, inputs, used, rejected),
+        _counts(run, inputs, monitor.counts()),
         comparison.finish(),
         monitor.steady_lead_s,
         monitor.contradictions(),
@@ -354,43 +332,34 @@ def _in_window(
 ) -> ReplayResult:
     samples = read_window(run, ship, parameters, window)
     coastdown = estimate_window(samples, ship, parameters)
-    used: Counter[str] = Counter()
-    rejected: dict[str, Counter[str]] = {}
-    inside = samples.inside
-    for channel, code in zip(samples.block.channel[inside], samples.reasons[inside], strict=True):
-        name, reason = Channel(channel).input, Reason(code)
-        if reason is Reason.ACCEPTED:
-            used[name] += 1
-        else:
-            rejected.setdefault(name, Counter())[reason.name.lower()] += 1
+    tally, inside = InputTally.fresh(), samples.inside
+    np.add.at(tally.reasons, (samples.block.channel[inside], samples.reasons[inside]), 1)
     return ReplayResult(
         run,
         ship,
         parameters,
         (coastdown,),
         (coastdown, *coastdown.cuts),
-        _counts(run, samples.inputs, used, rejected),
+        _counts(run, samples.inputs, tally.counts()),
         Recorded(by=_by(run)),
         heard=(HeardSpan.of(samples.block),) if len(samples.block) else (),
     )
 
 
 def _counts(
-    run: Run,
-    inputs: RunSamples,
-    used: Mapping[str, int],
-    rejected: Mapping[str, Mapping[str, int]],
+    run: Run, inputs: RunSamples, judged: Mapping[str, InputCounts]
 ) -> dict[str, InputCounts]:
     """Join what the decoder, the matching of types and the validation have counted."""
     counts: dict[str, InputCounts] = {}
     for name in TOPICS:
         refused = run.refused[name]
-        reasons = dict(inputs.unreadable.get(name, {})) | dict(rejected.get(name, {}))
+        of_input = judged.get(name, InputCounts())
+        reasons = dict(inputs.unreadable.get(name, {})) | dict(of_input.rejected)
         if refused:
             reasons[WRONG_TYPE] = refused
         messages = inputs.messages[name] + refused
         if messages:
-            counts[name] = InputCounts(messages, used.get(name, 0), reasons)
+            counts[name] = InputCounts(messages, of_input.used, reasons)
     return counts
 
 

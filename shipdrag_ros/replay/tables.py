@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import ENDED_BY, EndedCoastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, EndedCoastdown, InputCounts, NotCoastdown
 from shipdrag_ros.display import Table, spreadsheet_text
 from shipdrag_ros.estimation import tables
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.result import FroudeMax
 from shipdrag_ros.estimation.words import FROUDE_MAX_BY
-from shipdrag_ros.replay import InputCounts, words
+from shipdrag_ros.replay import words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import Ranking
 

@@ -18,6 +18,7 @@ from shipdrag_ros.coastdown.events import (
     EndedBy,
     EndedCoastdown,
     Event,
+    InputCounts,
     NotCoastdown,
     Regimes,
     Reset,
@@ -25,7 +26,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.messages import Unreadable
-from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
+from shipdrag_ros.replay import Recorded, ReplayResult
 from shipdrag_ros.samples import ALL_MOTION, MOTION_INPUTS, SECOND_NS, Channel
 from shipdrag_ros.ship import Ship
 

@@ -132,8 +132,8 @@ def test_what_was_refused_and_was_true_is_in_live_and_replay_alike(tmp_path: Pat
     events = [*whole.update(block), *whole.finish()]
     again = [each for i in range(len(block)) for each in part.update(block[i : i + 1])]
     assert bits([*again, *part.finish()]) == bits(events)
-    assert part.health() == whole.health()
-    health = whole.health()['speed_through_water']
+    assert part.counts() == whole.counts()
+    health = whole.counts()['speed_through_water']
     assert health.rejected == {'outlier': 4}
     assert health.used == int(of_log.sum()) - 4
     ended = [each for each in events if isinstance(each, EndedCoastdown) and each.estimate]

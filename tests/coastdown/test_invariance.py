@@ -111,7 +111,7 @@ def run(ship, blocks) -> tuple[list, dict]:
     events = []
     for block in blocks:
         events += monitor.update(block)
-    return events + monitor.finish(), monitor.health()
+    return events + monitor.finish(), monitor.counts()
 
 
 @pytest.fixture(scope='module')
@@ -267,7 +267,7 @@ def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:
     late = np.where(eventful.channel == Channel.HEADING, S, 0)
     moved = in_arrival_order([replace(eventful, receive_ns=eventful.receive_ns + late)])
     events, health = run(ship, [moved])
-    assert health['heading'].clock_offset_s == pytest.approx(1.0)
+    assert health['heading'].used
     # two stops, and the glide that goes on after the turn
     ended = [event for event in events if isinstance(event, EndedCoastdown)]
     standing = [event.ended_by for event in ended if not event.withdrawn]

@@ -248,10 +248,10 @@ def test_numbers_of_channels_stay_as_bags_and_stores_have_them() -> None:
 
 def test_each_instrument_is_judged_by_itself_and_told_where_it_was_heard(ship: Ship) -> None:
     monitor, _ = watched(ship, sailed(ship, Sensor(channel=FIRST, sd=0.03)))
-    assert list(monitor.health()) == list(INPUTS)[:8]
+    assert list(monitor.counts()) == list(INPUTS)[:8]
     spiky = Sensor(channel=SECOND, sd=0.03, outlier_fraction=0.05, outlier_size=4.0)
     monitor, _ = watched(ship, sailed(ship, Sensor(channel=FIRST, sd=0.03), spiky))
-    health = monitor.health()
+    health = monitor.counts()
     assert list(health) == [*list(INPUTS)[:8], 'speed_through_water_2']
     assert not health['speed_through_water'].rejected
     assert 50 < health['speed_through_water_2'].rejected['outlier'] < 100

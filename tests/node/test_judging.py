@@ -11,7 +11,7 @@ import pytest
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages.topics import ERROR, OK, STALE, WARN
 from shipdrag_ros.node.health import (
-    Counts,
+    InputCounts,
     InputFacts,
     Recently,
     behind_others,
@@ -25,14 +25,14 @@ WELL = InputFacts(
     type='geometry_msgs/msg/TwistStamped',
     senders=('/log',),
     age_s=0.1,
-    recent=Counts(300, 300),
+    recent=InputCounts(300, 300),
     seconds=30.0,
     offset_s=0.2,
 )
 
 
-def counts(used: int, **rejected: int) -> Counts:
-    return Counts(used + sum(rejected.values()), used, rejected)
+def counts(used: int, **rejected: int) -> InputCounts:
+    return InputCounts(used + sum(rejected.values()), used, rejected)
 
 
 def test_what_is_well_is_receiving() -> None:
@@ -53,8 +53,8 @@ def test_what_is_well_is_receiving() -> None:
             ERROR,
             'its clock is 3600.0 s ahead of that of this computer',
         ),
-        ({'recent': Counts(300, 1, {'duplicate': 299}, 0, 300)}, ERROR, 'holds no time'),
-        ({'recent': Counts(300, 300, {}, 7)}, WARN, '7 messages lost in 30 s'),
+        ({'recent': InputCounts(300, 1, {'duplicate': 299}, 0, 300)}, ERROR, 'holds no time'),
+        ({'recent': InputCounts(300, 300, {}, 7)}, WARN, '7 messages lost in 30 s'),
         ({'recent': counts(3)}, WARN, '0.1 Hz is too slow'),
         ({'recent': counts(5), 'seconds': 25.3}, WARN, '0.19 Hz is too slow, at least 0.2'),
         ({'behind': ('position', 6.0)}, WARN, '6.0 s behind those of position'),
@@ -111,8 +111,10 @@ def test_only_what_came_lately_counts() -> None:
     recently = Recently()
     for second in range(100):
         bad = max(second - 50, 0)
-        recently.add(float(second), Counts(10 * second, 10 * (second - bad), {'nan': 10 * bad}))
-    assert recently.counts == Counts(300, 0, {'nan': 300})
+        recently.add(
+            float(second), InputCounts(10 * second, 10 * (second - bad), {'nan': 10 * bad})
+        )
+    assert recently.counts == InputCounts(300, 0, {'nan': 300})
     assert recently.seconds == 30.0
     assert recently.rate_hz == pytest.approx(10.0)
 
@@ -121,7 +123,7 @@ def test_a_sensor_that_is_switched_on_late_is_not_too_slow() -> None:
     recently = Recently()
     for second in range(22):
         said = 10 * max(second - 20, 0)
-        recently.add(float(second), Counts(said, said))
+        recently.add(float(second), InputCounts(said, said))
     found = judge(replace(WELL, recent=recently.counts, seconds=recently.seconds))
     assert recently.seconds == 1.0
     assert found.level == OK
@@ -129,10 +131,10 @@ def test_a_sensor_that_is_switched_on_late_is_not_too_slow() -> None:
 
 def test_counts_that_begin_anew_are_no_loss() -> None:
     recently = Recently()
-    recently.add(0.0, Counts(100, 100))
-    recently.add(1.0, Counts(110, 5))
-    recently.add(2.0, Counts(120, 15))
-    assert recently.counts == Counts(10, 10)
+    recently.add(0.0, InputCounts(100, 100))
+    recently.add(1.0, InputCounts(110, 5))
+    recently.add(2.0, InputCounts(120, 15))
+    assert recently.counts == InputCounts(10, 10)
 
 
 def test_the_one_with_the_least_lag_is_the_measure() -> None:

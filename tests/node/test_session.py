@@ -133,13 +133,13 @@ def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_ord
         desk.session.reset('asked for', START_NS + 9 * SECOND_NS)
         desk.feed(speeds(arrivals[10:15]))
     assert patient.session.waiting == 15
-    assert patient.session.monitor.health()['speed_through_water'].used == 0
+    assert patient.session.monitor.counts()['speed_through_water'].used == 0
     assert EventKind.RESET not in patient.kinds()
     patient.ready = True
     for desk in (prompt, patient):
         desk.feed(speeds(arrivals[15:]))
     assert patient.session.waiting == 0
-    assert patient.session.monitor.health() == prompt.session.monitor.health()
+    assert patient.session.monitor.counts() == prompt.session.monitor.counts()
     assert [it.payload for it in patient.published] == [it.payload for it in prompt.published]
     (one,), (other,) = prompt.bags(), patient.bags()
     assert sorted(one) == sorted(other)

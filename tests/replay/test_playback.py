@@ -16,14 +16,21 @@ import pytest
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, StopMark, open_runs
 from shipdrag_ros.cli import main
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, Onset, Update
+from shipdrag_ros.coastdown.events import (
+    EndedBy,
+    EndedCoastdown,
+    Event,
+    InputCounts,
+    Onset,
+    Update,
+)
 from shipdrag_ros.errors import BagError, SimulationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, coast_windows, replay
+from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import Ship, StatedEffect
 from tests.runs import write_run

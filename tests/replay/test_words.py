@@ -20,13 +20,13 @@ from shipdrag_ros.coastdown.events import (
     EndedBy,
     EndedCoastdown,
     Event,
+    InputCounts,
     Regimes,
     Reset,
 )
 from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import (
-    InputCounts,
     Recorded,
     ReplayResult,
     replay,
