@@ -31,7 +31,12 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.given_window import margin_around_ns, parts_of_one_clock
-from shipdrag_ros.replay.playback import ReplayResult, feed, recorded_parameters
+from shipdrag_ros.replay.playback import (
+    ReplayResult,
+    feed,
+    recorded_parameters,
+    refuse_without_input,
+)
 from shipdrag_ros.samples import (
     ALL_MOTION,
     KIND,
@@ -251,9 +256,12 @@ def accepted_samples(
 
     Raises
     ------
+    BagError
+        If it holds no input.
     ParameterError
         If those attached cannot be used.
     """
+    refuse_without_input(run)
     parameters = recorded_parameters(run)
     block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
     reason = validate(block, parameters, _SHORTEST_M if ship is None else ship.length_m)

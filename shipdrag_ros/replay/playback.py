@@ -231,10 +231,17 @@ def settings_of(
     SimulationError
         Naming an effect of the ship file that is not known.
     """
-    if not any(topic.input for topic in run.topics):
-        raise BagError(_no_input(run))
+    refuse_without_input(run)
     used = checked(ship_of(run, ship))
     return used, recorded_parameters(run) if parameters is None else parameters
+
+
+def refuse_without_input(run: Run) -> None:
+    """
+    Raise a `BagError` that says what a run holds, if that is no input.
+    """
+    if not any(topic.input for topic in run.topics):
+        raise BagError(_no_input(run))
 
 
 def _no_input(run: Run) -> str:

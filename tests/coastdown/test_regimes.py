@@ -15,7 +15,13 @@ from shipdrag_ros.coastdown.regimes.births import bear, brakes, glides
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.numbers import BIN_S, NUMBERS, WIND_SD
-from shipdrag_ros.coastdown.regimes.read_out import Spans, probability_of, slowed_by, unpowered
+from shipdrag_ros.coastdown.regimes.read_out import (
+    Spans,
+    probability_of,
+    slowed_by,
+    smoothed,
+    unpowered,
+)
 from shipdrag_ros.coastdown.regimes.state import (
     ADVANCE,
     AMID,
@@ -366,6 +372,19 @@ def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:
     monitor.engine_stopped(START_NS + 900 * S)
     events += [*monitor.update(block[at:]), *monitor.finish()]
     assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+
+
+def test_probabilities_of_regimes_are_shares_of_what_was_kept() -> None:
+    """None is negative by rounding, and together they are one where histories were dropped."""
+    weight = np.array([0.1, 0.2, 0.3, 0.35])  # 0.05 was dropped
+    zero, over, end = np.zeros(4), np.array([15.0, 30.0, 45.0, 60.0]), np.full(4, 100.0)
+    code, same = np.full(4, GLIDE), zero > 0.0
+    glide = Spans(code, zero, zero, zero, over, weight, code, same)
+    brake = Spans(np.full(4, BRAKE), over, over, over, end, weight, code, same)
+    both = Spans._make(np.concatenate(each) for each in zip(glide, brake, strict=True))
+    shares = np.array(list(smoothed(both, 20, 5.0).values()))
+    assert shares.min() == 0.0
+    assert shares.sum(axis=0) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_regimes_that_are_long_over_took_no_speed() -> None:

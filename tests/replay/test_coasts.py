@@ -11,6 +11,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.errors import BagError
 from shipdrag_ros.replay import (
     accepted_samples,
     clocks_apart,
@@ -95,6 +96,16 @@ def test_zeros_of_any_log_are_kept_where_asked_for(tmp_path: Path, channel: Chan
     every, _ = accepted_samples(run, None, zeros=True)
     assert len(sound) < 1000
     assert len(every) == len(stamps)
+
+
+def test_a_run_without_an_input_says_what_it_holds(tmp_path: Path) -> None:
+    stamps = 10**18 + np.arange(10) * 10**9
+    path = write_run(tmp_path / 'a.mcap', Block.of(Channel.HEADING, stamps, np.zeros(10)))
+    (run,) = open_runs([path])
+    (topic,) = run.topics
+    run.topics = (replace(topic, topic='/gyro', input=None),)
+    with pytest.raises(BagError, match=r'holds none of the inputs .*/gyro .*--remap'):
+        accepted_samples(run, None)
 
 
 @pytest.mark.parametrize(

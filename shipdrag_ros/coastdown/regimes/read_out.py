@@ -134,7 +134,7 @@ def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
     edges = np.zeros(bins + 1)
     np.add.at(edges, np.clip(np.rint(found.begin_s / step_s).astype(int), 0, bins), found.weight)
     np.add.at(edges, np.clip(np.rint(found.end_s / step_s).astype(int), 0, bins), -found.weight)
-    return np.cumsum(edges)[:-1]
+    return np.cumsum(edges)[:-1].clip(0.0, 1.0)  # but for rounding
 
 
 def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
@@ -151,7 +151,10 @@ def smoothed(found: Spans, bins: int, step_s: float) -> dict[str, Float64]:
         P_TURNING: found.part((found.what == s.TURN) | (found.what == s.GLIDE_TURN)),
         P_ENGAGED: found.part(engaged),
     }
-    return {name: probability_of(of[number], bins, step_s) for number, name in enumerate(OUT)}
+    share = np.array([probability_of(of[number], bins, step_s) for number in range(len(OUT))])
+    # of the histories that were kept: the least likely are dropped after they are weighed
+    share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
+    return dict(zip(OUT, share, strict=True))
 
 
 def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
