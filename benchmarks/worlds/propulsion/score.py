@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +19,6 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import in_arrival_order
 
 HELD_SHARE = 0.8
-SPANS = bool(os.environ.get('SPANS'))  # spans alone, without an estimate: a tenth of the time
 _NO_ESTIMATE: Any = SimpleNamespace(samples={})  # in the place of one
 DRIVEN_S = 10.0
 SURE = 0.7  # probability of a glide that is said
@@ -93,21 +91,19 @@ class Row:
     sure_s: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
-def score(case: Case, suites: dict[str, tuple[str, ...]]) -> list[Row]:
+def score(case: Case, suites: dict[str, tuple[str, ...]], *, spans: bool = False) -> list[Row]:
     """
     Make a case and give it to the program under each suite.
+
+    Spans alone, without an estimate, take a tenth of the time.
     """
     world = build(case)
-    return [_one(world, name, instruments) for name, instruments in suites.items()]
+    given = {'estimate': None, 'final': lambda *_: _NO_ESTIMATE} if spans else {}
+    return [_one(world, name, instruments, given) for name, instruments in suites.items()]
 
 
-def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
-    parameters = Parameters(update_s=60.0)
-    monitor = (
-        Monitor(world.ship, parameters, estimate=None, final=lambda *_: _NO_ESTIMATE)
-        if SPANS
-        else Monitor(world.ship, parameters)
-    )
+def _one(world: World, suite: str, instruments: tuple[str, ...], given: dict[str, Any]) -> Row:
+    monitor = Monitor(world.ship, Parameters(update_s=60.0), **given)
     events = [
         *monitor.update(in_arrival_order(inputs(world, instruments))),
         *monitor.finish(),
@@ -129,7 +125,7 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         dated = spans[best][0] - glide[0]
         delay = kept[best].onset_detected_ns
         delay = np.nan if delay is None else seconds(delay) - glide[0]
-        if not SPANS:
+        if not given:
             rms, cover = _error(truth, kept[best].estimate)
     return Row(
         world.case,
