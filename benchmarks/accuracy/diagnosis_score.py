@@ -38,7 +38,6 @@ from benchmarks._tables import table as markdown
 from benchmarks.worlds.hidden import cases, scoring
 from benchmarks.worlds.hidden.recording import Recording
 from benchmarks.worlds.hidden_b import cases as cases_b
-from benchmarks.worlds.hidden_b import facts as facts_b
 from benchmarks.worlds.hidden_b import oracle
 from benchmarks.worlds.hidden_b import plans as plans_b
 from shipdrag_ros.bags import BagWriter
@@ -106,7 +105,7 @@ def diagnosis(by: str, number: int, hidden: Any, facts: bool = False) -> Diagnos
         module, _, name = by.partition(':')
         function = getattr(import_module(module), name)
         return lambda seen: function(seen.ship_file, [as_block(run) for run in seen.runs])
-    more = facts_b.arguments(hidden.reveal(number).facts) if facts else []
+    more = plans_b.arguments(hidden.reveal(number).facts) if facts else []
 
     def command(seen: cases.Observation) -> Found:
         with TemporaryDirectory() as folder:

@@ -31,8 +31,15 @@ from benchmarks.worlds.hidden_b.oracle_priors import (
     possible,
     shares,
 )
-from benchmarks.worlds.hidden_b.oracle_rows import Run
-from benchmarks.worlds.hidden_b.oracle_sail import Change, made, run_of, sailed, shared, stated
+from benchmarks.worlds.hidden_b.oracle_sail import (
+    Change,
+    Run,
+    made,
+    run_of,
+    sailed,
+    shared,
+    stated,
+)
 from benchmarks.worlds.hidden_b.plans import PAIRS
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import steady_point

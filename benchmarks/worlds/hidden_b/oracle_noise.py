@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.worlds.hidden_b.hulls import AIR, GRAVITY, Array
-from benchmarks.worlds.hidden_b.kit import Kit
-from benchmarks.worlds.hidden_b.oracle_rows import Means, Run
-from benchmarks.worlds.hidden_b.oracle_sail import Sailed
+from benchmarks.worlds.hidden_b.instruments import Kit
+from benchmarks.worlds.hidden_b.oracle_sail import Means, Run, Sailed
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import Track, sail_at
 

@@ -8,12 +8,20 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.cases import EPOCH_NS, LEAST, calm, fresh, matters, steady_of
+from benchmarks.worlds.hidden_b.cases import (
+    EPOCH_NS,
+    LEAST,
+    calm,
+    fresh,
+    matters,
+    quiet,
+    run_down_s,
+    seen,
+    steady_of,
+)
 from benchmarks.worlds.hidden_b.effects import FREE, Draw, Hidden
 from benchmarks.worlds.hidden_b.hulls import Array, draw_hull
-from benchmarks.worlds.hidden_b.instruments import INPUTS, Recording, read
-from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.measure import quiet, run_down_s, seen
+from benchmarks.worlds.hidden_b.instruments import INPUTS, Kit, Recording, draw_kit, read
 from benchmarks.worlds.hidden_b.screws import draw_screw
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.shipfile import draw_stated, ship_file
