@@ -96,7 +96,6 @@ def test_the_page_has_a_row_of_each_record() -> None:
 def test_the_page_says_what_the_program_says(tmp_path, name: str) -> None:
     coast = known(name)
     data = Path(os.environ['SHIPDRAG_DATA'])
-    real_coastdowns.run_command(coast.record.import_command(), data=data, out=tmp_path)
     page = real_coastdowns.PAGE.read_text(encoding='utf-8').splitlines()
     assert table(real_coastdowns.row(coast, tmp_path), ())[0] in page, (
         'run real_coastdowns --write'

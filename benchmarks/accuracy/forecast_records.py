@@ -13,7 +13,6 @@ into docs/forecast.md, and what was not foretold into docs/results/forecast_reco
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -25,7 +24,7 @@ from scipy.optimize import curve_fit
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._known_coasts import COASTS, KnownCoast
-from benchmarks.accuracy.real_records import DATA, run_command
+from benchmarks.accuracy.real_records import OUT, ROOT, prepared
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.errors import ShipdragError
@@ -37,10 +36,8 @@ from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'forecast.md'
 REASONS = ROOT / 'docs' / 'results' / 'forecast_records.txt'
-OUT = ROOT / 'benchmarks' / 'out' / 'forecast'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 EIGHTHS = np.arange(1, 9) / 8.0
 OURS, RIVALS = 'forecast', ('persistence', 'polynomial', 'v^2')
@@ -187,10 +184,9 @@ def cases(coast: KnownCoast, out: Path, estimator: str) -> Iterator[Case | str]:
     """Yield the forecasts of a record, or why there is none."""
     record, span = coast.record, coast.coast_s
     assert span is not None
-    (run,) = open_runs([out / f'{record.name}.mcap'])
-    given = Parameters.load(ROOT / 'benchmarks' / 'ships' / f'{record.parameters}.yaml')
-    given = replace(given, estimator=estimator)
+    (run,) = open_runs([record.bag(out)])
     try:
+        given = replace(record.given, estimator=estimator)
         result = replay(run, parameters=given, window=span)
         found = coast_windows(result)
         if not found:
@@ -309,16 +305,12 @@ def main() -> None:
     """
     Print the tables, and write them into the page if asked.
     """
-    options = asked(__doc__, write=False, estimator='one', out=OUT)
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+    options = asked(__doc__, write=False, estimator='one', out=OUT / 'forecast')
+    if not prepared(options.out):
         return
-    options.out.mkdir(parents=True, exist_ok=True)
     every: list[Case] = []
     problems: list[str] = []
     for coast in ONCE:
-        (options.out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
-        run_command(coast.record.import_command(), data=Path(os.environ[DATA]), out=options.out)
         for each in cases(coast, options.out, options.estimator):
             if isinstance(each, str):
                 problems.append(each)

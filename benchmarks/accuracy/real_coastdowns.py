@@ -13,7 +13,6 @@ Nothing is random. Takes about a minute.
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 from collections.abc import Iterator, Sequence
@@ -28,12 +27,11 @@ from benchmarks import _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._known_coasts import COASTS, Known, KnownCoast
-from benchmarks.accuracy.real_records import DATA, PAGE, ROOT, run_command
+from benchmarks.accuracy.real_records import OUT, PAGE, ROOT, prepared
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
-OUT = ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
 AGREES_SD = 2.0
 WIDEST = 1.5  # of the stated standard deviation to that of the known figure
 SLACK_S = 3.0  # by which a reported stretch may exceed the coast
@@ -226,9 +224,9 @@ def judged_words(coast: KnownCoast, said: Said) -> str:
 
 def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> tuple[str, ...]:
     """
-    Replay a record both ways and return its line of the table.
+    Import a record, replay it both ways and return its line of the table.
     """
-    (run,) = open_runs([out / f'{coast.record.name}.mcap'])
+    (run,) = open_runs([coast.record.bag(out)])
     assert run.span_ns is not None
     itself, window = (
         replayed(coast, out, run.span_ns[0], window=given, estimator=estimator)
@@ -248,14 +246,12 @@ def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> tuple[str, ...]
     )
 
 
-def section(data: Path, out: Path, estimator: str) -> str:
+def section(out: Path, estimator: str) -> str:
     """
     Import and replay all records; return the table.
     """
     rows = []
     for coast in COASTS:
-        (out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
-        run_command(coast.record.import_command(), data=data, out=out)
         rows.append(row(coast, out, estimator))
         print('\n  '.join(rows[-1]).replace('<br>', '\n    '), flush=True)
     yes, no = (sum(each[-1].startswith(word) for each in rows) for word in ('yes', 'NO'))
@@ -267,12 +263,10 @@ def main() -> None:
     """
     Print the table, and write it into the page if asked.
     """
-    options = asked(__doc__, write=False, estimator='one', out=OUT)
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+    options = asked(__doc__, write=False, estimator='one', out=OUT / 'real_coastdowns')
+    if not prepared(options.out):
         return
-    options.out.mkdir(parents=True, exist_ok=True)
-    found = section(Path(os.environ[DATA]), options.out.resolve(), options.estimator)
+    found = section(options.out.resolve(), options.estimator)
     print('\n' + found)
     if options.write:
         put(PAGE, {'coastdowns': found})

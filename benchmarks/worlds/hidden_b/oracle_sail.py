@@ -2,8 +2,8 @@
 """
 Runs without noise, as the oracle sails them, and what it compares: means over short times.
 
-The laws are the generator's own, the hull is as the ship file states her. An effect is made by the generator's own maker, from
-numbers that are given instead of drawn.
+The laws are the generator's own, the hull is as the ship file states her. An effect is made by the
+generator's own maker, from numbers that are given instead of drawn.
 """
 
 from __future__ import annotations
