@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -95,7 +94,6 @@ def test_the_page_has_a_row_of_each_record() -> None:
 @pytest.mark.parametrize('name', ['car_whole', 'blueboat_221', 'esso_osaka_2030s'])
 def test_the_page_says_what_the_program_says(tmp_path, name: str) -> None:
     coast = known(name)
-    data = Path(os.environ['SHIPDRAG_DATA'])
     page = real_coastdowns.PAGE.read_text(encoding='utf-8').splitlines()
     assert table(real_coastdowns.row(coast, tmp_path), ())[0] in page, (
         'run real_coastdowns --write'

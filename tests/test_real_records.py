@@ -37,7 +37,6 @@ needs_data = pytest.mark.skipif(
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `replay --json` says of each record, with the window and without."""
     out = tmp_path_factory.mktemp('records')
-    data = Path(os.environ['SHIPDRAG_DATA'])
     found = {}
     for record in real_records.RECORDS:
         real_records.run_command(record.import_command(), out=out)
@@ -114,7 +113,6 @@ def test_the_model_ship_drifts_and_the_joint_fit_shows_it(results: dict[str, Any
 
 @needs_data
 def test_the_ferry_path_and_the_ship_at_rest(tmp_path, capsys) -> None:
-    data = Path(os.environ['SHIPDRAG_DATA'])
     for record in (real_records.FERRY, real_records.MODEL_SHIP):
         real_records.run_command(record.import_command(), out=tmp_path)
     real_records.show_ferry_path(tmp_path)
@@ -133,10 +131,8 @@ def test_the_ferry_path_and_the_ship_at_rest(tmp_path, capsys) -> None:
 @pytest.fixture(scope='module')
 def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `diagnose --json` says of the logs of two yachts."""
-    out, data = tmp_path_factory.mktemp('diagnoses'), Path(os.environ['SHIPDRAG_DATA'])
-    return {
-        name: real_diagnosis.diagnosed(name, out=out) for name in real_diagnosis.RECORDS
-    }
+    out = tmp_path_factory.mktemp('diagnoses')
+    return {name: real_diagnosis.diagnosed(name, out=out) for name in real_diagnosis.RECORDS}
 
 
 @needs_data
