@@ -16,6 +16,7 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 
@@ -23,8 +24,7 @@ import numpy as np
 
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy.band_score import World
-from benchmarks.accuracy.diagnosis_score import HALVES, as_block
+from benchmarks.accuracy.diagnosis_score import HALVES, as_block, drawn, half_of
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.errors import ShipdragError
@@ -41,7 +41,7 @@ PARTS = (0.25, 1.0 / 3.0, 0.5)
 Row = tuple[float, bool, float, float]
 
 
-def rows(world: World, number: int, parameters: Parameters) -> Iterator[Row]:
+def rows(world: Any, number: int, parameters: Parameters) -> Iterator[Row]:
     """Yield of each figure of a case: part known, whether inside, score, error relative."""
     seen = world.observe(number)
     ship = Ship.from_yaml(seen.ship_file, subject=str(number))
@@ -88,12 +88,10 @@ def main() -> None:
         __doc__, world=('a', 'b'), half=tuple(HALVES), first=539, count=30, seed=31,
         estimator='one', write=False,
     )  # fmt: skip
-    world = World.a() if options.world == 'a' else World.b(options.seed)
+    world = drawn(options.world, options.seed)
     first = options.first if options.world == 'a' else 0
-    remainder, divisor = HALVES[options.half]
-    numbers = [n for n in range(first, world.count) if n % divisor == remainder]
     cases: dict[str, dict[int, list[Row]]] = {'nothing hidden': {}, 'anything hidden': {}}
-    for number in numbers[: options.count]:
+    for number in half_of(world, options.half, first)[: options.count]:
         hidden = 'anything hidden' if world.names(number) else 'nothing hidden'
         try:
             found = list(rows(world, number, Parameters(estimator=options.estimator)))

@@ -192,10 +192,17 @@ def reveal(number: int) -> Truth:
     return Truth(
         kind,
         shelf,
-        tuple(sorted(effect.name for effect in case.effects)),
+        names(number),
         {effect.name: effect.parameters() for effect in case.effects},
         plan.condition,
     )
+
+
+def names(number: int) -> tuple[str, ...]:
+    """
+    Return the names of what is hidden in a case, in alphabetical order.
+    """
+    return tuple(sorted(kind.name for kind in _plans()[number].kinds))
 
 
 def condition(number: int) -> Condition:

@@ -144,6 +144,13 @@ def condition(number: int, seed: int = SEED) -> Condition:
     return plans_of(seed)[number][1]
 
 
+def names(number: int, seed: int = SEED) -> tuple[str, ...]:
+    """
+    Return the names of what is hidden in a case, in alphabetical order.
+    """
+    return tuple(sorted(plans_of(seed)[number][0]))
+
+
 def observe(number: int, *, seed: int = SEED) -> Observation:
     """
     Return what a diagnosis may see of a case, counted from 0, of the world of a seed.
@@ -185,21 +192,20 @@ def reveal(number: int, seed: int = SEED) -> Truth:
     """
     Return what was hidden in a case.
     """
-    names, given = plans_of(seed)[number]
-    case = _case(number, seed)
-    outside = bool(set(names) & set(OUTSIDE))
-    kind = 'outside' if outside else ('none', 'one', 'pair')[len(names)]
+    what, case = names(number, seed), _case(number, seed)
+    outside = bool(set(what) & set(OUTSIDE))
+    kind = 'outside' if outside else ('none', 'one', 'pair')[len(what)]
     first = case.settings[0]
     wind = float(np.hypot(*np.sum([first.weather.wind, *first.wind], axis=0)))
     drive = first.screw.drive
-    facts, lies = draw_facts(np.random.default_rng([seed, number, 9]), names, drive, wind)
+    facts, lies = draw_facts(np.random.default_rng([seed, number, 9]), what, drive, wind)
     return Truth(
         kind,
-        0 if outside or not names else 2 if set(names) & set(SECOND) else 1,
-        ('unknown',) if outside else tuple(sorted(names)),
+        0 if outside or not what else 2 if set(what) & set(SECOND) else 1,
+        ('unknown',) if outside else what,
         {each.name: each.parameters for each in case.hidden},
-        given,
-        tuple(sorted(names)),
+        condition(number, seed),
+        what,
         {each.name: size for each, size in zip(case.hidden, case.sizes, strict=True)},
         facts,
         lies,
