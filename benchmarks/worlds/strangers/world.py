@@ -8,17 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.cases import (
-    EPOCH_NS,
-    LEAST,
-    calm,
-    fresh,
-    matters,
-    quiet,
-    run_down_s,
-    seen,
-    steady_of,
-)
+from benchmarks.worlds.hidden_b import cases as world_b
 from benchmarks.worlds.hidden_b.effects import FREE, Draw, Hidden
 from benchmarks.worlds.hidden_b.hulls import Array, draw_hull
 from benchmarks.worlds.hidden_b.instruments import INPUTS, Kit, Recording, draw_kit, read
@@ -63,7 +53,7 @@ class Case:
         Return what the instruments say of a run.
         """
         setting = self.settings[run]
-        start = EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
+        start = world_b.EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
         return read(sail(setting), setting, self.kit, INPUTS, start)
 
     def shown(self, run: int) -> tuple[Array, Array, Array, Array]:
@@ -73,8 +63,8 @@ class Case:
         """
         found = []
         for settings in (self.plain, self.settings):
-            track = sail(quiet(settings[run]))
-            found.append((track.t, *seen(track, settings[run], self.kit)))
+            track = sail(world_b.quiet(settings[run]))
+            found.append((track.t, *world_b.seen(track, settings[run], self.kit)))
         (t, log, ground), (_, log_with, ground_with) = found
         return t, log_with - log, ground_with - ground, ground
 
@@ -116,18 +106,18 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
     ]
     for which in (0, 1, 2):
         legs = tuple(base for base in bases if base.weather is days[which])
-        weather, kit, _ = calm(legs[:3], kit)
+        weather, kit, _ = world_b.calm(legs[:3], kit)
         bases = [replace(b, weather=weather) if b.weather is days[which] else b for b in bases]
-    key, steady = (seed, number, ship), steady_of(bases[0])
-    text = ship_file(hull, screw, steady, run_down_s(bases[0]), draw_stated(rng), ship)
-    settings = [fresh(base) for base in bases]
+    key, steady = (seed, number, ship), world_b.steady_of(bases[0])
+    text = ship_file(hull, screw, steady, world_b.run_down_s(bases[0]), draw_stated(rng), ship)
+    settings = [world_b.fresh(base) for base in bases]
     hidden: Hidden | None = None
     if stranger:
-        size, _ = matters(
+        size, _ = world_b.matters(
             lambda size: _made(stranger, size, bases[0], steady, key, 0),
             bases[0],
             kit,
-            1.5 * LEAST,
+            1.5 * world_b.LEAST,
         )
         for run, setting in enumerate(settings):
             made = _made(stranger, size, bases[0], steady, key, run)
