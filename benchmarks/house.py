@@ -30,9 +30,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 
-ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'shipdrag_ros'
 LINES, PARAMETERS = 60, 8
 # counted by themselves: the ways in and out, the studies and the ground floor

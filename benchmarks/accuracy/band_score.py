@@ -14,15 +14,12 @@ each run.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-
-os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 

@@ -19,7 +19,6 @@ that was broken off goes on where it was.
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -29,9 +28,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
-
-# before numpy: the processes share the cores with each other alone
-os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 from benchmarks import _verbs
 from benchmarks._asked import asked, pooled

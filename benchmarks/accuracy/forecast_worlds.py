@@ -13,15 +13,12 @@ of. `--write` puts the table of both worlds into docs/forecast.md.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
-
-os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy.diagnosis_score import HALVES, as_block, drawn, half_of
@@ -35,8 +32,8 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Reason
 from shipdrag_ros.ship import Ship
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'forecast.md'
-KEPT = Path(__file__).resolve().parents[1] / 'results' / 'forecast_worlds.json'
+PAGE = ROOT / 'docs' / 'forecast.md'
+KEPT = ROOT / 'benchmarks' / 'results' / 'forecast_worlds.json'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 Row = tuple[float, bool, float, float]
 

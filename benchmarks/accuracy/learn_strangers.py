@@ -16,7 +16,6 @@ both write docs/results/learn_strangers.txt.
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -25,12 +24,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-os.environ.setdefault('OMP_NUM_THREADS', '1')
-
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from benchmarks.accuracy.diagnosis_score import write_bag
 from benchmarks.worlds.hidden_b.cases import EPOCH_NS
@@ -47,7 +44,7 @@ WHY = (
     'nothing is missing',
 )  # fmt: skip
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
-RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
+RESULTS = ROOT / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
 GONE = 0.9  # of the gap
 Found = dict[str, Any]

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import along, table
 from benchmarks.accuracy._coasts import cut
@@ -30,7 +30,7 @@ from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import GaussMarkov, Scenario, Sensor, sense, simulate
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = ROOT / 'config'
 HULLS = (('vitus_bering', 8.2, 1500.0), ('kvlcc2', 7.97, 1800.0))  # speed [m/s], coastdown [s]
 LEAD_S, RATE_HZ = 1800.0, 0.5
 SETS = ('log', 'log, position', 'log, position, shaft', 'the same, two runs')

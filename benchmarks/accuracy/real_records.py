@@ -21,7 +21,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros import display
@@ -34,7 +34,6 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report import drawing
 from shipdrag_ros.samples import Float64
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
 OUT = ROOT / 'benchmarks' / 'out'
 DATA = 'SHIPDRAG_DATA'

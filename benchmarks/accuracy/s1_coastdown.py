@@ -11,10 +11,6 @@ docs/s1_coastdown.md. Two minutes.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -23,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import grid, table
 from benchmarks.accuracy import s1_experiment as paper
@@ -35,7 +32,7 @@ from shipdrag_ros.studies import least_squares
 from shipdrag_ros.studies.least_squares import OrderTable
 from shipdrag_ros.studies.s1.motion import OrthogonalBasis, fit_orders
 
-PICTURE = Path(__file__).resolve().parents[2] / 'docs' / 'pictures' / 's1_experiment.png'
+PICTURE = ROOT / 'docs' / 'pictures' / 's1_experiment.png'
 PROBLEMS = ('s1_speed', 's1_position', 's1_joint')
 CASES = (
     Case('base'),

@@ -9,13 +9,13 @@ docs/s2_cable.md and the pictures beside it. No random numbers; some seconds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
@@ -23,7 +23,7 @@ from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
 from shipdrag_ros.studies.cable import drag
 from shipdrag_ros.studies.cable.face.verb import LINES, RANGE_COLOR, SURFACES
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
+DOCS = ROOT / 'docs'
 ROUNDED = {
     drag.CableSurface.SMOOTH: (0.777, 0.008),
     drag.CableSurface.ROUGH: (0.769, 0.031),

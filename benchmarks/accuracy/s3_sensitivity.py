@@ -10,18 +10,14 @@ Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
@@ -39,7 +35,7 @@ from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import verb as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
+DOCS = ROOT / 'docs'
 SHIP, PAPER, KEEP = manoeuvring.mariner(), manoeuvring.zigzag(15.0), 24
 CONTROLS_S = (0.0, 0.1, 0.5)
 KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s

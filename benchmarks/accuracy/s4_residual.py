@@ -17,12 +17,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for threads
-
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from benchmarks.accuracy import _river_ships as river
@@ -33,7 +32,6 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import FORMS, Hulls, ResidualFit, fit_form
 
-ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / 'docs' / 'pictures'
 TABLE = ROOT / 'docs' / 'data' / 'river_ships.csv'  # tests to try the verb on
 SEED = 4

@@ -13,10 +13,6 @@ one table.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
-
 from collections import defaultdict
 from dataclasses import dataclass, field
 

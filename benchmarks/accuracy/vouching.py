@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
@@ -42,7 +43,7 @@ from shipdrag_ros.samples import (
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.reading import read_any
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'vouching.txt'
+PAGE = ROOT / 'docs' / 'results' / 'vouching.txt'
 START_NS = 1_700_000_000 * SECOND_NS
 LEAD_S, COAST_S = 1200, 600
 LASTS_S = LEAD_S + COAST_S - 60

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from benchmarks import ROOT
+
 os.environ.setdefault('ROS_DOMAIN_ID', '5')  # the tests and the demonstration are above
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
@@ -29,7 +31,7 @@ from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
-SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+SHIP_FILE = ROOT / 'config' / 'vitus_bering.yaml'
 SEED = 1
 LEAD_IN_S = 150.0
 CONFIRMED_S = 120.0  # played fast, after the stop
