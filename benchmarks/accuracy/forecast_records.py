@@ -14,7 +14,7 @@ into docs/forecast.md, and what was not foretold into docs/results/forecast_reco
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -236,48 +236,37 @@ def weighted_quantile(values: Float64, weights: Float64) -> float:
 
 def report(every: list[Case], problems: list[str]) -> str:
     """Return the tables."""
-    names = list(dict.fromkeys(each.record for each in every))
     methods = (OURS, *RIVALS)
-    rows, wins, shares = [], {'score': np.zeros(3), 'error': np.zeros(3)}, []
-    numbers: list[tuple[str, bool, bool]] = []
-    for name in names:
-        mine = [each for each in every if each.record == name]
-        held = {m: np.mean([inside(each.by[m]) for each in mine]) for m in methods}
-        score = {m: np.mean([scores(each.by[m]) for each in mine]) for m in methods}
-        error = {m: np.median([np.abs(each.by[m].error) for each in mine]) for m in methods}
-        shares.append(held[OURS])
-        numbers.append((name, score[OURS] < score[RIVALS[0]], error[OURS] < error[RIVALS[0]]))
-        wins['score'] += [score[OURS] < score[m] for m in RIVALS]
-        wins['error'] += [error[OURS] < error[m] for m in RIVALS]
-        rows.append(
-            [
-                name,
-                len(mine),
-                f'{held[OURS]:.0%}',
-                *(f'{100.0 * score[m]:.3g}' for m in methods),
-                *(f'{100.0 * error[m]:.2g}' for m in methods),
-            ]
-        )
+    rows: list[Sequence[object]] = []
+    shares: dict[str, float] = {}
+    better: dict[str, list[list[bool]]] = {}  # score and error, than each rival
+    for name in dict.fromkeys(each.record for each in every):
+        mine = [each.by for each in every if each.record == name]
+        score = [np.mean([scores(by[m]) for by in mine]) for m in methods]
+        error = [np.median([np.abs(by[m].error) for by in mine]) for m in methods]
+        shares[name] = float(np.mean([inside(by[OURS]) for by in mine]))
+        better[name] = [[each[0] < rival for rival in each[1:]] for each in (score, error)]
+        cells = (*(f'{100.0 * each:.3g}' for each in score), *(f'{100.0 * e:.2g}' for e in error))
+        rows.append((name, len(mine), f'{shares[name]:.0%}', *cells))
     parts = [
         f'{part:.0%}: {np.mean([inside(one.by[OURS]) for one in every if one.part == part]):.0%}'
         for part in PARTS
     ]
-    share, spread = float(np.mean(shares)), float(np.std(shares) / np.sqrt(len(shares)))
+    n, held = len(shares), list(shares.values())
+    share, spread = float(np.mean(held)), float(np.std(held) / np.sqrt(n))
+    won = np.sum(list(better.values()), axis=0).tolist()
     head = ['record', 'forecasts', 'inside 90 %']
     head += [f'score, {m}' for m in methods] + [f'error, {m}' for m in methods]
-    n = len(names)
     # the families of the law were chosen on the first of each two records of the list
     listed = [coast.record.name for coast in ONCE]
     halves = []
     for half, which in ((listed[::2], 'odd'), (listed[1::2], 'even')):
-        of_half = [
-            (share, row) for share, row in zip(shares, numbers, strict=True) if row[0] in half
-        ]
-        held = float(np.mean([share for share, _ in of_half]))
-        better = [sum(row[k] for _, row in of_half) for k in (1, 2)]
+        of_half = [name for name in shares if name in half]
+        score, error = np.sum([better[name] for name in of_half], axis=0)[:, 0]
         halves.append(
-            f'{which} records ({len(of_half)}): {held:.0%} inside, better score than persistence '
-            f'in {better[0]}, less error in {better[1]}'
+            f'{which} records ({len(of_half)}): '
+            f'{float(np.mean([shares[name] for name in of_half])):.0%} inside, better score than '
+            f'persistence in {score}, less error in {error}'
         )
     missed = len({re.split('[,:]', each)[0] for each in problems})
     lines = [
@@ -286,9 +275,8 @@ def report(every: list[Case], problems: list[str]) -> str:
         f'{len(every)} forecasts of {n} records. Inside the band: {share:.0%} ± {2 * spread:.0%} '
         '(mean over records, ± two standard errors). '
         + ' '.join(
-            f'{words} than {", ".join(RIVALS)} in '
-            f'{", ".join(f"{won:.0f}" for won in wins[key])} of {n}.'
-            for key, words in (('score', 'Better score'), ('error', 'Less error'))
+            f'{words} than {", ".join(RIVALS)} in {", ".join(map(str, of))} of {n}.'
+            for words, of in zip(('Better score', 'Less error'), won)
         ),
         '',
         f'By part of the coast that was known: {", ".join(parts)}.',

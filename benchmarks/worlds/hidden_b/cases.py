@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -261,15 +262,12 @@ def _case(number: int, seed: int) -> _Case:
         drives = LIBRARY[name][1] if name in LIBRARY and LIBRARY[name][1] else drives
     if {'residual_thrust', 'locked_propeller'} & set(names):
         drives = FREE
-    hull = draw_hull(rng, drives)
-    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
-    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
-    lead = rng.uniform(900.0, 2400.0) if hull.time_s > 100.0 else rng.uniform(500.0, 1200.0)
-    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    ship, kit = draw_ship(rng, drives, (2400.0, 1200.0))
+    hull, screw = ship['hull'], ship['screw']
     if {'radar_scale', 'gyro_ballistic'} & set(names):
         kit = replace(kit, fix='radar', fix_every_s=3.0)
     weather = draw_weather(rng, hull.time_s, hull.speed_m_s)
-    bases = _legs(rng, hull, screw, weather, lead, coast, (seed, number))
+    bases = _legs(rng, ship, weather, (seed, number))
     weather, kit, moves = calm(bases, kit)
     bases = tuple(replace(base, weather=weather) for base in bases)
     stated = draw_stated(rng)
@@ -292,6 +290,31 @@ def _case(number: int, seed: int) -> _Case:
     return _Case(hull, screw, stated, kit, text, *found, moves)
 
 
+def draw_ship(
+    rng: np.random.Generator, drives: tuple[str, ...], longest_s: tuple[float, float]
+) -> tuple[dict[str, Any], Kit]:
+    """
+    Draw what all runs of a ship have in common, by the names of `Setting`, and her instruments.
+
+    Parameters
+    ----------
+    rng
+    drives
+        Those that will do; any where there are none.
+    longest_s
+        Of the steady part, of a ship that slows slowly and of a quick one.
+    """
+    hull = draw_hull(rng, drives)
+    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
+    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
+    slow, quick = longest_s
+    lead = rng.uniform(900.0, slow) if hull.time_s > 100.0 else rng.uniform(500.0, quick)
+    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
+    times = {'lead_s': round(lead / step) * step, 'coast_s': coast, 'step_s': step}
+    return {'hull': hull, 'screw': screw, **times}, kit
+
+
 def fresh(base: Setting) -> Setting:
     """
     Return a copy whose lists are its own.
@@ -301,40 +324,28 @@ def fresh(base: Setting) -> Setting:
 
 
 def _legs(
-    rng: np.random.Generator,
-    hull: Hull,
-    screw: object,
-    weather: Weather,
-    lead: float,
-    coast: float,
-    key: tuple[int, int],
+    rng: np.random.Generator, ship: dict[str, Any], weather: Weather, key: tuple[int, int]
 ) -> tuple[Setting, ...]:
     """Return three runs: a first, one back, one on another course."""
     first = rng.uniform(-np.pi, np.pi)
     headings = (first, first + np.pi + rng.normal(0, 0.03), first + rng.uniform(1.0, 2.1))
     clock = rng.uniform(6.0, 14.0) * 3600.0
-    legs = []
-    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
-    lead = round(lead / step) * step
+    legs, hull = [], ship['hull']
     for run, heading in enumerate(headings):
         speed = hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.8, 0.98))
         legs.append(
             Setting(
-                hull=hull,
-                screw=screw,  # type: ignore[arg-type]
+                **ship,
                 weather=weather,
                 speed_m_s=speed,
                 heading_rad=heading,
                 first_rad=first,
-                lead_s=lead,
-                coast_s=coast,
-                step_s=step,
                 clock_s=clock,
                 seed=(*key, 2, run),
                 depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),
             )
         )
-        clock += lead + coast + rng.uniform(300.0, 900.0)
+        clock += ship['lead_s'] + ship['coast_s'] + rng.uniform(300.0, 900.0)
     return tuple(legs)
 
 

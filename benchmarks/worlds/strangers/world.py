@@ -10,9 +10,8 @@ import numpy as np
 
 from benchmarks.worlds.hidden_b import cases as world_b
 from benchmarks.worlds.hidden_b.effects import FREE, Draw, Hidden
-from benchmarks.worlds.hidden_b.hulls import Array, draw_hull
-from benchmarks.worlds.hidden_b.instruments import INPUTS, Kit, Recording, draw_kit, read
-from benchmarks.worlds.hidden_b.screws import draw_screw
+from benchmarks.worlds.hidden_b.hulls import Array
+from benchmarks.worlds.hidden_b.instruments import INPUTS, Kit, Recording, read
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.shipfile import draw_stated, ship_file
 from benchmarks.worlds.hidden_b.voyage import sail
@@ -76,28 +75,20 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
     """
     number = list(STRANGERS).index(stranger) if stranger else _NONE
     rng = np.random.default_rng([seed, number, ship])
-    hull = draw_hull(rng, FREE)
-    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
-    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
-    lead = rng.uniform(900.0, 1500.0) if hull.time_s > 100.0 else rng.uniform(500.0, 900.0)
-    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    board, kit = world_b.draw_ship(rng, FREE, (1500.0, 900.0))
+    hull = board['hull']
     if stranger == 'gyro_ballistic':
         kit = replace(kit, fix='radar', fix_every_s=3.0)
-    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
     clock = rng.uniform(6.0, 14.0) * 3600.0
     first = rng.uniform(-np.pi, np.pi)
     days = [draw_weather(rng, hull.time_s, hull.speed_m_s) for _ in range(3)]
     bases = [
         Setting(
-            hull=hull,
-            screw=screw,
+            **board,
             weather=days[2 if run == LATER else run % 2],
             speed_m_s=hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.65, 1.0)),
             heading_rad=first if run == 0 else rng.uniform(-np.pi, np.pi),
             first_rad=first,
-            lead_s=round(lead / step) * step,
-            coast_s=coast,
-            step_s=step,
             clock_s=clock + run * 86400.0,
             seed=(seed, number, ship, run),
             depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),
@@ -109,7 +100,9 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
         weather, kit, _ = world_b.calm(legs[:3], kit)
         bases = [replace(b, weather=weather) if b.weather is days[which] else b for b in bases]
     key, steady = (seed, number, ship), world_b.steady_of(bases[0])
-    text = ship_file(hull, screw, steady, world_b.run_down_s(bases[0]), draw_stated(rng), ship)
+    text = ship_file(
+        hull, board['screw'], steady, world_b.run_down_s(bases[0]), draw_stated(rng), ship
+    )
     settings = [world_b.fresh(base) for base in bases]
     hidden: Hidden | None = None
     if stranger:
