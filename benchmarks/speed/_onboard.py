@@ -69,7 +69,6 @@ class Onboard:
     peer: Node
     executor: SingleThreadedExecutor
     player: Player
-    directory: Path
 
     def spin_for(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -136,7 +135,7 @@ def onboard(**parameters: object) -> Iterator[Onboard]:
         executor.add_node(peer)
         try:
             player = Player(peer, executor)
-            yield Onboard(psutil.Process(node.pid), peer, executor, player, Path(folder))
+            yield Onboard(psutil.Process(node.pid), peer, executor, player)
             node.send_signal(signal.SIGINT)
             status = node.wait(timeout=30)
             assert status == 0, (Path(folder) / 'log').read_text()

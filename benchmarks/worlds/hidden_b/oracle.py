@@ -248,30 +248,26 @@ class _Oracle:
 
     # fits
 
-    def _residual(
-        self, names: Names, signs: Sequence[float], z: Array
-    ) -> tuple[Array, list[tuple[float, float]]]:
-        settings = self._settings(names, signs, z)
-        measured = np.concatenate([run.measured for run in self.runs])
-        return measured - self._row(settings), list(self._shoals(names, settings))
-
     def _whitened(self, names: Names, signs: Sequence[float], z: Array) -> Array:
-        return self._white(self._whole(names, signs, z))
+        return self._white(self._whole(names, signs, z)[0])
 
     def _slopes(
         self, names: Names, signs: Sequence[float], z: Array, which: Sequence[int]
     ) -> Array:
         """Return minus the slope of the residual (not whitened), echo sounders with it."""
-        columns, here = [], self._whole(names, signs, z)
+        columns, here = [], self._whole(names, signs, z)[0]
         for k in which:
             step = np.zeros(len(z))
             step[k] = 3e-4 if k < self.common else 0.01
-            columns.append((here - self._whole(names, signs, z + step)) / step[k])
+            columns.append((here - self._whole(names, signs, z + step)[0]) / step[k])
         return np.stack(columns, axis=1) if columns else np.zeros((len(here), 0))
 
-    def _whole(self, names: Names, signs: Sequence[float], z: Array) -> Array:
-        off, shoals = self._residual(names, signs, z)
-        return np.concatenate([off, [each for each, _ in shoals]])
+    def _whole(self, names: Names, signs: Sequence[float], z: Array) -> tuple[Array, list[float]]:
+        """Return by how much all is off, the echo sounders in their sd, and these sd."""
+        settings = self._settings(names, signs, z)
+        shoals = list(self._shoals(names, settings))
+        off = np.concatenate([run.measured for run in self.runs]) - self._row(settings)
+        return np.concatenate([off, [each for each, _ in shoals]]), [sd for _, sd in shoals]
 
     def _white(self, columns: Array) -> Array:
         n = len(self.factor)
@@ -348,13 +344,13 @@ class _Oracle:
     def _terms(self, fit: Fit) -> Terms:
         """Return what the evidence of a fit is made of."""
         around = self._scatter(fit) if set(fit.names) & _GUSTY else self.around
-        off, shoals = self._residual(fit.names, fit.signs, fit.z)
+        off, sds = self._whole(fit.names, fit.signs, fit.z)
         sizes = range(self.common, len(fit.z))
         slopes = self._slopes(fit.names, fit.signs, fit.z, sizes)
         slopes = np.concatenate([self.slopes, slopes], axis=1)
-        whole = np.concatenate([off, [each for each, _ in shoals]]) + slopes @ fit.z
+        whole = off + slopes @ fit.z
         halves = sum(size.sign for name in fit.names for size in SIZES[name])
-        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0]))) + halves * np.log(2.0)
+        less = float(np.sum(np.log(sds or [1.0]))) + halves * np.log(2.0)
         return Terms(*around, whole, slopes, less - float(np.log(shares()[fit.names])))
 
     def answer(self) -> dict[str, Any]:

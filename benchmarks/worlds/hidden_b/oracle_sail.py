@@ -147,43 +147,32 @@ def shared(row: Callable[[Change, Hull], Array], stated: Stated) -> Array:
     stated
     """
     hull = stated.hull
-    plain = row(_nothing, hull)
+    plain = row(lambda _: None, hull)
     hulls = [replace(hull, still_n=hull.still_n + miss) for miss in stated.misses]
     hulls.append(replace(hull, n_r=hull.n_r + stated.added_sd))
-    changes = [_run_down(1.0 + stated.run_down_sd)]
-    for name, value in _WEATHER:
-        size = hull.speed_m_s if name == 'flow' else 1.0
-        changes.append(_blowing(name, tuple(size * each for each in value)))
-    changes += [_faulty('scale', _SCALE), _faulty('offset_m_s', _OFFSET * hull.speed_m_s)]
-    rows = [row(_nothing, each) for each in hulls] + [row(change, hull) for change in changes]
+    late = 1.0 + stated.run_down_sd
+    changes = [
+        _changing('screw', inertia_s=lambda now: now * late, ramp_s=lambda now: now * late),
+        *(_blowing(hull, name, value) for name, value in _WEATHER),
+        _changing('faults', scale=lambda now: now + _SCALE),
+        _changing('faults', offset_m_s=lambda now: now + _OFFSET * hull.speed_m_s),
+    ]
+    rows = [row(lambda _: None, each) for each in hulls] + [row(each, hull) for each in changes]
     return np.stack([each - plain for each in rows], axis=1)
 
 
-def _nothing(_: Setting) -> None:
-    """Change nothing."""
+def _blowing(hull: Hull, name: str, value: tuple[float, ...]) -> Change:
+    size = hull.speed_m_s if name == 'flow' else 1.0
+    return _changing('weather', **{name: lambda _: tuple(size * each for each in value)})
 
 
-def _run_down(late: float) -> Change:
+def _changing(part: str, **laws: Callable[[Any], Any]) -> Change:
+    """Return what makes of attributes of a part of a setting what laws make of them."""
+
     def change(setting: Setting) -> None:
-        screw = setting.screw
-        setting.screw = replace(
-            screw, inertia_s=screw.inertia_s * late, ramp_s=screw.ramp_s * late
-        )
-
-    return change
-
-
-def _blowing(name: str, value: tuple[float, ...]) -> Change:
-    def change(setting: Setting) -> None:
-        setting.weather = replace(setting.weather, **{name: value})  # type: ignore[arg-type]
-
-    return change
-
-
-def _faulty(name: str, size: float) -> Change:
-    def change(setting: Setting) -> None:
-        more = getattr(setting.faults, name) + size
-        setting.faults = replace(setting.faults, **{name: more})
+        now = getattr(setting, part)
+        changed = {name: law(getattr(now, name)) for name, law in laws.items()}
+        setattr(setting, part, replace(now, **changed))
 
     return change
 

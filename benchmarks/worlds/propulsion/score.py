@@ -66,9 +66,8 @@ class Row:
         is on the shaft and does not push, a ship at rest.
     wrong_live
         Onsets announced of which either is true at the time when they were.
-    rms, cover
-        Of r against the truth over the valid range: relative to r's maximum; share within
-        2 sigma. NaN without.
+    rms
+        Of r against the truth over the valid range, relative to r's maximum; NaN without.
     sure_s
         Of what it says last of each moment about slow-downs: in how long she glides with a
         probability of 0.7 or more, how much of that it expects, in how much she does, and in how
@@ -87,8 +86,7 @@ class Row:
     idle: int
     wrong_live: int
     rms: float
-    cover: float
-    sure_s: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    sure_s: tuple[float, float, float, float]
 
 
 def score(case: Case, suites: dict[str, tuple[str, ...]], *, spans: bool = False) -> list[Row]:
@@ -119,14 +117,13 @@ def _one(world: World, suite: str, instruments: tuple[str, ...], given: dict[str
     truth = world.truth
     why, best = _lacks(truth, spans)
     glide = truth.glide or (np.nan, np.nan)
-    rms = cover = np.nan
-    dated = delay = np.nan
+    rms = dated = delay = np.nan
     if best is not None:
         dated = spans[best][0] - glide[0]
         delay = kept[best].onset_detected_ns
         delay = np.nan if delay is None else seconds(delay) - glide[0]
         if not given:
-            rms, cover = _error(truth, kept[best].estimate)
+            rms = _error(truth, kept[best].estimate)
     return Row(
         world.case,
         suite,
@@ -142,7 +139,6 @@ def _one(world: World, suite: str, instruments: tuple[str, ...], given: dict[str
         sum(_is_idle(truth, span) for span in spans),
         sum(_driven_s(truth, span) > DRIVEN_S or _is_idle(truth, span) for span in onsets),
         rms,
-        cover,
         _sure(truth, ended),
     )
 
@@ -199,14 +195,13 @@ def _lacks(truth: Truth, spans: list[tuple[float, float]]) -> tuple[str, int | N
     return '', best
 
 
-def _error(truth: Truth, estimate: Estimate) -> tuple[float, float]:
+def _error(truth: Truth, estimate: Estimate) -> float:
     curve = estimate.valid_curve
     if len(truth.speed) < 5 or not len(curve):
-        return np.nan, np.nan
+        return np.nan
     inside = (curve.speed_m_s >= truth.speed[0]) & (curve.speed_m_s <= truth.speed[-1])
     if not inside.any():
-        return np.nan, np.nan
+        return np.nan
     true = np.interp(curve.speed_m_s[inside], truth.speed, truth.retardation)
     off = curve.resistance_m_s2[inside] - true
-    rms = float(np.sqrt(np.mean(off**2)) / true.max())
-    return rms, float(np.mean(np.abs(off) <= 2.0 * curve.sigma_m_s2[inside]))
+    return float(np.sqrt(np.mean(off**2)) / true.max())

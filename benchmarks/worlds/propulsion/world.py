@@ -50,7 +50,6 @@ class Truth:
     idle: np.ndarray
     glide: tuple[float, float] | None
     first_speed_m_s: float
-    seconds: float
     speed: Float64
     retardation: Float64
 
@@ -162,7 +161,6 @@ def _truth(case: Case, plan: Plan, motion: Motion, start: Steady, weather: Weath
         pushes_not | (motion.speed <= hull.end_m_s),
         glide,
         float(motion.speed[before_stop].mean()) if before_stop.any() else start.speed_m_s,
-        float(time[-1]),
         speed,
         force / hull.mass_kg,
     )

@@ -30,8 +30,6 @@ class Case:
 
     Attributes
     ----------
-    stranger
-        '' without.
     ship_file
     kit
     plain, settings
@@ -40,7 +38,6 @@ class Case:
         Of the stranger in the first run.
     """
 
-    stranger: str
     ship_file: str
     kit: Kit
     plain: tuple[Setting, ...]
@@ -117,7 +114,7 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
             hidden = hidden or made
             made.apply(setting)
     found = {} if hidden is None else hidden.parameters
-    return Case(stranger, text, kit, tuple(bases), tuple(settings), found)
+    return Case(text, kit, tuple(bases), tuple(settings), found)
 
 
 def _made(
