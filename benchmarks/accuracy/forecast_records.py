@@ -23,7 +23,7 @@ from scipy.optimize import curve_fit
 
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy._known_coasts import COASTS, KnownCoast
+from benchmarks.accuracy.real_coastdowns import COASTS, KnownCoast
 from benchmarks.accuracy.real_records import OUT, ROOT, prepared
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.running import too_vague

@@ -26,8 +26,7 @@ from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from benchmarks.accuracy import _river_ships as river
 from benchmarks.accuracy._delft import FILE as DELFT
-from benchmarks.accuracy._delft import delft
-from benchmarks.accuracy._regressions import WRONG, Predictor, gauss, rms, shown
+from benchmarks.accuracy._delft import WRONG, Predictor, delft, gauss, rms, shown
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import FORMS, Hulls, ResidualFit, fit_form
