@@ -26,9 +26,8 @@ import tempfile
 import tokenize
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 from benchmarks import ROOT
 from benchmarks._asked import asked
@@ -90,26 +89,19 @@ print('WALKED', json.dumps([sorted(calls), sorted(modules)]))
 """
 
 
-class Long(NamedTuple):
-    """A function that is long, or takes much."""
-
-    place: str
-    count: int
-
-
 @dataclass
 class Count:
-    """What a tree holds."""
+    """What a tree holds; of functions that are long, or take much, where they are and how much."""
 
-    raw: int
-    lines: int
-    core: int
-    outer: int
-    modules: int
-    core_modules: int
-    numbers: Counter[str]
-    long: list[Long]
-    wide: list[Long]
+    raw: int = 0
+    lines: int = 0
+    core: int = 0
+    outer: int = 0
+    modules: int = 0
+    core_modules: int = 0
+    numbers: Counter[str] = field(default_factory=Counter)
+    long: list[tuple[str, int]] = field(default_factory=list)
+    wide: list[tuple[str, int]] = field(default_factory=list)
 
 
 def code_lines(path: Path) -> set[int]:
@@ -118,18 +110,9 @@ def code_lines(path: Path) -> set[int]:
     """
     text = path.read_text(encoding='utf-8')
     held: set[int] = set()
-    skipped = {
-        tokenize.COMMENT,
-        tokenize.NL,
-        tokenize.NEWLINE,
-        tokenize.INDENT,
-        tokenize.DEDENT,
-        tokenize.ENCODING,
-        tokenize.ENDMARKER,
-    }
     with path.open('rb') as file:
         for token in tokenize.tokenize(file.readline):
-            if token.type not in skipped:
+            if token.type != tokenize.COMMENT and token.string.strip() and token.start[0]:
                 held.update(range(token.start[0], token.end[0] + 1))
     for node in ast.walk(ast.parse(text)):
         body = getattr(node, 'body', None)
@@ -185,7 +168,7 @@ def count(tree: Path) -> Count:
     Count the package of a tree.
     """
     package = tree / PACKAGE
-    found = Count(0, 0, 0, 0, 0, 0, Counter(), [], [])
+    found = Count()
     for path in sorted(package.rglob('*.py')):
         held = code_lines(path)
         room = path.relative_to(package).parent.as_posix().partition('/')[0].strip('.')
@@ -201,9 +184,9 @@ def count(tree: Path) -> Count:
             place = f'{path.relative_to(package)}:{node.name}'
             long = len(held & set(range(node.lineno, (node.end_lineno or 0) + 1)))
             if long > LINES and not is_compiled:
-                found.long.append(Long(place, long))
+                found.long.append((place, long))
             if parameters(node) > PARAMETERS and not is_compiled:
-                found.wide.append(Long(place, parameters(node)))
+                found.wide.append((place, parameters(node)))
     return found
 
 
@@ -220,15 +203,21 @@ def walk(
         which a function was called. What calls within compiled code is not seen.
     """
     code = WALK.format(tree=str(tree), line=line, module=module, function=function)
-    environment = {**os.environ, 'PYTHONPATH': str(tree)}
-    done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=tree
-    )
+    done = of_tree(tree, '-c', code)
     printed = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
     if not printed:
         raise SystemExit(f'{tree}: {" ".join(line)} failed:\n{done.stderr[-2000:]}')
     calls, modules = json.loads(printed[0].removeprefix('WALKED '))
     return calls, modules
+
+
+def of_tree(tree: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """
+    Run Python in a tree.
+    """
+    environment = {**os.environ, 'PYTHONPATH': str(tree)}
+    line = [sys.executable, *words]
+    return subprocess.run(line, capture_output=True, text=True, env=environment, cwd=tree)
 
 
 def figures(tree: Path, folder: Path) -> dict[str, str]:
@@ -239,9 +228,7 @@ def figures(tree: Path, folder: Path) -> dict[str, str]:
     bag = folder / f'{len(list(folder.iterdir()))}.mcap'
     simulate = ['simulate', '--ship', str(tree / 'config' / 'vitus_bering.yaml'), '-o', str(bag)]
     simulate += ['--lead-in', '900', '--seed', '5', '--effect', 'current=0.4']
-    environment = {**os.environ, 'PYTHONPATH': str(tree)}
-    module = [sys.executable, '-m', f'{PACKAGE}.cli']
-    subprocess.run([*module, *simulate], check=True, env=environment, capture_output=True)
+    of_tree(tree, '-m', f'{PACKAGE}.cli', *simulate).check_returncode()
     calls, _ = walk(tree, ['replay', str(bag)], 'playback.py', 'replay')
     _, modules = walk(tree, ['diagnose', str(bag)], 'diagnosis/diagnose.py', 'diagnose')
     return {
@@ -292,8 +279,8 @@ def main() -> None:
         cells = [name, *(each[name] for each in columns), str(AIMS.get(name, ''))]
         print(f'| {" | ".join(cells)} |')
     last = count(trees[-1])
-    for each in (*last.long, *last.wide):
-        print(f'{each.place}: {each.count}')
+    for place, many in (*last.long, *last.wide):
+        print(f'{place}: {many}')
 
 
 if __name__ == '__main__':

@@ -190,15 +190,23 @@ def residual_thrust(d: Draw) -> Hidden:
     return changed('residual_thrust', 'run', found, 'screw', left=left, left_s=left_s)
 
 
+def _moving(
+    name: str, field: str, velocity: tuple[float, float], parameters: dict[str, float]
+) -> Hidden:
+    """Return air or water that moves along the first run and to port of it."""
+
+    def apply(setting: Setting) -> None:
+        getattr(setting, field).append(setting.along_first(*velocity))
+
+    return Hidden(name, 'earth', parameters, apply)
+
+
 def wind(d: Draw) -> Hidden:
     """A breeze, more or less along the ship, with its gusts."""
     strength, angle = d.rng.uniform(3.0, 9.0) * d.size, d.rng.normal(0.0, 0.6)
     head, cross = d.sign * strength * np.cos(angle), strength * np.sin(angle)
-
-    def apply(setting: Setting) -> None:
-        setting.wind.append(setting.along_first(-head, -cross))
-
-    return Hidden('wind', 'earth', {'head_m_s': float(head), 'cross_m_s': float(cross)}, apply)
+    found = {'head_m_s': float(head), 'cross_m_s': float(cross)}
+    return _moving('wind', 'wind', (-head, -cross), found)
 
 
 def waves(d: Draw) -> Hidden:
@@ -230,11 +238,8 @@ def current(d: Draw) -> Hidden:
     """A stream."""
     along = d.sign * d.rng.uniform(0.03, 0.1) * d.size * d.hull.speed_m_s
     port = d.rng.normal(0.0, 0.04) * d.hull.speed_m_s
-
-    def apply(setting: Setting) -> None:
-        setting.flow.append(setting.along_first(along, port))
-
-    return Hidden('current', 'earth', {'along_track_m_s': along, 'cross_track_m_s': port}, apply)
+    found = {'along_track_m_s': along, 'cross_track_m_s': port}
+    return _moving('current', 'flow', (along, port), found)
 
 
 def current_change(d: Draw) -> Hidden:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -141,28 +141,22 @@ STOPS: dict[str, Callable[[Plan], None]] = {
 }
 
 
-def _slow_down(fraction: float) -> Callable[[Plan], None]:
-    def act(plan: Plan) -> None:
-        plan.ramp(plan.at, int(plan.random.integers(5, 90)), fraction)
-
-    return act
+def _slow_down(plan: Plan, fraction: float) -> None:
+    plan.ramp(plan.at, int(plan.random.integers(5, 90)), fraction)
 
 
-def _turn(degrees: float) -> Callable[[Plan], None]:
-    def act(plan: Plan) -> None:
-        plan.hold = Hold.POWER
-        rate = plan.random.uniform(0.12, 0.35) * 6.0 / plan.hull.length_m
-        rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
-        length = int(np.radians(degrees) / rate)
-        side = plan.random.choice([-1.0, 1.0])
-        shape = np.ones(length)
-        edge = min(15, length // 3)
-        shape[:edge] = np.linspace(0.0, 1.0, edge)
-        shape[-edge:] = shape[:edge][::-1]
-        shape *= np.radians(degrees) / shape.sum()
-        plan.orders.turn[plan.at : plan.at + length] = side * shape
-
-    return act
+def _turn(plan: Plan, degrees: float) -> None:
+    plan.hold = Hold.POWER
+    rate = plan.random.uniform(0.12, 0.35) * 6.0 / plan.hull.length_m
+    rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
+    length = int(np.radians(degrees) / rate)
+    side = plan.random.choice([-1.0, 1.0])
+    shape = np.ones(length)
+    edge = min(15, length // 3)
+    shape[:edge] = np.linspace(0.0, 1.0, edge)
+    shape[-edge:] = shape[:edge][::-1]
+    shape *= np.radians(degrees) / shape.sum()
+    plan.orders.turn[plan.at : plan.at + length] = side * shape
 
 
 def _crash_stop(plan: Plan) -> None:
@@ -175,18 +169,15 @@ def _crash_stop(plan: Plan) -> None:
     plan.orders.mode[:, wait:] = Mode.ASTERN
 
 
-def _kick(mode: Mode) -> Callable[[Plan], None]:
-    def act(plan: Plan) -> None:
-        long = 1.0 if plan.hull.length_m > 50 else 0.5
-        plan.spoilt_at = plan.at + int(long * plan.random.uniform(200, 600))
-        end = plan.spoilt_at + int(plan.random.uniform(20, 60))
-        plan.orders.mode[:, plan.at :] = Mode.OFF
-        plan.orders.mode[:, plan.spoilt_at : end] = mode
-        plan.orders.level[:, plan.spoilt_at : end] = plan.random.uniform(0.4, 0.7)
-        if mode is Mode.AHEAD:
-            plan.hold = Hold.REVS
-
-    return act
+def _kick(plan: Plan, mode: Mode) -> None:
+    long = 1.0 if plan.hull.length_m > 50 else 0.5
+    plan.spoilt_at = plan.at + int(long * plan.random.uniform(200, 600))
+    end = plan.spoilt_at + int(plan.random.uniform(20, 60))
+    plan.orders.mode[:, plan.at :] = Mode.OFF
+    plan.orders.mode[:, plan.spoilt_at : end] = mode
+    plan.orders.level[:, plan.spoilt_at : end] = plan.random.uniform(0.4, 0.7)
+    if mode is Mode.AHEAD:
+        plan.hold = Hold.REVS
 
 
 def _one_of_two(plan: Plan) -> None:
@@ -207,16 +198,16 @@ def _harbour(plan: Plan) -> None:
 
 
 OTHERS: dict[str, Callable[[Plan], None]] = {
-    'slow-down to 80 %': _slow_down(0.8),
-    'slow-down to 60 %': _slow_down(0.6),
-    'slow-down to 50 %': _slow_down(0.5),
-    'slow-down to 30 %': _slow_down(0.3),
-    'turn of 35 deg': _turn(35.0),
-    'turn of 60 deg': _turn(60.0),
-    'turn of 90 deg': _turn(90.0),
+    'slow-down to 80 %': partial(_slow_down, fraction=0.8),
+    'slow-down to 60 %': partial(_slow_down, fraction=0.6),
+    'slow-down to 50 %': partial(_slow_down, fraction=0.5),
+    'slow-down to 30 %': partial(_slow_down, fraction=0.3),
+    'turn of 35 deg': partial(_turn, degrees=35.0),
+    'turn of 60 deg': partial(_turn, degrees=60.0),
+    'turn of 90 deg': partial(_turn, degrees=90.0),
     'crash stop': _crash_stop,
-    'kick ahead in a glide': _kick(Mode.AHEAD),
-    'kick astern in a glide': _kick(Mode.ASTERN),
+    'kick ahead in a glide': partial(_kick, mode=Mode.AHEAD),
+    'kick astern in a glide': partial(_kick, mode=Mode.ASTERN),
     'one shaft of two': _one_of_two,
     'shallow water': _nothing,
     'current changes': _nothing,
