@@ -14,7 +14,7 @@ into docs/forecast.md, and what was not foretold into docs/results/forecast_reco
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.result import Track
 from shipdrag_ros.forecast.followed import Followed
 from shipdrag_ros.forecast.foretell import foretell
 from shipdrag_ros.parameters import Parameters
@@ -93,14 +94,13 @@ def scores(one: Predicted) -> Float64:
     return np.asarray(one.low + one.high + 2.0 / 0.1 * out)
 
 
-def readings(
-    window: Window, stop_ns: int, track: tuple[Float64, Float64]
-) -> tuple[Float64, Float64]:
+def readings(window: Window, stop_ns: int, tracks: Mapping[str, Track]) -> tuple[Float64, Float64]:
     """Return times from the stop and the speeds that rivals fit; of places, as they are fitted."""
     for series in (window.speed_through_water, window.speed_over_ground):
         if len(series):
             return (series.time_ns - stop_ns) / SECOND_NS, series.value
-    return track[0], np.gradient(track[1], track[0])
+    time_s = (tracks['position'].time_ns - stop_ns) / SECOND_NS
+    return time_s, np.gradient(tracks['position'].fitted, time_s)
 
 
 def rivals(time_s: Float64, speed: Float64, order: int) -> Iterator[tuple[str, Motion]]:
@@ -158,11 +158,7 @@ def case_of(
             ahead / made_s,
         )
     }
-    track = found.tracks.get('position')
-    fitted = (np.empty(0), np.empty(0))
-    if track is not None:
-        fitted = (track.time_ns - stop_ns) / SECOND_NS, track.fitted
-    seen = readings(known, stop_ns, fitted)
+    seen = readings(known, stop_ns, found.tracks)
     published = (
         's1_speed' if known.speed_through_water or known.speed_over_ground else 's1_position'
     )
