@@ -272,19 +272,12 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> recor
         world=case.world,
         disturbance=recording.disturb(leg, case.noise, heading, _stream(number, 1, which)),
     )
-    streams = {
-        name: _stream(number, 2, which, place) for place, name in enumerate(recording.INPUTS)
-    }
-    return recording.record(
-        motion,
-        leg,
-        effects,
-        number=which,
-        inputs=inputs,
-        noise=case.noise,
-        heading_rad=heading,
-        streams=streams,
-    )
+    found = {}
+    for name in inputs:
+        rng = _stream(number, 2, which, recording.INPUTS.index(name))
+        scene = recording.Scene(motion, leg, effects, case.noise, heading, rng)
+        found[name] = recording.read(name, scene, which)
+    return found
 
 
 _WEATHER = ('wind', 'shallow_water', 'waves')
