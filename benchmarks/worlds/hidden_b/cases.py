@@ -250,7 +250,7 @@ def steady_of(setting: Setting) -> tuple[float, float]:
     Return revs and torque before the stop.
     """
     need = float(np.interp(setting.speed_m_s, setting.hull.grid_m_s, setting.still_n()))
-    return steady_point(setting, need)[1:]
+    return steady_point(setting, need)
 
 
 @lru_cache(maxsize=16)

@@ -164,7 +164,7 @@ class _Oracle:
         self.scatters = [Scatter(run) for run in self.runs]
         need = float(np.interp(hull.speed_m_s, hull.grid_m_s, hull.still_n))
         first = run_of(known, hull, 0, hull.speed_m_s, 0.0)
-        self.steady = steady_point(first, need)[1:]
+        self.steady = steady_point(first, need)
         self.common = 2 * len(self.runs)
         self._about(Fit((), (), np.zeros(self.common)))
 

@@ -89,9 +89,9 @@ def stated(text: str, known: Known) -> Stated:
     added, down = file['added_mass'], file['propulsion']
     bare = replace(hull, still_n=usual, n_r=added['value'])
     # revs and torque before the stop depend on the drag hardly at all
-    revs, torque = steady_point(run_of(known, bare, 0, hull.speed_m_s, 0.0), float(
-        np.interp(hull.speed_m_s, grid, usual)))[1:]  # fmt: skip
-    drag = np.interp(grid, steady, known.screw.drag_n(steady, (revs, torque)))
+    need = float(np.interp(hull.speed_m_s, grid, usual))
+    held = steady_point(run_of(known, bare, 0, hull.speed_m_s, 0.0), need)
+    drag = np.interp(grid, steady, known.screw.drag_n(steady, held))
     drag *= np.maximum(grid / steady[-1], 1.0) ** 2
     return Stated(
         replace(bare, still_n=np.maximum(usual - drag, 0.02 * usual)),
