@@ -181,13 +181,6 @@ def _answer(found: DiagnosisResult) -> str:
     return f'{found.verdict}: {", ".join(shown)}' if shown else str(found.verdict)
 
 
-def lines_of(table: Table) -> list[str]:
-    """
-    Return a table in Markdown.
-    """
-    return markdown(table.columns, table.rows)
-
-
 def tables(
     found: steering.SteeringStudy,
     shown: steering.Experiment,
@@ -209,7 +202,7 @@ def tables(
         (coasting_words.MIMICS, coasting_words.mimic_table(coast)),
         ('What diagnose says of one wrong value of the file, seeds 0 and 1', wrong),
     ):
-        yield from ('', heading, '', *lines_of(table))
+        yield from ('', heading, '', *markdown(table.columns, table.rows))
     yield ''
     kept = f'{len(found.selection.kept)} of {len(manoeuvring.FORM)}'
     yield f'50 % over 10 %: {root.growth:.2f}; kept {kept}'

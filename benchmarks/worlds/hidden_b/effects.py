@@ -331,26 +331,18 @@ def time_offset(d: Draw) -> Hidden:
 
 
 FREE = ('declutched', 'electric')
+_NEEDS = {
+    locked_propeller: FREE,
+    windmilling_propeller: ('declutched',),
+    residual_thrust: FREE,
+}
+_MAKERS = (
+    fouling, shallow_water, towed_cable, locked_propeller, windmilling_propeller,
+    residual_thrust, wind, waves, current, log_scale, log_offset, radar_scale, turning, log_lag,
+    log_dead_band, time_offset, current_change, added_mass, displacement,
+)  # fmt: skip
 LIBRARY: dict[str, tuple[Callable[[Draw], Hidden], tuple[str, ...]]] = {
-    'fouling': (fouling, ()),
-    'shallow_water': (shallow_water, ()),
-    'towed_cable': (towed_cable, ()),
-    'locked_propeller': (locked_propeller, FREE),
-    'windmilling_propeller': (windmilling_propeller, ('declutched',)),
-    'residual_thrust': (residual_thrust, FREE),
-    'wind': (wind, ()),
-    'waves': (waves, ()),
-    'current': (current, ()),
-    'log_scale': (log_scale, ()),
-    'log_offset': (log_offset, ()),
-    'radar_scale': (radar_scale, ()),
-    'turning': (turning, ()),
-    'log_lag': (log_lag, ()),
-    'log_dead_band': (log_dead_band, ()),
-    'time_offset': (time_offset, ()),
-    'current_change': (current_change, ()),
-    'added_mass': (added_mass, ()),
-    'displacement': (displacement, ()),
+    make.__name__: (make, _NEEDS.get(make, ())) for make in _MAKERS
 }
 """Its maker by name, and the drives that it needs."""
 SECOND = ('log_lag', 'log_dead_band', 'time_offset', 'current_change', 'added_mass',

@@ -120,13 +120,8 @@ def aerated_log(d: Draw) -> Hidden:
     return changed('aerated_log', 'run', {'share': share, 'period_s': period}, swing=law)
 
 
-OUTSIDE = {
-    'swinging_force': swinging_force,
-    'dragging_anchor': dragging_anchor,
-    'ice': ice,
-    'bank': bank,
-    'list_change': list_change,
-    'caught_net': caught_net,
-    'gyro_ballistic': gyro_ballistic,
-    'aerated_log': aerated_log,
-}
+_MAKERS = (
+    swinging_force, dragging_anchor, ice, bank, list_change, caught_net, gyro_ballistic,
+    aerated_log,
+)  # fmt: skip
+OUTSIDE = {make.__name__: make for make in _MAKERS}
