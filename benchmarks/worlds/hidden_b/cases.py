@@ -74,7 +74,7 @@ class Truth:
     what
         Names of the effects themselves.
     r_change
-        By how much each moves r, of its largest value; see `measure.moved`.
+        By how much each moves r, of its largest value; see `moved`.
     facts, lies
         What the crew says, and which of it is false.
     """
