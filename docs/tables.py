@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from shipdrag_ros.coastdown import numbers as vouching_numbers
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.fields import keys_of
 from shipdrag_ros.forecast import priors as forecast_priors
@@ -238,7 +239,10 @@ PAGES: Mapping[Path, Tables] = {
         'families': model_families,
         'forecast priors': model_forecast,
     },
-    REGIMES: {'numbers': numbers.table},
+    REGIMES: {
+        'numbers': numbers.NUMBERS.table,
+        'vouching numbers': vouching_numbers.NUMBERS.table,
+    },
 }
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.coastdown import numbers as v
 from shipdrag_ros.coastdown.bins import Bins, mean_speeds
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import UNIT_RATIOS
@@ -25,18 +26,6 @@ from shipdrag_ros.samples import Float64, Int64
 EDGES: Int64 = np.array([0, 10, 22, 38, 60, 90, 130, 185, 260, 360, 500, 680, 920, 1250])
 _WIDTH = np.diff(EDGES)
 _MIDDLE = 0.5 * (EDGES[1:] + EDGES[:-1])
-
-CURRENT = ((0.4, 0.7), (1.0, 0.3))  # between log and ground [m/s]
-TURNS = 0.1  # probability that she turns in it
-_TURN_S = 60.0
-_ANOTHER = 0.2  # probability that it is another one before some time, after a turn
-_DRIFT = ((0.002, 0.5), (0.01, 0.5))  # its change in a second [m/s]; grows with the root of time
-_PLACE = ((1.0, 0.5), (8.0, 0.5))  # of a way made good [m]
-_JITTER, _OFFSET = 0.2, 0.1  # of a log in one second, and always [m/s]
-_LEAST = 0.03  # of a way made good that lasts long [m/s]
-_SOUND = ((0.02, 0.8), (0.06, 0.2))  # of ln scale: a Doppler log, a paddle wheel
-_WIDE = 0.5  # the same of one that is wrong ...
-_UNITS, _UNIT = 0.5, 0.04  # ... but for the share that is in another unit, and its sd
 
 _NEAR, _FAR = np.arange(-0.2, 0.21, 0.025), np.arange(0.26, 1.7, 0.06)
 _LN = np.concatenate([-_FAR[::-1], _NEAR, _FAR])
@@ -52,10 +41,10 @@ def _share(density: Float64) -> Float64:
     return np.asarray(np.log(np.maximum(density / density.sum(), 1e-300)), np.float64)
 
 
-_IS_SOUND = _share(np.sum([part * _normal(_LN, sd) for sd, part in _SOUND], axis=0))
+_IS_SOUND = _share(np.sum([part * _normal(_LN, sd) for sd, part in v.SOUND], axis=0))
 _IS_WRONG = _share(
-    (1.0 - _UNITS) * _normal(_LN, _WIDE)
-    + _UNITS * np.mean([_normal(_LN - math.log(each), _UNIT) for each in UNIT_RATIOS], axis=0)
+    (1.0 - v.UNITS) * _normal(_LN, v.WIDE)
+    + v.UNITS * np.mean([_normal(_LN - math.log(each), v.UNIT) for each in UNIT_RATIOS], axis=0)
 )
 
 
@@ -86,17 +75,17 @@ def _settings(count: int) -> tuple[Float64, Float64, Float64, Float64]:
     apart, since = np.subtract.outer(middle, middle), middle[-1] - middle
     same = np.ones((count, count))
     walk = np.minimum.outer(since, since)
-    steady = 1.0 - TURNS - _ANOTHER
-    kinds = [(same, drift, steady * part) for drift, part in _DRIFT]
-    kinds.append((np.exp(-np.abs(apart) / _TURN_S), _DRIFT[-1][0], TURNS))
+    steady = 1.0 - v.TURNS - v.ANOTHER
+    kinds = [(same, drift, steady * part) for drift, part in v.DRIFTS]
+    kinds.append((np.exp(-np.abs(apart) / v.TURN_S), v.DRIFTS[-1][0], v.TURNS))
     for first in range(1, count):
         newer = np.arange(count) < first
         one = (newer[:, None] == newer).astype(np.float64)
-        kinds.append((one, _DRIFT[-1][0], _ANOTHER / (count - 1)))
-    of_log = np.diag(_JITTER**2 / width) + _OFFSET**2 * same
-    for (size, a), (kind, drift, b), (place, c) in product(CURRENT, kinds, _PLACE):
+        kinds.append((one, v.DRIFTS[-1][0], v.ANOTHER / (count - 1)))
+    of_log = np.diag(v.JITTER**2 / width) + v.OFFSET**2 * same
+    for (size, a), (kind, drift, b), (place, c) in product(v.CURRENT, kinds, v.PLACE):
         water = size**2 * kind + drift**2 * walk
-        ground = water + np.diag((place / width) ** 2 + _LEAST**2)
+        ground = water + np.diag((place / width) ** 2 + v.LEAST**2)
         lower = np.linalg.cholesky(ground)
         inverse = np.linalg.inv(lower)
         more, vectors = np.linalg.eigh(inverse @ of_log @ inverse.T)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.coastdown import numbers as v
 from shipdrag_ros.coastdown.bins import (
     COUNT,
     PER_UNIT,
@@ -37,7 +38,7 @@ from shipdrag_ros.coastdown.bins import (
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, NoEstimate, NotCoastdown
 from shipdrag_ros.coastdown.past import FIRST_TRACK, NEVER
 from shipdrag_ros.coastdown.regimes.numbers import SHAFT_SD
-from shipdrag_ros.coastdown.scales import CURRENT, EDGES, TURNS, Scaled, log_sum, means, scaled
+from shipdrag_ros.coastdown.scales import EDGES, Scaled, log_sum, means, scaled
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.display import mistaken_units, utc
 from shipdrag_ros.estimation.run_down import STANDS_RAD_S
@@ -53,36 +54,15 @@ from shipdrag_ros.samples import (
 )
 
 LOOK_S = 10  # from one look to the next
-_LASTS_S = 70  # a contradiction that lasts so long: its source is no longer used ...
-_HOLD_S = 300  # ... until it agreed so long
+_LASTS_S, _HOLD_S = round(v.LASTS_S), round(v.HOLD_S)
 _MEAN_S, _MEANS = 5, 10  # a minute
 _LATE_S = 3  # that other inputs may be behind
-_WRONG = 0.9  # probability of a contradiction that is said: a false alarm costs nine misses
-_UNUSED = 0.75  # probability to say nothing of the ship with which a source is not used
-_AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: need not be computed
-# Priors as (value [m/s], weight). Of a ship, and of an instrument that measures her:
-_LEVEL = ((0.1, 0.2), (6.0, 0.8))  # she lies still, or sails
-_INERTIA = ((0.01, 0.7), (0.1, 0.2))  # change in a second; it grows with the root of time
-_QUICK, _QUICK_M_M_S = 0.1, 10.0  # of a craft that is quick, over her length
-_NOISE = ((0.03, 0.4), (0.1, 0.35), (0.3, 0.25))  # of a mean of a log or a speed over ground
-_TRACK_NOISE = ((0.03, 0.3), (0.1, 0.3), (0.3, 0.2), (1.0, 0.2))  # radar: 4 to 10 m
-_NOISES = (_NOISE, _NOISE, _TRACK_NOISE)  # each kind has its own
-_SLOW = 0.15  # an offset; half of it that its filter makes while she changes speed
-_DRIFT = 0.01  # change of a current in a second, in open water
-_SWING_S = 40.0  # in which it is another one while she turns, or crosses an eddy
-_ASTERN = 0.005  # share of minutes
-# Of a source that says nothing: dead or anywhere, still or wandering, smooth or jumping
-_ANYWHERE = ((0.1, 0.4), (8.0, 0.6))
-_WANDERS = ((0.0, 0.3), (0.3, 0.7))
-_JUMPS = ((0.03, 0.15), (0.1, 0.2), (0.3, 0.25), (1.0, 0.2), (3.0, 0.2))
-_WRONG_SHARE = (0.04, 0.003, 0.003, 0.003)  # of minutes: a log fouls, a fix hardly ever
-_IN_A_SCALE = (0.5, 0.1, 0.1, 0.1)  # of these: the ship in a wrong scale; of a track: in km
-_REVERSED = 0.05  # of logs in a wrong scale: a wrong sign
-_FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
-_TOGETHER = 0.5  # share of those of a kind that have one driver, setting or aerial
-_STILL = 0.5  # share of minutes of a source that was wrong just before
 _STUCK_LOOK_S = 60  # from one look for a shaft that sticks to the next
-_DISTINCT = 0.9  # of the readings of a shaft whose sensor has no coarse levels
+_AGREE_M_S = 0.4  # where all means are as near, the first hypothesis holds: need not be computed
+_NOISES = (v.NOISE, v.NOISE, v.TRACK_NOISE)  # each kind has its own
+_WRONG_SHARE = (v.WRONG_LOG, *[v.WRONG_FIX] * 3)
+_IN_A_SCALE = (v.SCALED_LOG, *[v.SCALED_FIX] * 3)
+_FEW, _MOST_WRONG = 4, 2  # of more sources than a few, so many at most say nothing of her
 
 _KIND, _RANK = KIND.tolist(), RANK.tolist()
 _LOG, _METRES = int(Channel.SPEED_THROUGH_WATER), int(Channel.POSITION)
@@ -90,8 +70,8 @@ _KM = Scaled(_MEANS * math.log(1e3), 1e-3, _MEAN_S * _MEANS)
 _SAME, _WHITE = np.ones((_MEANS, _MEANS)), np.eye(_MEANS)
 _TIME_S = _MEAN_S * np.arange(_MEANS, dtype=np.float64)
 _WALK = np.minimum.outer(_TIME_S, _TIME_S)
-_TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / _SWING_S) ** 2)
-_OWN = _SLOW**2 * (_SAME + 0.25 * _TURN)  # what an instrument errs by, sound or not
+_TURN = np.exp(-0.5 * (np.subtract.outer(_TIME_S, _TIME_S) / v.SWING_S) ** 2)
+_OWN = v.SLOW**2 * (_SAME + 0.25 * _TURN)  # what an instrument errs by, sound or not
 SpeedMixture = tuple[Float64, Float64]  # precisions, and logarithms of their factors
 
 
@@ -107,7 +87,7 @@ def _nothing() -> SpeedMixture:
     return _mixture(
         [
             (level**2 * _SAME + wander**2 * _WALK + jump**2 * _WHITE + _OWN, a * b * c)
-            for (level, a), (wander, b), (jump, c) in product(_ANYWHERE, _WANDERS, _JUMPS)
+            for (level, a), (wander, b), (jump, c) in product(v.ANYWHERE, v.WANDERS, v.JUMPS)
         ]
     )
 
@@ -129,12 +109,12 @@ def _one_ship(counts: tuple[int, ...], length_m: float) -> SpeedMixture:
     parts, kinds = [], np.flatnonzero(counts)
     root = np.sqrt(np.array(counts)[kinds])
     over_ground = root * (kinds > 0)
-    water = ((_SAME, 1.0 - TURNS), (_TURN, TURNS))
+    water = ((_SAME, 1.0 - v.TURNS), (_TURN, v.TURNS))
     apart = counts[0] and len(kinds) > 1
-    currents = list(product(CURRENT, water)) if apart else [((0.0, 1.0), (_SAME, 1.0))]
-    drift = _DRIFT**2 * _WALK * (len(currents) > 1)
+    currents = list(product(v.CURRENT, water)) if apart else [((0.0, 1.0), (_SAME, 1.0))]
+    drift = v.DRIFTS[-1][0] ** 2 * _WALK * (len(currents) > 1)
     for (level, a), (inertia, b), ((current, c), (kind, d)) in product(
-        _LEVEL, (*_INERTIA, (_QUICK_M_M_S / length_m, _QUICK)), currents
+        v.LEVEL, (*v.INERTIA, (v.QUICK_M_M_S / length_m, v.QUICK)), currents
     ):
         shared = np.kron(np.outer(root, root), level**2 * _SAME + inertia**2 * _WALK)
         shared += np.kron(np.outer(over_ground, over_ground), current**2 * kind + drift)
@@ -195,7 +175,7 @@ def _measured(speeds: Mapping[int, Float64], craft: Craft) -> float:
         return ahead
     # she makes way astern: over ground a speed has no sign
     pace = through / craft.slow_m_s
-    rare = math.log(_ASTERN * max(_LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
+    rare = math.log(v.ASTERN * max(v.LEVEL[1][0] / craft.slow_m_s, 1.0)) - 0.5 * pace * pace
     astern = _ahead({**speeds, **{source: -each for source, each in of_logs.items()}}, craft)
     return min(rare, 0.0) + float(np.logaddexp(ahead, astern))
 
@@ -283,13 +263,13 @@ def sound_probabilities(
 
 def _share_of(names: list[int], sound: Collection[int], doubted: Collection[int]) -> float:
     """Return the log share of minutes in which these of a kind are wrong, alone or together."""
-    shares = [_STILL if name in doubted else _WRONG_SHARE[_KIND[name]] for name in names]
+    shares = [v.STILL if name in doubted else _WRONG_SHARE[_KIND[name]] for name in names]
     alone = math.prod(
         1.0 - share if name in sound else share for name, share in zip(names, shares, strict=True)
     )
     right = sum(name in sound for name in names)
     together = {0: max(shares), len(names): 1.0 - max(shares)}.get(right, 0.0)
-    return math.log((1.0 - _TOGETHER) * alone + _TOGETHER * together)
+    return math.log((1.0 - v.TOGETHER) * alone + v.TOGETHER * together)
 
 
 def _beside(
@@ -306,7 +286,7 @@ def _beside(
         return _KM.log_odds + _measured(_in_order(scaled_up), craft)
     found = -math.inf
     if _KIND[name] == _LOG and sound:
-        found = math.log(_REVERSED) + _measured(_in_order({name: -speed, **sound}), craft)
+        found = math.log(v.REVERSED) + _measured(_in_order({name: -speed, **sound}), craft)
     # a track has no scale, and no current is between it and a speed over ground
     for other in sorted(sound, key=_RANK.__getitem__, reverse=_KIND[name] != _LOG):
         if (name, other) in scales:
@@ -489,7 +469,7 @@ class Vouching:
         logs = {one for one, _ in scales if _KIND[one] == _LOG}
         self._scaled |= {source: (number, found.scaled[source]) for source in logs}
         wrong = {source: found.wrong(source) for source in speeds}
-        contradiction = found.sets[tuple(speeds)] < 1.0 - _WRONG
+        contradiction = found.sets[tuple(speeds)] < 1.0 - v.WRONG
         left = len(speeds) - len(doubted)
         for source, each in wrong.items():
             if source not in doubted and left < 2:
@@ -498,13 +478,13 @@ class Vouching:
             if source in doubted:
                 lasts = each > 0.5  # as long as it is more probable than not
             else:  # a radar that takes another mark is odd for the length of its filter
-                begins = NEVER if not (contradiction and each > _UNUSED) else number
+                begins = NEVER if not (contradiction and each > v.UNUSED) else number
                 self._since[source] = (
                     begins if NEVER in (begins, self._since[source]) else self._since[source]
                 )
                 lasts = begins == number >= self._since[source] + _LASTS_S
                 # while a scale is known from the whole record
-                lasts = lasts or found.scaled[source] > _WRONG
+                lasts = lasts or found.scaled[source] > v.WRONG
             if lasts:
                 left -= source not in doubted
                 self.until[source] = number + _HOLD_S
@@ -583,7 +563,7 @@ class Vouching:
         before = _readings(bins, shaft, last, len(bins.places[shaft]))
         before = before[: np.flatnonzero(before != still[-1])[-1:].sum() + 1]
         turning = still[-1] / PER_UNIT
-        coarse = len(np.unique(before)) < _DISTINCT * len(before)
+        coarse = len(np.unique(before)) < v.DISTINCT * len(before)
         if abs(turning) < STANDS_RAD_S or coarse or len(before) < len(still):
             return ''
         return (
@@ -627,7 +607,7 @@ def _scales(
         both = np.array([read[one][:count], read[other][:count]])
         # as long as she makes way ahead, through the water and faster than a current may run:
         # a speed over ground has no sign
-        way = (both > 0.0).all(axis=0) & (both[1] > CURRENT[-1][0])
+        way = (both > 0.0).all(axis=0) & (both[1] > v.CURRENT[-1][0])
         # and since both said something of her
         way &= EDGES[1 : count + 1] <= last - nothing[[one, other]].max()
         count = count if way.all() else int(np.argmin(way))

@@ -329,7 +329,11 @@ def _all_families(
     ]
     extra, added = len(means[0]), sum(len(each.columns) for each in influences)
     level = np.array([hull.level for hull, _ in bases])
-    options = [*product(_lags(kinds), _after_stop(stop, added, level), wrong)]
+    options = [
+        (lag, force, bad)
+        for force, bad in product(_after_stop(stop, added, level), wrong)
+        for lag in (_lags(kinds) if motion.LAG not in bad.places else [_Option(1.0)])
+    ]
     many = len(options)
     mean, sd = (
         np.repeat(np.hstack([each, np.tile(of_extra, (len(bases), 1))]), many, axis=0)
@@ -362,6 +366,11 @@ class _Option(NamedTuple):
     chance: float
     unknown: tuple[tuple[int, float, float | Float64], ...] = ()
     name: str = ''
+
+    @property
+    def places(self) -> set[int]:
+        """The unknowns that it is about."""
+        return {place for place, *_ in self.unknown}
 
 
 def _after_stop(stop: StopPrior, added: int, level: Float64) -> Iterator[_Option]:

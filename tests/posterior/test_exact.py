@@ -140,6 +140,10 @@ def test_each_instrument_may_be_wrong_but_the_scale_of_latitude_and_longitude(sh
         families = problem.families
         nothing = families.usual
         assert families.chance.sum() == pytest.approx(1.0)
+        each = np.column_stack([families.mean, families.precision])
+        for name in np.unique(families.name):
+            some = each[families.name == name]
+            assert len(np.unique(some, axis=0)) == len(some), name
         for place, effect in effects.items():
             at = problem.coefficients + place
             mean, sd = effect.parameters[0].prior.moments()

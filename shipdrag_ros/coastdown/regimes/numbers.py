@@ -24,9 +24,9 @@ class Number(NamedTuple):
     Attributes
     ----------
     name
-        Of the constant in this module.
+        Of the constant in its module.
     values
-        One, or the points of a grid.
+        One, the points of a grid, or values with their shares, as text.
     unit
         '1' for ratios.
     source
@@ -34,24 +34,46 @@ class Number(NamedTuple):
     """
 
     name: str
-    values: tuple[float, ...]
+    values: str
     unit: str
     source: str
 
 
-NUMBERS: list[Number] = []
-"""All of them, in the order in which the docs list them."""
+Shares = tuple[tuple[float, float], ...]
+"""Values, each with its share."""
 
 
-def _number(name: str, value: float, unit: str, source: str) -> float:
-    NUMBERS.append(Number(name, (value,), unit, source))
-    return value
+class NumberTable(list[Number]):
+    """
+    A table of numbers, in the order in which the docs list them; each is returned as it is listed.
+    """
+
+    def number(self, name: str, value: float, unit: str, source: str) -> float:
+        """List one number."""
+        self.append(Number(name, f'{value:g}', unit, source))
+        return value
+
+    def grid(self, name: str, values: tuple[float, ...], unit: str, source: str) -> Float64:
+        """List the points of a grid, or numbers that go together."""
+        self.append(Number(name, ', '.join(f'{value:g}' for value in values), unit, source))
+        return np.array(values)
+
+    def shares(self, name: str, parts: Shares, unit: str, source: str) -> Shares:
+        """List values with their shares."""
+        said = ', '.join(f'{value:g} ({share:g})' for value, share in parts)
+        self.append(Number(name, said, unit, source))
+        return parts
+
+    def table(self) -> str:
+        """
+        Return all of them as a table of Markdown.
+        """
+        rows = (f'| {" | ".join(each)} |' for each in self)
+        return '\n'.join(['| number | value | unit | source |', '|---|---|---|---|', *rows])
 
 
-def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float64:
-    NUMBERS.append(Number(name, values, unit, source))
-    return np.array(values)
-
+NUMBERS = NumberTable()
+_number, _grid = NUMBERS.number, NUMBERS.grid
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
 BIN_LENGTH_M = _number('BIN_LENGTH_M', 150.0, 'm', 'of a ship of that bin; times go by the root')
@@ -203,15 +225,3 @@ EXPLAINED = _grid(
     'nats a reading',
     'by which these are explained less well: log density over its expectation',
 )
-
-
-def table() -> str:
-    """
-    Return all numbers as a table of Markdown.
-    """
-    rows = [
-        f'| {each.name} | {", ".join(f"{value:g}" for value in each.values)} | {each.unit} | '
-        f'{each.source} |'
-        for each in NUMBERS
-    ]
-    return '\n'.join(['| number | value | unit | source |', '|---|---|---|---|', *rows])
