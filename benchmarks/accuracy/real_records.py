@@ -160,12 +160,13 @@ RECORDS = (
 
 def prepared(out: Path) -> bool:
     """
-    Make a folder; say whether the records are there.
+    Say whether the records are there; if so, make a folder for what becomes of them.
     """
-    out.mkdir(parents=True, exist_ok=True)
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
-    return DATA in os.environ
+        return False
+    out.mkdir(parents=True, exist_ok=True)
+    return True
 
 
 def run_command(line: str, *, out: Path) -> None:
