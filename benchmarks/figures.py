@@ -19,9 +19,9 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks import ROOT
 from benchmarks._tables import filled, table
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGE, RESULTS = ROOT / 'docs' / 'figures.md', ROOT / 'docs' / 'results'
 
 

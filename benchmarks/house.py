@@ -26,31 +26,17 @@ import tempfile
 import tokenize
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 
-ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'shipdrag_ros'
 LINES, PARAMETERS = 60, 8
 # counted by themselves: the ways in and out, the studies and the ground floor
 OUTER = ('bags', 'cli', 'fleet', 'library', 'live', 'messages', 'nmea', 'node', 'report')
 OUTER += ('sources', 'studies', 'trend', '')
-AIMS = {
-    'lines of code, core': 24_000,
-    'lines of code, outer rooms': 14_500,
-    'modules': 210,
-    'numbers in constants, inner rooms': 200,
-    'calls from room to room, bytes of a bag to bytes published': 25,
-    'modules that run in a diagnosis': 45,
-    f'functions over {LINES} lines of code': 0,
-    f'functions over {PARAMETERS} parameters': 0,
-    'lines of code, tests': 25_000,
-    'lines of code, benchmarks': 10_000,
-    'words, README and docs': 25_000,
-}
 PRINTED = {'Declared', '_number', '_grid', '_shares'}  # rows of tables of priors, which pages show
 PLAIN = {0, 1, 2, 0.5}
 WALK = """
@@ -90,26 +76,19 @@ print('WALKED', json.dumps([sorted(calls), sorted(modules)]))
 """
 
 
-class Long(NamedTuple):
-    """A function that is long, or takes much."""
-
-    place: str
-    count: int
-
-
 @dataclass
 class Count:
-    """What a tree holds."""
+    """What a tree holds; of functions that are long, or take much, where they are and how much."""
 
-    raw: int
-    lines: int
-    core: int
-    outer: int
-    modules: int
-    core_modules: int
-    numbers: Counter[str]
-    long: list[Long]
-    wide: list[Long]
+    raw: int = 0
+    lines: int = 0
+    core: int = 0
+    outer: int = 0
+    modules: int = 0
+    core_modules: int = 0
+    numbers: Counter[str] = field(default_factory=Counter)
+    long: list[tuple[str, int]] = field(default_factory=list)
+    wide: list[tuple[str, int]] = field(default_factory=list)
 
 
 def code_lines(path: Path) -> set[int]:
@@ -118,18 +97,9 @@ def code_lines(path: Path) -> set[int]:
     """
     text = path.read_text(encoding='utf-8')
     held: set[int] = set()
-    skipped = {
-        tokenize.COMMENT,
-        tokenize.NL,
-        tokenize.NEWLINE,
-        tokenize.INDENT,
-        tokenize.DEDENT,
-        tokenize.ENCODING,
-        tokenize.ENDMARKER,
-    }
     with path.open('rb') as file:
         for token in tokenize.tokenize(file.readline):
-            if token.type not in skipped:
+            if token.type != tokenize.COMMENT and token.string.strip() and token.start[0]:
                 held.update(range(token.start[0], token.end[0] + 1))
     for node in ast.walk(ast.parse(text)):
         body = getattr(node, 'body', None)
@@ -185,7 +155,7 @@ def count(tree: Path) -> Count:
     Count the package of a tree.
     """
     package = tree / PACKAGE
-    found = Count(0, 0, 0, 0, 0, 0, Counter(), [], [])
+    found = Count()
     for path in sorted(package.rglob('*.py')):
         held = code_lines(path)
         room = path.relative_to(package).parent.as_posix().partition('/')[0].strip('.')
@@ -201,9 +171,9 @@ def count(tree: Path) -> Count:
             place = f'{path.relative_to(package)}:{node.name}'
             long = len(held & set(range(node.lineno, (node.end_lineno or 0) + 1)))
             if long > LINES and not is_compiled:
-                found.long.append(Long(place, long))
+                found.long.append((place, long))
             if parameters(node) > PARAMETERS and not is_compiled:
-                found.wide.append(Long(place, parameters(node)))
+                found.wide.append((place, parameters(node)))
     return found
 
 
@@ -220,10 +190,7 @@ def walk(
         which a function was called. What calls within compiled code is not seen.
     """
     code = WALK.format(tree=str(tree), line=line, module=module, function=function)
-    environment = {**os.environ, 'PYTHONPATH': str(tree)}
-    done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=tree
-    )
+    done = of_tree(tree, '-c', code)
     printed = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
     if not printed:
         raise SystemExit(f'{tree}: {" ".join(line)} failed:\n{done.stderr[-2000:]}')
@@ -231,36 +198,43 @@ def walk(
     return calls, modules
 
 
-def figures(tree: Path, folder: Path) -> dict[str, str]:
+def of_tree(tree: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """
-    Return the figures of a tree, by name.
+    Run Python in a tree.
+    """
+    environment = {**os.environ, 'PYTHONPATH': str(tree)}
+    line = [sys.executable, *words]
+    return subprocess.run(line, capture_output=True, text=True, env=environment, cwd=tree)
+
+
+def figures(tree: Path, folder: Path) -> dict[str, tuple[int, int | None]]:
+    """
+    Return the figures of a tree, by name, each with its aim.
     """
     held = count(tree)
     bag = folder / f'{len(list(folder.iterdir()))}.mcap'
     simulate = ['simulate', '--ship', str(tree / 'config' / 'vitus_bering.yaml'), '-o', str(bag)]
     simulate += ['--lead-in', '900', '--seed', '5', '--effect', 'current=0.4']
-    environment = {**os.environ, 'PYTHONPATH': str(tree)}
-    module = [sys.executable, '-m', f'{PACKAGE}.cli']
-    subprocess.run([*module, *simulate], check=True, env=environment, capture_output=True)
+    of_tree(tree, '-m', f'{PACKAGE}.cli', *simulate).check_returncode()
     calls, _ = walk(tree, ['replay', str(bag)], 'playback.py', 'replay')
     _, modules = walk(tree, ['diagnose', str(bag)], 'diagnosis/diagnose.py', 'diagnose')
     return {
-        'lines, with docstrings, comments and blanks': f'{held.raw}',
-        'lines of code': f'{held.lines}',
-        'lines of code, core': f'{held.core}',
-        'lines of code, outer rooms': f'{held.outer}',
-        'modules': f'{held.modules}',
-        'modules, core': f'{held.core_modules}',
-        'numbers in constants, inner rooms': f'{held.numbers["constants"]}',
-        'numbers in printed tables, inner rooms': f'{held.numbers["printed"]}',
-        'numbers within functions, inner rooms': f'{held.numbers["code"]}',
-        'calls from room to room, bytes of a bag to bytes published': f'{len(calls)}',
-        'modules that run in a diagnosis': f'{len(modules)}',
-        f'functions over {LINES} lines of code': f'{len(held.long)}',
-        f'functions over {PARAMETERS} parameters': f'{len(held.wide)}',
-        'lines of code, tests': f'{lines(tree / "tests")}',
-        'lines of code, benchmarks': f'{lines(tree / "benchmarks")}',
-        'words, README and docs': f'{words(tree)}',
+        'lines, with docstrings, comments and blanks': (held.raw, None),
+        'lines of code': (held.lines, None),
+        'lines of code, core': (held.core, 24_000),
+        'lines of code, outer rooms': (held.outer, 14_500),
+        'modules': (held.modules, 210),
+        'modules, core': (held.core_modules, None),
+        'numbers in constants, inner rooms': (held.numbers['constants'], 200),
+        'numbers in printed tables, inner rooms': (held.numbers['printed'], None),
+        'numbers within functions, inner rooms': (held.numbers['code'], None),
+        'calls from room to room, bytes of a bag to bytes published': (len(calls), 25),
+        'modules that run in a diagnosis': (len(modules), 45),
+        f'functions over {LINES} lines of code': (len(held.long), 0),
+        f'functions over {PARAMETERS} parameters': (len(held.wide), 0),
+        'lines of code, tests': (lines(tree / 'tests'), 25_000),
+        'lines of code, benchmarks': (lines(tree / 'benchmarks'), 10_000),
+        'words, README and docs': (words(tree), 25_000),
     }
 
 
@@ -289,11 +263,12 @@ def main() -> None:
     print('| | ' + ' | '.join(tree.name for tree in trees) + ' | aim |')
     print('|---|' + '---:|' * len(trees) + '---:|')
     for name in columns[0]:
-        cells = [name, *(each[name] for each in columns), str(AIMS.get(name, ''))]
-        print(f'| {" | ".join(cells)} |')
+        aim = columns[-1][name][1]
+        cells = [name, *(each[name][0] for each in columns), '' if aim is None else aim]
+        print(f'| {" | ".join(map(str, cells))} |')
     last = count(trees[-1])
-    for each in (*last.long, *last.wide):
-        print(f'{each.place}: {each.count}')
+    for place, many in (*last.long, *last.wide):
+        print(f'{place}: {many}')
 
 
 if __name__ == '__main__':

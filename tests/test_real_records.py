@@ -37,13 +37,12 @@ needs_data = pytest.mark.skipif(
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `replay --json` says of each record, with the window and without."""
     out = tmp_path_factory.mktemp('records')
-    data = Path(os.environ['SHIPDRAG_DATA'])
     found = {}
     for record in real_records.RECORDS:
-        real_records.run_command(record.import_command(), data=data, out=out)
+        real_records.run_command(record.import_command(), out=out)
         for window in (True, False) if record.name in WHOLE else (True,):
             line = f'{record.replay_command(window=window)} --json one.json'
-            real_records.run_command(line, data=data, out=out)
+            real_records.run_command(line, out=out)
             found[record.name, window] = json.loads((out / 'one.json').read_text())
     return found
 
@@ -114,9 +113,8 @@ def test_the_model_ship_drifts_and_the_joint_fit_shows_it(results: dict[str, Any
 
 @needs_data
 def test_the_ferry_path_and_the_ship_at_rest(tmp_path, capsys) -> None:
-    data = Path(os.environ['SHIPDRAG_DATA'])
     for record in (real_records.FERRY, real_records.MODEL_SHIP):
-        real_records.run_command(record.import_command(), data=data, out=tmp_path)
+        real_records.run_command(record.import_command(), out=tmp_path)
     real_records.show_ferry_path(tmp_path)
     lengths = [float(x) for x in re.findall(r's1_\w+ +([\d.]+)', capsys.readouterr().out)]
     # integral of the speed, then path of the positions, alone and jointly
@@ -133,10 +131,8 @@ def test_the_ferry_path_and_the_ship_at_rest(tmp_path, capsys) -> None:
 @pytest.fixture(scope='module')
 def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """What `diagnose --json` says of the logs of two yachts."""
-    out, data = tmp_path_factory.mktemp('diagnoses'), Path(os.environ['SHIPDRAG_DATA'])
-    return {
-        name: real_diagnosis.diagnosed(name, data=data, out=out) for name in real_diagnosis.RECORDS
-    }
+    out = tmp_path_factory.mktemp('diagnoses')
+    return {name: real_diagnosis.diagnosed(name, out=out) for name in real_diagnosis.RECORDS}
 
 
 @needs_data

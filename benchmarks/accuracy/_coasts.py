@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
@@ -27,7 +27,7 @@ from shipdrag_ros.simulation import (
     simulate,
 )
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = ROOT / 'config'
 COURSE_RAD = 0.7
 STEADY_S = 1800.0
 SLOW_S = 300.0  # correlation time of gusts and of the log's slow noise

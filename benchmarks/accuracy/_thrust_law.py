@@ -12,13 +12,13 @@ The ships and the noise are those of `_coasts`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from benchmarks.accuracy._coasts import CARGO, COURSE_RAD, STEADY_S, YACHT, Compared, Hull
 from shipdrag_ros.estimation import Window, estimate_final
@@ -81,46 +81,26 @@ class Case(NamedTuple):
 CASES = (Case(True, 1.0), Case(False, 1.0), Case(False, 2.0))
 
 
-@dataclass(frozen=True)
-class Motion:
-    """From the stop on, in even steps."""
-
-    time_s: Float64
-    speed_m_s: Float64
-    distance_m: Float64
-    shaft: Float64  # over the steady one
-
-
 @cache
-def follow(hull: Hull, law: Law) -> Motion:
-    """Integrate the coastdown by Runge-Kutta's fourth order."""
-    ship, run_down_s = hull.ship, RUN_DOWN_S[hull.name]
-    v0 = hull.speed_m_s
+def follow(hull: Hull, law: Law) -> tuple[Float64, Float64, Float64, Float64]:
+    """Return time, speed, distance, and the shaft over the steady one, from the stop on."""
+    ship, v0 = hull.ship, hull.speed_m_s
     table_m_s = np.linspace(0.0, v0, 2000)
     table = ship.resistance_n(table_m_s) / ship.mass_kg
     inertia = 1.0 + np.asarray(ship.n_r(table_m_s), np.float64)
-    largest = float(table[-1])
 
-    def shaft(t: float, v: float) -> float:
-        return max(math.exp(-t / run_down_s), law.windmilling * v / v0)
+    def shaft(t: Float64, v: Float64) -> Float64:
+        return np.maximum(np.exp(-t / RUN_DOWN_S[hull.name]), law.windmilling * v / v0)
 
-    def rate(t: float, v: float) -> float:
-        thrust = largest * law.thrust(shaft(t, v), v / v0)
-        return float((thrust - np.interp(v, table_m_s, table)) / np.interp(v, table_m_s, inertia))
+    def rate(t: Float64, state: Float64) -> tuple[Float64, Float64]:
+        v = state[0]
+        push = table[-1] * law.thrust(shaft(t, v), v / v0) - np.interp(v, table_m_s, table)
+        return push / np.interp(v, table_m_s, inertia), v
 
-    h = run_down_s / 30.0
-    time_s = np.arange(0.0, hull.duration_s + h, h)
-    speed, distance = np.empty(len(time_s)), np.empty(len(time_s))
-    v, x = v0, 0.0
-    for i, t in enumerate(time_s):
-        speed[i], distance[i] = v, x
-        a = rate(t, v)
-        b = rate(t + 0.5 * h, v + 0.5 * h * a)
-        c = rate(t + 0.5 * h, v + 0.5 * h * b)
-        d = rate(t + h, v + h * c)
-        x += h * v + h * h * (a + b + c) / 6.0
-        v += h * (a + 2.0 * b + 2.0 * c + d) / 6.0
-    return Motion(time_s, speed, distance, np.array([shaft(t, u) for t, u in zip(time_s, speed)]))
+    span_s = 0.0, hull.duration_s
+    time_s = np.linspace(*span_s, 5000)
+    speed, distance = solve_ivp(rate, span_s, (v0, 0.0), t_eval=time_s, rtol=1e-8, atol=1e-8).y
+    return time_s, speed, distance, shaft(time_s, speed)
 
 
 def true_r(hull: Hull, law: Law, speed_m_s: Float64) -> Float64:
@@ -135,15 +115,11 @@ def true_r(hull: Hull, law: Law, speed_m_s: Float64) -> Float64:
 def record(hull: Hull, law: Law, case: Case, n: int, seed: int) -> Window:
     """Read a coastdown; cut its window."""
     rng = np.random.default_rng(seed)
-    motion = follow(hull, law)
-    spacing = hull.duration_s / (n - 1)
-    time_s = np.arange(-STEADY_S, hull.duration_s, spacing)
-    speed = np.interp(time_s, motion.time_s, motion.speed_m_s)
-    distance = np.where(
-        time_s < 0.0,
-        hull.speed_m_s * time_s,
-        np.interp(time_s, motion.time_s, motion.distance_m),
-    )
+    after_s, speed, distance, shaft = follow(hull, law)
+    time_s = np.arange(-STEADY_S, hull.duration_s, hull.duration_s / (n - 1))
+    speed = np.interp(time_s, after_s, speed)
+    before = np.minimum(time_s, 0.0) * hull.speed_m_s
+    distance = before + np.interp(time_s, after_s, distance)
     along = distance[:, None] * [np.cos(COURSE_RAD), np.sin(COURSE_RAD)]
     stamps = ZERO_NS + np.round(time_s * 1e9).astype(np.int64)
     blocks = [
@@ -157,8 +133,8 @@ def record(hull: Hull, law: Law, case: Case, n: int, seed: int) -> Window:
     late_s = float(rng.uniform(-ONSET_S, ONSET_S))
     if case.shaft:
         shaft_s = np.arange(time_s[0], time_s[-1], 1.0)
-        shaft = np.where(shaft_s < 0.0, 1.0, np.interp(shaft_s, motion.time_s, motion.shaft))
-        value = SHAFT_RAD_S * shaft + SHAFT_SD * rng.normal(size=len(shaft))
+        value = SHAFT_RAD_S * np.interp(shaft_s, after_s, shaft)
+        value += SHAFT_SD * rng.normal(size=len(value))
         stamps = ZERO_NS + np.round(shaft_s * 1e9).astype(np.int64)
         blocks.append(Block.of(Channel.SHAFT, stamps, value))
     return Window.from_block(

@@ -14,16 +14,12 @@ below it. What is expected of r beforehand was chosen in view of this ship.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy import _peers
@@ -34,7 +30,7 @@ from shipdrag_ros.estimation import estimate, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'accuracy_beside_peers.txt'
+PAGE = ROOT / 'docs' / 'results' / 'accuracy_beside_peers.txt'
 CASES = (
     Case('white noise'),
     Case('current 0.25 m/s', current_m_s=0.25),

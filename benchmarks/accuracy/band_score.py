@@ -14,16 +14,12 @@ each run.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-
-os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 
@@ -31,10 +27,8 @@ from benchmarks import _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
 from benchmarks.accuracy._coasts import rms
-from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
-from benchmarks.worlds.hidden import cases as cases_a
+from benchmarks.accuracy.diagnosis_score import HALVES, drawn, half_of, write_bags
 from benchmarks.worlds.hidden_b import cases as cases_b
-from benchmarks.worlds.hidden_b.plans import plans_of
 from shipdrag_ros.simulation.effect import Scope
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -47,54 +41,6 @@ ROWS = {
     Scope.HULL: 'hull', Scope.EARTH: 'weather', Scope.SENSOR: 'instrument', Scope.RUN: 'manoeuvre',
 }  # fmt: skip
 WIDE = 1.96
-
-
-@dataclass(frozen=True)
-class World:
-    """
-    The cases of a world; each attribute but the first is a function of the number of a case.
-
-    Attributes
-    ----------
-    count
-        How many there are.
-    names
-        What is hidden.
-    condition, observe, stops_ns
-    first_speed
-        And of the run.
-    true_r
-        And of speeds and the run, in calm deep water.
-    """
-
-    count: int
-    names: Callable[[int], tuple[str, ...]]
-    condition: Callable[[int], object]
-    observe: Callable[[int], Any]
-    stops_ns: Callable[[int], tuple[int, ...]]
-    first_speed: Callable[[int, int], float]
-    true_r: Callable[[int, np.ndarray, int], np.ndarray]
-
-    @classmethod
-    def a(cls) -> World:
-        """
-        Return the first world.
-        """
-        of = cases_a
-        true_r = partial(of.true_r, calm=True)
-        more = of.condition, of.observe, of.stops_ns, of.first_speed, true_r
-        return cls(of.count(), lambda number: of.reveal(number).names, *more)
-
-    @classmethod
-    def b(cls, seed: int = cases_b.SEED) -> World:
-        """
-        Return the world of another hand.
-        """
-        of, plans = cases_b, plans_of(seed)
-        true_r = partial(of.true_r, calm=True)
-        more = of.condition, of.observe, of.stops_ns, of.first_speed, true_r
-        seeded = (partial(each, seed=seed) for each in more)
-        return cls(len(plans), lambda number: tuple(sorted(plans[number][0])), *seeded)
 
 
 @dataclass(frozen=True)
@@ -136,9 +82,7 @@ def replay(ship: Path, bag: Path, estimator: str = 'one') -> dict[str, Any]:
     return _verbs.found('replay', str(bag), '--ship', str(ship), '--parameters', str(parameters))
 
 
-def score(
-    world: World, number: int, run: int, found: dict[str, Any], cpu_s: float
-) -> Score | None:
+def score(world: Any, number: int, run: int, found: dict[str, Any], cpu_s: float) -> Score | None:
     """
     Return the score of a run, None where no coastdown was found after its stop.
     """
@@ -155,7 +99,7 @@ def score(
     speed, r, sigma = speed[use], r[use], sigma[use]
     if len(speed) < 3:
         return None
-    true = world.true_r(number, speed, run)
+    true = world.true_r(number, speed, run, calm=True)
     largest = float(true.max())
     error = r - true
     return Score(
@@ -171,26 +115,21 @@ def score(
     )
 
 
-def chosen(world: World, half: str, hidden: str, first: int, count: int) -> list[int]:
+def chosen(world: Any, half: str, hidden: str, first: int, count: int) -> list[int]:
     """
     Return numbers of cases: of a half, and of those with what is wanted hidden.
     """
-    remainder, divisor = HALVES[half]
-    numbers: list[int] = []
-    for number in range(first, world.count):
-        if len(numbers) == count:
-            break
-        if number % divisor != remainder:
-            continue
+
+    def wanted(number: int) -> bool:
         names = world.names(number)
         own = not names or (len(names) == 1 and names[0] in OWN)
-        if {'own': own, 'nothing': not names, 'all': True}[hidden]:
-            numbers.append(number)
-    return numbers
+        return {'own': own, 'nothing': not names, 'all': True}[hidden]
+
+    return list(filter(wanted, half_of(world, half, first)))[:count]
 
 
 def scored(
-    world: World, numbers: Sequence[int], estimator: str = 'one'
+    world: Any, numbers: Sequence[int], estimator: str = 'one'
 ) -> Iterator[tuple[int, int, Score | None, str]]:
     """
     Yield case, run, score, and the error where the command failed.
@@ -273,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         __doc__, arguments, world=('b', 'a'), half=tuple(HALVES), hidden=('own', 'nothing', 'all'),
         first=0, count=40, seed=cases_b.SEED, estimator='one', each=False,
     )  # fmt: skip
-    world = World.a() if options.world == 'a' else World.b(options.seed)
+    world = drawn(options.world, options.seed)
     numbers = chosen(world, options.half, options.hidden, options.first, options.count)
     rows = []
     for row in scored(world, numbers, options.estimator):
@@ -281,10 +220,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         number, run, found, error = row
         if options.each:
             print(found or f'case {number} run {run}: {error or "no coastdown"}', flush=True)
-    seed = cases_a.SEED if options.world == 'a' else options.seed
     print(
-        f'{len(numbers)} cases of world {options.world} from {options.first} on, seed {seed}, '
-        f'half {options.half}'
+        f'{len(numbers)} cases of world {options.world} from {options.first} on, '
+        f'seed {world.SEED}, half {options.half}'
     )
     for error in sorted({error for *_, error in rows if error})[:5]:
         print(error)

@@ -14,10 +14,10 @@ a source that was doubted held.
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import table
 from benchmarks.accuracy.vouching import START_NS, by_seconds, sailing, ship_of, spoilt, well
@@ -26,7 +26,7 @@ from shipdrag_ros.node.health import InputStates
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Channel
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'day_of_faults.txt'
+PAGE = ROOT / 'docs' / 'results' / 'day_of_faults.txt'
 KINDS = (
     'random', 'zero', 'constant', 'reversed', 'other axis', '20 % spikes', 'in knots', '0.5 times',
 )  # fmt: skip

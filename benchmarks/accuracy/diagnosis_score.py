@@ -19,18 +19,15 @@ that was broken off goes on where it was.
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
+from inspect import getmembers
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
-
-# before numpy: the processes share the cores with each other alone
-os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 from benchmarks import _verbs
 from benchmarks._asked import asked, pooled
@@ -38,7 +35,6 @@ from benchmarks._tables import table as markdown
 from benchmarks.worlds.hidden import cases, scoring
 from benchmarks.worlds.hidden.recording import Recording
 from benchmarks.worlds.hidden_b import cases as cases_b
-from benchmarks.worlds.hidden_b import facts as facts_b
 from benchmarks.worlds.hidden_b import oracle
 from benchmarks.worlds.hidden_b import plans as plans_b
 from shipdrag_ros.bags import BagWriter
@@ -53,15 +49,20 @@ Diagnose = Callable[[cases.Observation], Found]
 
 def drawn(world: str, seed: int = 0) -> Any:
     """
-    Return the functions of a world, of another seed than its own where one is given.
+    Return the functions of a world, of world b of another seed than its own where one is given.
     """
-    module = WORLDS[world]
-    if not seed:
-        return module
-    asked_for = 'count', 'observe', 'reveal', 'known'
-    return SimpleNamespace(
-        SEED=seed, **{each: partial(getattr(module, each), seed=seed) for each in asked_for}
-    )
+    if world == 'a' or not seed:
+        return WORLDS[world]
+    functions = getmembers(cases_b, lambda each: 'seed' in getattr(each, '__annotations__', ()))
+    return SimpleNamespace(SEED=seed, **{n: partial(each, seed=seed) for n, each in functions})
+
+
+def half_of(world: Any, half: str, first: int) -> list[int]:
+    """
+    Return the numbers of a half of the cases of a world, from the first on.
+    """
+    remainder, divisor = HALVES[half]
+    return [n for n in range(first, world.count()) if n % divisor == remainder]
 
 
 def as_block(recording: Recording) -> Block:
@@ -106,7 +107,7 @@ def diagnosis(by: str, number: int, hidden: Any, facts: bool = False) -> Diagnos
         module, _, name = by.partition(':')
         function = getattr(import_module(module), name)
         return lambda seen: function(seen.ship_file, [as_block(run) for run in seen.runs])
-    more = facts_b.arguments(hidden.reveal(number).facts) if facts else []
+    more = plans_b.arguments(hidden.reveal(number).facts) if facts else []
 
     def command(seen: cases.Observation) -> Found:
         with TemporaryDirectory() as folder:
@@ -187,9 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if world == 'a' and (options.facts or options.seed or by == 'oracle'):
         raise SystemExit('world a has neither facts nor an oracle nor other seeds')
     hidden = drawn(world, options.seed)
-    place, step = HALVES[options.half]
-    numbers = [n for n in range(options.first, hidden.count()) if n % step == place]
-    numbers = numbers[: options.count]
+    numbers = half_of(hidden, options.half, options.first)[: options.count]
     name = by.replace(':', '_') + '_b' * (world == 'b') + '_facts' * options.facts
     name += f'_{options.seed}' * bool(options.seed)
     out = options.out or OUT / f'diagnosis_{name}.jsonl'

@@ -13,9 +13,8 @@ into docs/forecast.md, and what was not foretold into docs/results/forecast_reco
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,12 +23,13 @@ from scipy.optimize import curve_fit
 
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy._known_coasts import COASTS, KnownCoast
-from benchmarks.accuracy.real_records import DATA, run_command
+from benchmarks.accuracy.real_coastdowns import COASTS, KnownCoast
+from benchmarks.accuracy.real_records import OUT, ROOT, prepared
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.result import Track
 from shipdrag_ros.forecast.followed import Followed
 from shipdrag_ros.forecast.foretell import foretell
 from shipdrag_ros.parameters import Parameters
@@ -37,10 +37,8 @@ from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'forecast.md'
 REASONS = ROOT / 'docs' / 'results' / 'forecast_records.txt'
-OUT = ROOT / 'benchmarks' / 'out' / 'forecast'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 EIGHTHS = np.arange(1, 9) / 8.0
 OURS, RIVALS = 'forecast', ('persistence', 'polynomial', 'v^2')
@@ -96,14 +94,13 @@ def scores(one: Predicted) -> Float64:
     return np.asarray(one.low + one.high + 2.0 / 0.1 * out)
 
 
-def readings(
-    window: Window, stop_ns: int, track: tuple[Float64, Float64]
-) -> tuple[Float64, Float64]:
+def readings(window: Window, stop_ns: int, tracks: Mapping[str, Track]) -> tuple[Float64, Float64]:
     """Return times from the stop and the speeds that rivals fit; of places, as they are fitted."""
     for series in (window.speed_through_water, window.speed_over_ground):
         if len(series):
             return (series.time_ns - stop_ns) / SECOND_NS, series.value
-    return track[0], np.gradient(track[1], track[0])
+    time_s = (tracks['position'].time_ns - stop_ns) / SECOND_NS
+    return time_s, np.gradient(tracks['position'].fitted, time_s)
 
 
 def rivals(time_s: Float64, speed: Float64, order: int) -> Iterator[tuple[str, Motion]]:
@@ -161,11 +158,7 @@ def case_of(
             ahead / made_s,
         )
     }
-    track = found.tracks.get('position')
-    fitted = (np.empty(0), np.empty(0))
-    if track is not None:
-        fitted = (track.time_ns - stop_ns) / SECOND_NS, track.fitted
-    seen = readings(known, stop_ns, fitted)
+    seen = readings(known, stop_ns, found.tracks)
     published = (
         's1_speed' if known.speed_through_water or known.speed_over_ground else 's1_position'
     )
@@ -187,10 +180,9 @@ def cases(coast: KnownCoast, out: Path, estimator: str) -> Iterator[Case | str]:
     """Yield the forecasts of a record, or why there is none."""
     record, span = coast.record, coast.coast_s
     assert span is not None
-    (run,) = open_runs([out / f'{record.name}.mcap'])
-    given = Parameters.load(ROOT / 'benchmarks' / 'ships' / f'{record.parameters}.yaml')
-    given = replace(given, estimator=estimator)
+    (run,) = open_runs([record.bag(out)])
     try:
+        given = replace(record.given, estimator=estimator)
         result = replay(run, parameters=given, window=span)
         found = coast_windows(result)
         if not found:
@@ -240,48 +232,37 @@ def weighted_quantile(values: Float64, weights: Float64) -> float:
 
 def report(every: list[Case], problems: list[str]) -> str:
     """Return the tables."""
-    names = list(dict.fromkeys(each.record for each in every))
     methods = (OURS, *RIVALS)
-    rows, wins, shares = [], {'score': np.zeros(3), 'error': np.zeros(3)}, []
-    numbers: list[tuple[str, bool, bool]] = []
-    for name in names:
-        mine = [each for each in every if each.record == name]
-        held = {m: np.mean([inside(each.by[m]) for each in mine]) for m in methods}
-        score = {m: np.mean([scores(each.by[m]) for each in mine]) for m in methods}
-        error = {m: np.median([np.abs(each.by[m].error) for each in mine]) for m in methods}
-        shares.append(held[OURS])
-        numbers.append((name, score[OURS] < score[RIVALS[0]], error[OURS] < error[RIVALS[0]]))
-        wins['score'] += [score[OURS] < score[m] for m in RIVALS]
-        wins['error'] += [error[OURS] < error[m] for m in RIVALS]
-        rows.append(
-            [
-                name,
-                len(mine),
-                f'{held[OURS]:.0%}',
-                *(f'{100.0 * score[m]:.3g}' for m in methods),
-                *(f'{100.0 * error[m]:.2g}' for m in methods),
-            ]
-        )
+    rows: list[Sequence[object]] = []
+    shares: dict[str, float] = {}
+    better: dict[str, list[list[bool]]] = {}  # score and error, than each rival
+    for name in dict.fromkeys(each.record for each in every):
+        mine = [each.by for each in every if each.record == name]
+        score = [np.mean([scores(by[m]) for by in mine]) for m in methods]
+        error = [np.median([np.abs(by[m].error) for by in mine]) for m in methods]
+        shares[name] = float(np.mean([inside(by[OURS]) for by in mine]))
+        better[name] = [[each[0] < rival for rival in each[1:]] for each in (score, error)]
+        cells = (*(f'{100.0 * each:.3g}' for each in score), *(f'{100.0 * e:.2g}' for e in error))
+        rows.append((name, len(mine), f'{shares[name]:.0%}', *cells))
     parts = [
         f'{part:.0%}: {np.mean([inside(one.by[OURS]) for one in every if one.part == part]):.0%}'
         for part in PARTS
     ]
-    share, spread = float(np.mean(shares)), float(np.std(shares) / np.sqrt(len(shares)))
+    n, held = len(shares), list(shares.values())
+    share, spread = float(np.mean(held)), float(np.std(held) / np.sqrt(n))
+    won = np.sum(list(better.values()), axis=0).tolist()
     head = ['record', 'forecasts', 'inside 90 %']
     head += [f'score, {m}' for m in methods] + [f'error, {m}' for m in methods]
-    n = len(names)
     # the families of the law were chosen on the first of each two records of the list
     listed = [coast.record.name for coast in ONCE]
     halves = []
     for half, which in ((listed[::2], 'odd'), (listed[1::2], 'even')):
-        of_half = [
-            (share, row) for share, row in zip(shares, numbers, strict=True) if row[0] in half
-        ]
-        held = float(np.mean([share for share, _ in of_half]))
-        better = [sum(row[k] for _, row in of_half) for k in (1, 2)]
+        of_half = [name for name in shares if name in half]
+        score, error = np.sum([better[name] for name in of_half], axis=0)[:, 0]
         halves.append(
-            f'{which} records ({len(of_half)}): {held:.0%} inside, better score than persistence '
-            f'in {better[0]}, less error in {better[1]}'
+            f'{which} records ({len(of_half)}): '
+            f'{float(np.mean([shares[name] for name in of_half])):.0%} inside, better score than '
+            f'persistence in {score}, less error in {error}'
         )
     missed = len({re.split('[,:]', each)[0] for each in problems})
     lines = [
@@ -290,9 +271,8 @@ def report(every: list[Case], problems: list[str]) -> str:
         f'{len(every)} forecasts of {n} records. Inside the band: {share:.0%} ± {2 * spread:.0%} '
         '(mean over records, ± two standard errors). '
         + ' '.join(
-            f'{words} than {", ".join(RIVALS)} in '
-            f'{", ".join(f"{won:.0f}" for won in wins[key])} of {n}.'
-            for key, words in (('score', 'Better score'), ('error', 'Less error'))
+            f'{words} than {", ".join(RIVALS)} in {", ".join(map(str, of))} of {n}.'
+            for words, of in zip(('Better score', 'Less error'), won)
         ),
         '',
         f'By part of the coast that was known: {", ".join(parts)}.',
@@ -309,16 +289,12 @@ def main() -> None:
     """
     Print the tables, and write them into the page if asked.
     """
-    options = asked(__doc__, write=False, estimator='one', out=OUT)
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+    options = asked(__doc__, write=False, estimator='one', out=OUT / 'forecast')
+    if not prepared(options.out):
         return
-    options.out.mkdir(parents=True, exist_ok=True)
     every: list[Case] = []
     problems: list[str] = []
     for coast in ONCE:
-        (options.out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
-        run_command(coast.record.import_command(), data=Path(os.environ[DATA]), out=options.out)
         for each in cases(coast, options.out, options.estimator):
             if isinstance(each, str):
                 problems.append(each)

@@ -13,18 +13,15 @@ of. `--write` puts the table of both worlds into docs/forecast.md.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
-from pathlib import Path
-
-os.environ.setdefault('OMP_NUM_THREADS', '1')
+from typing import Any
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy.band_score import World
-from benchmarks.accuracy.diagnosis_score import HALVES, as_block
+from benchmarks.accuracy.diagnosis_score import HALVES, as_block, drawn, half_of
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.errors import ShipdragError
@@ -35,13 +32,13 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Reason
 from shipdrag_ros.ship import Ship
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'forecast.md'
-KEPT = Path(__file__).resolve().parents[1] / 'results' / 'forecast_worlds.json'
+PAGE = ROOT / 'docs' / 'forecast.md'
+KEPT = ROOT / 'benchmarks' / 'results' / 'forecast_worlds.json'
 PARTS = (0.25, 1.0 / 3.0, 0.5)
 Row = tuple[float, bool, float, float]
 
 
-def rows(world: World, number: int, parameters: Parameters) -> Iterator[Row]:
+def rows(world: Any, number: int, parameters: Parameters) -> Iterator[Row]:
     """Yield of each figure of a case: part known, whether inside, score, error relative."""
     seen = world.observe(number)
     ship = Ship.from_yaml(seen.ship_file, subject=str(number))
@@ -88,12 +85,10 @@ def main() -> None:
         __doc__, world=('a', 'b'), half=tuple(HALVES), first=539, count=30, seed=31,
         estimator='one', write=False,
     )  # fmt: skip
-    world = World.a() if options.world == 'a' else World.b(options.seed)
+    world = drawn(options.world, options.seed)
     first = options.first if options.world == 'a' else 0
-    remainder, divisor = HALVES[options.half]
-    numbers = [n for n in range(first, world.count) if n % divisor == remainder]
     cases: dict[str, dict[int, list[Row]]] = {'nothing hidden': {}, 'anything hidden': {}}
-    for number in numbers[: options.count]:
+    for number in half_of(world, options.half, first)[: options.count]:
         hidden = 'anything hidden' if world.names(number) else 'nothing hidden'
         try:
             found = list(rows(world, number, Parameters(estimator=options.estimator)))

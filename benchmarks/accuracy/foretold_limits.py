@@ -15,13 +15,14 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from benchmarks._asked import asked
 from benchmarks._tables import table
-from benchmarks.accuracy.band_score import World, chosen
-from benchmarks.accuracy.diagnosis_score import HALVES, write_bags
+from benchmarks.accuracy.band_score import chosen
+from benchmarks.accuracy.diagnosis_score import HALVES, drawn, write_bags
 from benchmarks.worlds.hidden_b import cases as cases_b
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.diagnosis import CoastRun, diagnose
@@ -33,7 +34,7 @@ NEAR = 1.3
 Pairs = dict[str, list[tuple[Limit, Limit]]]
 
 
-def pairs_of(world: World, numbers: Sequence[int]) -> Pairs:
+def pairs_of(world: Any, numbers: Sequence[int]) -> Pairs:
     """
     Return the limits of each effect, foretold and found, by its name.
     """
@@ -88,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         __doc__, arguments, world=('b', 'a'), half=tuple(HALVES), first=0, count=12,
         seed=cases_b.SEED,
     )  # fmt: skip
-    world = World.a() if options.world == 'a' else World.b(options.seed)
+    world = drawn(options.world, options.seed)
     numbers = chosen(world, options.half, 'nothing', options.first, options.count)
     print(f'{len(numbers)} cases of world {options.world} from {options.first} on, nothing hidden')
     heads = ['effect', 'upper_95, foretold over found', 'named from, the same', 'runs', 'one only']

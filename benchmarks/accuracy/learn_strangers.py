@@ -16,7 +16,6 @@ both write docs/results/learn_strangers.txt.
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -25,12 +24,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-os.environ.setdefault('OMP_NUM_THREADS', '1')
-
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from benchmarks.accuracy.diagnosis_score import write_bag
 from benchmarks.worlds.hidden_b.cases import EPOCH_NS
@@ -47,7 +44,7 @@ WHY = (
     'nothing is missing',
 )  # fmt: skip
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
-RESULTS = Path(__file__).parents[2] / 'docs' / 'results' / 'learn_strangers.txt'
+RESULTS = ROOT / 'docs' / 'results' / 'learn_strangers.txt'
 NAME = 'stranger'
 GONE = 0.9  # of the gap
 Found = dict[str, Any]
@@ -155,11 +152,10 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
         mine = [row for row in rows if row['runs'] == runs]
         plain = [row for row in mine if row['stranger'] in PLAIN]
         other = [row for row in mine if row['stranger'] and row['stranger'] not in PLAIN]
-        empty = [row for row in mine if not row['stranger']]
+        empty, strange = [row for row in mine if not row['stranger']], plain + other
         right = [tuple(row['kind'] or ()) == CURVES[row['stranger']] for row in plain]
         wrong = [row['kind'] is not None and not ok for row, ok in zip(plain, right, strict=True)]
-        cut = [row['cut'] >= GONE for row in (*plain, *other)]
-        written = [row for row in (*plain, *other) if row['kind'] is not None]
+        written = [row for row in strange if row['kind'] is not None]
         yield f'\n{runs} runs, {len(mine)} cases'
         yield _line('the twelve: form right', right)
         yield _line('the twelve: another form', wrong)
@@ -167,16 +163,14 @@ def table(rows: Sequence[Found]) -> Iterator[str]:
         yield _line('without a stranger: a form written', [r['kind'] is not None for r in empty])
         sizes = [abs(row['size'][0] - 1.0) <= 2.0 * row['size'][1] for row in written]
         yield _line('written: size right within 2 sd, on that run', sizes)
+        cut = [row['cut'] >= GONE for row in strange]
         yield _line('90 % of the gap of a run that was kept gone', cut)
-        yield _line(
-            'written, and named in a later run', [r['later'][1] == [NAME] for r in written]
-        )
-        alone = [[row['alone'][0] == 'named' for row in some] for some in (plain + other, empty)]
+        later = [row['later'][1] == [NAME] for row in written]
+        yield _line('written, and named in a later run', later)
+        alone = [[row['alone'][0] == 'named' for row in some] for some in (strange, empty)]
         yield _line('one run diagnosed alone: a name, which is wrong', alone[0])
         yield _line('without a stranger: one run, a name', alone[1])
-        why = [
-            next(k for k in WHY if k in row['reason']) for row in plain + other if not row['kind']
-        ]
+        why = [next(k for k in WHY if k in row['reason']) for row in strange if not row['kind']]
         yield f'of {len(why)} of which nothing is written: ' + ', '.join(
             f'{count} {text}' for text, count in Counter(why).most_common()
         )

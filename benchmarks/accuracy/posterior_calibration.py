@@ -38,6 +38,12 @@ STOP = StopPrior(30.0, 8.0, 2.0)
 OUT = (HELD, WIND, DEPTH), (HELD,)  # of the calm curve, and of that in the conditions
 WIDE = 1.96
 SPEEDS = np.linspace(LOW_M_S, 7.8, 50)
+TIME_S = np.concatenate(
+    [
+        np.arange(-LEAD_S + 0.5 * STEADY_BIN_S, 0.0, STEADY_BIN_S),
+        np.arange(0.5 * BIN_S, COAST_S, BIN_S),
+    ]
+)
 
 
 class Place(NamedTuple):
@@ -54,15 +60,9 @@ class Place(NamedTuple):
 
 def model_of(value: Float64) -> RunModel:
     """Return the run with these readings, of the log and then of the positions."""
-    time_s = np.concatenate(
-        [
-            np.arange(-LEAD_S + 0.5 * STEADY_BIN_S, 0.0, STEADY_BIN_S),
-            np.arange(0.5 * BIN_S, COAST_S, BIN_S),
-        ]
-    )
-    rows = Rows(np.repeat(time_s, 2), np.tile([LOG, POSITION], len(time_s)), value)
-    variance = np.tile([LOG_SD**2, POSITION_SD**2], len(time_s))
-    steady = 2 * int((time_s < 0.0).sum())
+    rows = Rows(np.repeat(TIME_S, 2), np.tile([LOG, POSITION], len(TIME_S)), value)
+    variance = np.tile([LOG_SD**2, POSITION_SD**2], len(TIME_S))
+    steady = 2 * int((TIME_S < 0.0).sum())
     return RunModel.of(
         rows,
         variance,
@@ -74,14 +74,9 @@ def model_of(value: Float64) -> RunModel:
     )
 
 
-def count_of_rows() -> int:
-    """Return how many rows a run has."""
-    return 2 * (int(LEAD_S / STEADY_BIN_S) + int(COAST_S / BIN_S))
-
-
 def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
     """Draw a run: its model, what holds, and the true r at `SPEEDS`, calm and in its weather."""
-    model = model_of(np.zeros(count_of_rows()))
+    model = model_of(np.zeros(2 * len(TIME_S)))
     families = model.families
     which = int(rng.choice(len(families), p=families.chance / families.chance.sum()))
     mean, precision = families.mean[which], families.precision[which]

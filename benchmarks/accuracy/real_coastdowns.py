@@ -9,15 +9,18 @@ joint standard deviations of the one that is known, and its own is at most 1.5
 times the other's; both without the uncertainty of n_r, which they share. `--write`
 puts the table into docs/results/real_records.txt.
 Nothing is random. Takes about a minute.
+
+What is known is from the page on the records (reality, section 3) and from their provenance, each
+found from the samples by other means: fits of an equation of motion, times of passage, motor and
+rudder columns. Its +- is two standard deviations. Where nothing is known of r, `known` is empty.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
 from typing import Any
@@ -27,13 +30,192 @@ import numpy as np
 from benchmarks import _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
-from benchmarks.accuracy._known_coasts import COASTS, Known, KnownCoast
-from benchmarks.accuracy.real_records import DATA, PAGE, ROOT, run_command
+from benchmarks.accuracy import real_records as real
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 
+
+@dataclass(frozen=True)
+class Known:
+    """
+    A resistance found independently.
+
+    Attributes
+    ----------
+    from_m_s, to_m_s
+        Speed, or range of speed: r is then the range over the time of passage.
+    r_m_s2, two_sd_m_s2
+        Specific resistance, and two standard deviations.
+    """
+
+    from_m_s: float
+    to_m_s: float
+    r_m_s2: float
+    two_sd_m_s2: float
+
+
+@dataclass(frozen=True)
+class KnownCoast:
+    """
+    A record with all its useful columns, and what is known of it.
+
+    Attributes
+    ----------
+    record
+        How it is imported and which window a person would give.
+    coast_s
+        The stretch that is a coastdown [s from the start of the record]; None: there
+        is none.
+    fact
+        What is known besides, and where from.
+    known
+        The resistance there.
+    refusal
+        Reasons of `not_coastdowns` one of which makes it right to give no figure.
+    """
+
+    record: real.Record
+    coast_s: tuple[float, float] | None
+    fact: str
+    known: tuple[Known, ...] = ()
+    refusal: tuple[str, ...] = ()
+
+
+def _at(speed_m_s: float, r_m_s2: float, two_sd_m_s2: float) -> Known:
+    return Known(speed_m_s, speed_m_s, r_m_s2, two_sd_m_s2)
+
+
+_MOTORS = '--map shaft=motor1_rpm,motor2_rpm,motor3_rpm,motor4_rpm:rpm'
+_BOAT = (
+    '--time t --map speed_through_water=surge --map position=lat,lon:deg --map heading=yaw:deg '
+    '--map shaft=thr_l,thr_r'
+)
+_TANKER = (
+    '--time t_s --map speed_through_water=u_mps --map position=x_m,y_m --map heading=psi_rad '
+    '--map shaft=prop_rps:rev/s --map rudder=rudder_rad'
+)
+_SPIKES = '1 Hz, spikes of 2 to 4 m/s'
+
+
+def _usv(test: str, turn: int) -> KnownCoast:
+    record = replace(real.usv(test, 'short'), name=f'usv_{test}')
+    return KnownCoast(record, (0.0, 15.0), f'coasts 13 to 15 s, the heading turns {turn} deg')
+
+
+def _car(test: str, end_s: float) -> KnownCoast:
+    record = real.car(test, end_s, 'short')
+    return KnownCoast(record, (0.0, end_s), 'cut to the coast by those who measured')
+
+
+def _slow_car(test: str, *known: Known) -> KnownCoast:
+    return KnownCoast(real.slow_car(test, 'short'), (0.0, 172.0), _SPIKES, known)
+
+
+def _boat(run: str, window_s: tuple[float, float]) -> real.Record:
+    table = f'blueboat_{run}_10hz.csv'
+    name, speeds = f'blueboat_{run}', (0.3, 0.4)
+    return real.Record(name, table, _BOAT, 'blueboat', 'short_compass', window_s, speeds)
+
+
+def _ferry(name: str, window_s: tuple[float, float]) -> real.Record:
+    columns = f'{real.FERRY.columns} --map heading=yaw_rad {_MOTORS}'
+    file = 'milliampere_nlp1_t275_20hz.csv'
+    return real.Record(name, file, columns, 'ferry', 'short_compass', window_s, (0.116,))
+
+
+def _tanker(part: str, window_s: tuple[float, float]) -> real.Record:
+    file = f'esso_osaka_3m_{part}_10hz.csv'
+    return real.Record(
+        f'esso_osaka_{part}', file, _TANKER, 'esso_osaka', 'short', window_s, (0.17,)
+    )
+
+
+_FERRY_KNOWN = (_at(0.116, 0.0053, 0.0009),)
+_TRUE_COAST_S = (16.2, 25.2)  # 287 to 296 s of its column of times
+COASTS = (
+    KnownCoast(
+        replace(
+            real.MODEL_SHIP,
+            name='model_ship_shaft',
+            columns=f'{real.MODEL_SHIP.columns} --map shaft=max_abs_cmd',
+            parameters='short',
+        ),
+        (5.0, 32.0),
+        'the engine stops at 5 s; the speed goes through zero: a hidden force or current',
+    ),
+    KnownCoast(
+        replace(
+            real.FERRY,
+            name='ferry_motors',
+            columns=f'{real.FERRY.columns} {_MOTORS}',
+            parameters='short',
+        ),
+        (8.0, 34.4),
+        'all motors at 0 from 8.0 s for 26.4 s; in sway, the heading turns 16 deg',
+    ),
+    KnownCoast(
+        _ferry('ferry_tempting', (8.2, 29.15)),
+        _TRUE_COAST_S,
+        'motors at up to 440 rpm in the window; the coast is 16 to 25 s',
+        _FERRY_KNOWN,
+        ('thrust',),
+    ),
+    KnownCoast(
+        _ferry('ferry_coast', _TRUE_COAST_S),
+        _TRUE_COAST_S,
+        'the coast of the record before',
+        _FERRY_KNOWN,
+    ),
+    *(_usv(test, turn) for test, turn in (('6', 54), ('8', 39), ('10', 65))),
+    *(_car(test, end_s) for test, end_s in real.CAR_ENDS_S.items()),
+    KnownCoast(
+        replace(
+            real.car('1', 0.0, 'short'),
+            name='car_whole',
+            table='car/shotgoose_RR-Coastdown-1_whole_100hz.csv',
+            window_s=(9.43, 19.79),
+            speeds_m_s=(7.0,),
+        ),
+        (9.43, 16.9),
+        'accelerates, coasts from 9.43 s, brake 7.5 s later',
+        (_at(7.0, 0.82, 0.01),),
+    ),
+    _slow_car('Michelin60A'),
+    _slow_car('Michelin60A1'),
+    _slow_car(
+        'Michelin60B', _at(4.0, 0.038, 0.005), _at(6.0, 0.044, 0.009), _at(7.2, 0.055, 0.04)
+    ),
+    KnownCoast(
+        _boat('222', (59.8, 95.3)),
+        (59.8, 95.0),
+        'thrusters at 0 from 59.8 s',
+        (Known(0.65, 1.0, 0.231, 0.02),),
+    ),
+    KnownCoast(_boat('218', (24.6, 44.6)), (24.6, 44.6), 'thrusters at 0 from 24.6 s, for 20 s'),
+    KnownCoast(
+        _boat('221', (30.5, 58.5)),
+        (30.5, 58.5),
+        'thrusters at 0 from 30.5 s, going ASTERN',
+        refusal=('astern',),
+    ),
+    KnownCoast(
+        _tanker('180s', (475.0, 503.5)),
+        (476.0, 482.0),
+        'reversed until 471 s, kick ahead at 476 s, stopped from outside at 483 s: no coastdown '
+        'of more than 6 s',
+        refusal=('thrust', 'brake', 'plateau', 'slow', 'settled', 'lead_in', 'other'),
+    ),
+    KnownCoast(
+        _tanker('2030s', (37.0, 62.0)),
+        (37.0, 62.0),
+        'rudder at -0.6 rad by the notes, 0 in its column; the heading turns by 0.5 rad',
+        (_at(0.17, 0.0026, 0.0002),),
+        ('rudder', 'turn'),
+    ),
+)
+
+
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
-OUT = ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
 AGREES_SD = 2.0
 WIDEST = 1.5  # of the stated standard deviation to that of the known figure
 SLACK_S = 3.0  # by which a reported stretch may exceed the coast
@@ -98,7 +280,7 @@ def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool, estim
     """
     words = shlex.split(coast.record.replay_command(window=window))[1:]
     at = words.index('--parameters') + 1
-    stated = (ROOT / words[at]).read_text(encoding='utf-8')
+    stated = (real.ROOT / words[at]).read_text(encoding='utf-8')
     changed = out / f'{coast.record.name}.parameters.yaml'
     if 'estimator:' not in stated:  # where another cannot work, the record names its own
         stated += f'\nestimator: {estimator}\n'
@@ -226,9 +408,9 @@ def judged_words(coast: KnownCoast, said: Said) -> str:
 
 def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> tuple[str, ...]:
     """
-    Replay a record both ways and return its line of the table.
+    Import a record, replay it both ways and return its line of the table.
     """
-    (run,) = open_runs([out / f'{coast.record.name}.mcap'])
+    (run,) = open_runs([coast.record.bag(out)])
     assert run.span_ns is not None
     itself, window = (
         replayed(coast, out, run.span_ns[0], window=given, estimator=estimator)
@@ -248,14 +430,12 @@ def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> tuple[str, ...]
     )
 
 
-def section(data: Path, out: Path, estimator: str) -> str:
+def section(out: Path, estimator: str) -> str:
     """
     Import and replay all records; return the table.
     """
     rows = []
     for coast in COASTS:
-        (out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
-        run_command(coast.record.import_command(), data=data, out=out)
         rows.append(row(coast, out, estimator))
         print('\n  '.join(rows[-1]).replace('<br>', '\n    '), flush=True)
     yes, no = (sum(each[-1].startswith(word) for each in rows) for word in ('yes', 'NO'))
@@ -267,15 +447,13 @@ def main() -> None:
     """
     Print the table, and write it into the page if asked.
     """
-    options = asked(__doc__, write=False, estimator='one', out=OUT)
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+    options = asked(__doc__, write=False, estimator='one', out=real.OUT / 'real_coastdowns')
+    if not real.prepared(options.out):
         return
-    options.out.mkdir(parents=True, exist_ok=True)
-    found = section(Path(os.environ[DATA]), options.out.resolve(), options.estimator)
+    found = section(options.out.resolve(), options.estimator)
     print('\n' + found)
     if options.write:
-        put(PAGE, {'coastdowns': found})
+        put(real.PAGE, {'coastdowns': found})
 
 
 if __name__ == '__main__':

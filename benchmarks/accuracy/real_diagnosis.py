@@ -9,14 +9,13 @@ and draws nothing at random. `--write` puts it into docs/results/real_records.tx
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from benchmarks._asked import asked
 from benchmarks._tables import put
-from benchmarks.accuracy.real_records import DATA, PAGE, run_command
+from benchmarks.accuracy.real_records import DATA, PAGE, prepared, run_command
 
 IMPORT_LOG = f'shipdrag import ${DATA}/psaros_lake_geneva.nmea.gz -o yacht.mcap'
 DIAGNOSE_LOG = 'shipdrag diagnose yacht.mcap'
@@ -36,13 +35,13 @@ RECORDS = {
 }
 
 
-def diagnosed(name: str, *, data: Path, out: Path) -> dict[str, Any]:
+def diagnosed(name: str, *, out: Path) -> dict[str, Any]:
     """
     Import a record, diagnose it and return the document.
     """
     importing, diagnosing = RECORDS[name]
-    run_command(importing, data=data, out=out)
-    run_command(f'{diagnosing} --json diagnosis.json', data=data, out=out)
+    run_command(importing, out=out)
+    run_command(f'{diagnosing} --json diagnosis.json', out=out)
     text = (out / 'diagnosis.json').read_text().replace(f'{out}/', '')
     found: dict[str, Any] = json.loads(text)
     return found
@@ -81,15 +80,12 @@ def main() -> None:
     """
     Run all.
     """
-    options = asked(__doc__, write=False)
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set')
-        return
-    blocks = {}
+    options, blocks = asked(__doc__, write=False), {}
     for name in RECORDS:
         with TemporaryDirectory() as folder:
-            found = diagnosed(name, data=Path(os.environ[DATA]), out=Path(folder))
-        blocks[name] = block(found)
+            if not prepared(Path(folder)):
+                return
+            blocks[name] = block(diagnosed(name, out=Path(folder)))
         print(f'{name}\n\n{blocks[name]}\n')
     if options.write:
         put(PAGE, blocks)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros import display
@@ -34,8 +34,8 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report import drawing
 from shipdrag_ros.samples import Float64
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
+OUT = ROOT / 'benchmarks' / 'out'
 DATA = 'SHIPDRAG_DATA'
 SIMULATED = 'config/vitus_bering.yaml'
 
@@ -78,6 +78,20 @@ class Record:
             f'shipdrag import ${DATA}/{self.table} -o {self.name}.mcap {self.columns} '
             f'--ship benchmarks/ships/{self.ship}.yaml'
         )
+
+    @property
+    def given(self) -> Parameters:
+        """Its parameters."""
+        return Parameters.load(ROOT / 'benchmarks' / 'ships' / f'{self.parameters}.yaml')
+
+    def bag(self, out: Path) -> Path:
+        """
+        Import it anew; return its bag.
+        """
+        path = out / f'{self.name}.mcap'
+        path.unlink(missing_ok=True)
+        run_command(self.import_command(), out=out)
+        return path
 
     def replay_command(self, *, window: bool = True) -> str:
         """
@@ -144,7 +158,18 @@ RECORDS = (
 )
 
 
-def run_command(line: str, *, data: Path, out: Path) -> None:
+def prepared(out: Path) -> bool:
+    """
+    Say whether the records are there; if so, make a folder for what becomes of them.
+    """
+    if DATA not in os.environ:
+        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+        return False
+    out.mkdir(parents=True, exist_ok=True)
+    return True
+
+
+def run_command(line: str, *, out: Path) -> None:
     """
     Run a line of the page; what it makes is in `out`.
 
@@ -159,7 +184,7 @@ def run_command(line: str, *, data: Path, out: Path) -> None:
             word = str(out / word)
         elif word.endswith('.yaml'):
             word = str(ROOT / word)
-        arguments.append(word.replace(f'${DATA}', str(data)))
+        arguments.append(os.path.expandvars(word))
     _verbs.run(*arguments)
 
 
@@ -167,14 +192,9 @@ def replayed(record: Record, out: Path, *, window: bool = True, **changes: Any) 
     """
     Replay its bag and return what the commands print; with changed parameters too.
     """
-    path = ROOT / 'benchmarks' / 'ships' / f'{record.parameters}.yaml'
-    parameters = Parameters.from_yaml(path.read_text(), subject=str(path))
     (run,) = open_runs([out / f'{record.name}.mcap'])
-    return replay(
-        run,
-        parameters=replace(parameters, **changes),
-        window=record.window_s if window else None,
-    )
+    parameters = replace(record.given, **changes)
+    return replay(run, parameters=parameters, window=record.window_s if window else None)
 
 
 def estimated(record: Record, out: Path, **changes: Any) -> Estimate:
@@ -304,19 +324,15 @@ def show_ferry_path(out: Path) -> None:
         print(f'  {estimator:<12} {length:.3f}; order {found.order}, noise {noise}')
 
 
-def draw(out: Path, data: Path) -> None:
+def draw(out: Path) -> None:
     """
     Draw r(v) of the model ship and of a simulated one.
     """
-    real = RunResult.of(replayed(MODEL_SHIP, out))
-    bag = out / 'simulated.mcap'
-    run_command(
-        f'shipdrag simulate --ship {SIMULATED} -o {bag.name} --lead-in 900 --seed 1',
-        data=data,
-        out=out,
-    )
-    (run,) = open_runs([bag])
-    for name, result in (('real_record', real), ('simulated', RunResult.of(replay(run)))):
+    line = f'shipdrag simulate --ship {SIMULATED} -o simulated.mcap --lead-in 900 --seed 1'
+    run_command(line, out=out)
+    (run,) = open_runs([out / 'simulated.mcap'])
+    made = {'real_record': replayed(MODEL_SHIP, out), 'simulated': replay(run)}
+    for name, result in ((name, RunResult.of(each)) for name, each in made.items()):
         (coastdown,) = result.coastdowns
         assert coastdown.estimate is not None
         true = result.truth
@@ -333,20 +349,15 @@ def main() -> None:
     """
     Import, replay, print and draw.
     """
-    options = asked(__doc__, out=ROOT / 'benchmarks' / 'out' / 'real_records', write=False)
+    options = asked(__doc__, out=OUT / 'real_records', write=False)
     out = options.out
-    if DATA not in os.environ:
-        print(f'skipped: {DATA} is not set, it names the folder of the measured records')
+    if not prepared(out):
         return
-    data = Path(os.environ[DATA])
-    out.mkdir(parents=True, exist_ok=True)
-    for old in out.glob('*.mcap'):
-        old.unlink()
+    (out / 'simulated.mcap').unlink(missing_ok=True)
     found, published = {}, []
     for record in RECORDS:
-        run_command(record.import_command(), data=data, out=out)
-        line = f'{record.replay_command()} --report {record.name}.html'
-        run_command(line, data=data, out=out)
+        record.bag(out)
+        run_command(f'{record.replay_command()} --report {record.name}.html', out=out)
         found[record.name], line_of_it = show(record, out)
         published.append(line_of_it)
     show_model_ship_at_rest(out)
@@ -361,7 +372,7 @@ def main() -> None:
     print('', *blocks.values(), sep='\n')
     if options.write:
         put(PAGE, blocks)
-    draw(out, data)
+    draw(out)
 
 
 if __name__ == '__main__':

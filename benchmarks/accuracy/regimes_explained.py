@@ -11,12 +11,9 @@ report would say is explained less well, which is 5, 25, 50, 75, 95 % where they
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-
-os.environ['SPANS'] = '1'
 
 from benchmarks._asked import asked
 from benchmarks.worlds.propulsion.cases import stops

@@ -12,12 +12,9 @@ wander (`vouching`). Half an hour of one core for six seeds.
 
 from __future__ import annotations
 
-import os
 from collections import defaultdict
 
 import numpy as np
-
-os.environ['SPANS'] = '1'
 
 from benchmarks._asked import asked
 from benchmarks._tables import table
@@ -119,7 +116,7 @@ def main() -> None:
     for seed in seeds:
         for made, rows in ((stops, coasts), (others, none)):
             for case in made(seed):
-                for row in score(case, SUITES):
+                for row in score(case, SUITES, spans=True):
                     rows[row.suite].append(row)
     columns = [column(coasts[suite], none[suite]) for suite in SUITES]
     print(*table((f'seeds {seeds}', *SUITES), zip(NAMES, *columns, strict=True)), sep='\n')

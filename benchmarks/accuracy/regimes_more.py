@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from benchmarks.accuracy._coasts import CARGO, errors, rms
@@ -26,7 +26,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64
 from shipdrag_ros.simulation import START_NS, GaussMarkov, Scenario, Sensor, sense, simulate
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'regimes_more.txt'
+PAGE = ROOT / 'docs' / 'results' / 'regimes_more.txt'
 SHIP, LENGTH_S, LEAD_S = CARGO.ship, 3600, 1800.0
 SLOWEST_M_S = float(SHIP.speed(Parameters().froude_min))
 KINDS = {

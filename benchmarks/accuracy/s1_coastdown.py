@@ -11,10 +11,6 @@ docs/s1_coastdown.md. Two minutes.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -23,20 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import grid, table
+from benchmarks.accuracy import s1_experiment as paper
 from benchmarks.accuracy._coasts import CARGO, Case, read, rms, voyage
-from benchmarks.accuracy.s1_experiment import (
-    LABELS,
-    RUNS,
-    YACHT_NOISE,
-    Stated,
-    coastdowns,
-    draw,
-    inflection,
-    maxima,
-    off,
-)
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.parameters import Parameters
@@ -45,7 +32,7 @@ from shipdrag_ros.studies import least_squares
 from shipdrag_ros.studies.least_squares import OrderTable
 from shipdrag_ros.studies.s1.motion import OrthogonalBasis, fit_orders
 
-PICTURE = Path(__file__).resolve().parents[2] / 'docs' / 'pictures' / 's1_experiment.png'
+PICTURE = ROOT / 'docs' / 'pictures' / 's1_experiment.png'
 PROBLEMS = ('s1_speed', 's1_position', 's1_joint')
 CASES = (
     Case('base'),
@@ -63,14 +50,15 @@ def beside() -> list[str]:
     """
     Return the statements of the paper beside what is found.
     """
-    truth, yachts = coastdowns()
-    of = {name: Stated.of(truth, name, 100) for name in LABELS}
-    joint, half = of['s1_joint'], Stated.of(truth, 's1_joint', 50)
-    means = ', '.join(f'{LABELS[name]} {one.mean:.2f}' for name, one in of.items())
+    truth, yachts = paper.coastdowns()
+    noise = paper.YACHT_NOISE
+    of = {name: paper.Stated.of(truth, name, 100) for name in paper.LABELS}
+    joint, half = of['s1_joint'], paper.Stated.of(truth, 's1_joint', 50)
+    means = ', '.join(f'{paper.LABELS[name]} {one.mean:.2f}' for name, one in of.items())
     found = []
     for name, yacht in yachts.items():
-        tops, _ = maxima(yacht, YACHT_NOISE)
-        found.append(f'{name}: significant in {len(tops)} of {RUNS} records')
+        tops, _ = paper.maxima(yacht, noise)
+        found.append(f'{name}: significant in {len(tops)} of {paper.RUNS} records')
     ship, hull = truth.ship, next(iter(yachts.values())).ship
     rows = [
         (
@@ -104,8 +92,8 @@ def beside() -> list[str]:
         (
             'Fr_max from 5 and from 6 knots',
             'the same (two records)',
-            f'not confirmed: true inflection of this hull Fr {inflection(hull):.3f}; '
-            f'{"; ".join(found)} (log {YACHT_NOISE[0]} m/s, position {YACHT_NOISE[1]} m)',
+            f'not confirmed: true inflection of this hull Fr {paper.inflection(hull):.3f}; '
+            f'{"; ".join(found)} (log {noise[0]} m/s, position {noise[1]} m)',
         ),
     ]
     return table(('', 'the paper', 'here'), rows)
@@ -115,7 +103,9 @@ def scored(found: list[Estimate], truth: Truth) -> tuple[str, str, str]:
     """
     Return error, error at the top, and cover over the valid ranges, in percent.
     """
-    error, sigma = np.array([off(one.valid_curve, truth) for one in found]).transpose(1, 0, 2)
+    error, sigma = np.array([paper.off(one.valid_curve, truth) for one in found]).transpose(
+        1, 0, 2
+    )
     cover = np.mean(np.abs(error) <= 2.0 * sigma)
     return f'{100 * rms(error):.2f}', f'{100 * rms(error[:, -1]):.1f}', f'{100 * cover:.0f}'
 
@@ -190,7 +180,7 @@ def main() -> None:
     options = asked(__doc__, runs=200, polynomials=2000, coasts=100, picture=False)
     print(*beside(), '', sep='\n')
     with tempfile.TemporaryDirectory() as folder:
-        draw(PICTURE if options.picture else Path(folder) / PICTURE.name)
+        paper.draw(PICTURE if options.picture else Path(folder) / PICTURE.name)
     share = ('RMSE %', 'at top %', 'cover %')
     grid(
         f'S1 on simulated coastdowns, N = {options.runs}, seeds 0..{options.runs - 1}',

@@ -87,7 +87,6 @@ def draw_orders(axes: list[Axes], truth: Truth) -> None:
             print(f'  {title:<24} n={n}: order {found.order:2d}; orders 3..12: {shown}')
         axis.set(title=title, xlabel='number of coefficients', ylim=(0.5, 100))
         axis.set_xticks(range(2, 21, 2))
-        axis.legend(fontsize=7)
 
 
 def draw_hulls(axis: Axes, ship_truth: Truth, yachts: dict[str, Truth]) -> None:
@@ -115,7 +114,6 @@ def draw_hulls(axis: Axes, ship_truth: Truth, yachts: dict[str, Truth]) -> None:
             f'{truth.ship.froude(truth.speed_through_water_m_s[0]):.3f}'
         )
     axis.set(xlabel='Fr', ylabel='r / r max', title='r (full), dr/dFr (dotted), Fr_max')
-    axis.legend(fontsize=7)
 
 
 @dataclass(frozen=True)
@@ -191,7 +189,6 @@ def draw_w(axis: Axes, truth: Truth) -> None:
         )
     axis.axhline(0.01, color='k', lw=0.6)
     axis.set(xlabel='Fr', ylabel='w', title='w, order by the test')
-    axis.legend(fontsize=7)
 
 
 def at(speeds: Float64, curve: ResistanceCurve, values: Float64) -> Float64:
@@ -231,7 +228,6 @@ def draw_truth(axis: Axes, truth: Truth) -> None:
     axis.set(
         xlabel='Fr', ylabel='% of max r', title='real error (full), sigma_r (dashed), n = 500'
     )
-    axis.legend(fontsize=7)
 
 
 def draw_bands(axis: Axes, truth: Truth) -> None:
@@ -252,7 +248,6 @@ def draw_bands(axis: Axes, truth: Truth) -> None:
         )
     axis.plot(curve.froude, true, 'k', lw=0.8, label='true')
     axis.set(xlabel='Fr', ylabel='r, m/s^2', title='joint, n = 500, +-2 sigma_r')
-    axis.legend(fontsize=7)
 
 
 def inflection(ship: Ship) -> float:
@@ -321,4 +316,6 @@ def draw(picture: Path) -> None:
     draw_truth(axes[1, 2], truth)
     print_yacht(yachts)
     draw_bands(axes[1, 3], truth)
+    for axis in axes.flat:
+        axis.legend(fontsize=7)
     figure.savefig(picture, dpi=60)

@@ -9,38 +9,26 @@ docs/s2_cable.md and the pictures beside it. No random numbers; some seconds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
-from shipdrag_ros.studies.cable.drag import (
-    LONGEST,
-    PUBLISHED_RANGE,
-    SHORTEST,
-    CableSurface,
-    Tangent,
-    base_coefficient,
-    drag_coefficient,
-    naive_error,
-    naive_range_m_s,
-    tangent_error,
-    tangent_range,
-)
+from shipdrag_ros.studies.cable import drag
 from shipdrag_ros.studies.cable.face.verb import LINES, RANGE_COLOR, SURFACES
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
+DOCS = ROOT / 'docs'
 ROUNDED = {
-    CableSurface.SMOOTH: (0.777, 0.008),
-    CableSurface.ROUGH: (0.769, 0.031),
+    drag.CableSurface.SMOOTH: (0.777, 0.008),
+    drag.CableSurface.ROUGH: (0.769, 0.031),
 }  # the paper's (12)
-LIMITS = {CableSurface.SMOOTH: 0.01, CableSurface.ROUGH: 0.03}  # the paper's text
+LIMITS = {drag.CableSurface.SMOOTH: 0.01, drag.CableSurface.ROUGH: 0.03}  # the paper's text
 UNIT = QuadraticDrag(0.02, 1.0)  # C0 = 0.02, as ropes have, on l d = 1 m^2, of unit density
 COLORS = (BLUE, VERMILION, GREEN)
 STYLES = ('-', '--', '-.')
@@ -51,10 +39,10 @@ def coefficients() -> Figure:
     Draw the coefficients against l/d, figure 2.
     """
     figure, axes = _figure(1, 2, 3.0)
-    slenderness = np.linspace(SHORTEST, 300.0, 300)
+    slenderness = np.linspace(drag.SHORTEST, 300.0, 300)
     for axis, name, of in (
-        (axes[0, 0], 'zeta0, on the base', base_coefficient),
-        (axes[0, 1], 'C0, on length times diameter', drag_coefficient),
+        (axes[0, 0], 'zeta0, on the base', drag.base_coefficient),
+        (axes[0, 1], 'C0, on length times diameter', drag.drag_coefficient),
     ):
         for surface, style in SURFACES.items():
             axis.plot(slenderness, of(slenderness, surface), label=surface, **style)
@@ -62,7 +50,7 @@ def coefficients() -> Figure:
         axis.set_xlabel('length over diameter [-]')
         axis.set_ylim(0.0)
     for surface, (base, side) in ROUNDED.items():
-        label = 'rounded, (12)' if surface is CableSurface.SMOOTH else ''
+        label = 'rounded, (12)' if surface is drag.CableSurface.SMOOTH else ''
         axes[0, 1].plot(
             slenderness, base / slenderness + side, color='#1a1a1a', linestyle=':', label=label
         )
@@ -85,7 +73,7 @@ def naive() -> Figure:
         top.plot(speed, UNIT.force_n(np.ones(1)) * speed, label='f1 = 0.5 C0 V', **LINES['C V'])
         top.set_ylabel('f, C0 = 0.02')
         top.legend()
-        bottom.plot(speed, 100.0 * naive_error(speed), **LINES['C V'])
+        bottom.plot(speed, 100.0 * drag.naive_error(speed), **LINES['C V'])
         bottom.set_ylabel('error of f1 [%]')
         bottom.set_xlabel('speed [m/s]')
         _title(top, number)
@@ -104,18 +92,18 @@ def tangents() -> Figure:
     speed = np.linspace(0.0, 4.5, 451)
     left.plot(speed, UNIT.force_n(speed), label='f2', **LINES['C V²'])
     for v0, color, style in zip((1.5, 3.0), COLORS[1:], STYLES[1:]):
-        line = Tangent(UNIT, v0).force_n(speed)
+        line = drag.Tangent(UNIT, v0).force_n(speed)
         left.plot(speed, line, color=color, linestyle=style, label=f'V0 = {v0:g} m/s')
     left.set_ylabel('f, C0 = 0.02')
     left.set_ylim(-0.03)
     moving = speed[1:]
     for v0, color, style in zip((0.5, 1.5, 3.0), COLORS, STYLES):
-        error = 100.0 * tangent_error(moving / v0)
+        error = 100.0 * drag.tangent_error(moving / v0)
         middle.plot(moving, error, color=color, linestyle=style, label=f'V0 = {v0:g} m/s')
     u = np.linspace(0.4, 3.5, 400)
-    right.plot(u, 100.0 * tangent_error(u), **LINES['tangent'])
-    right.axvspan(*tangent_range(0.1), color=RANGE_COLOR, zorder=0, label='10 %, solved')
-    for end, label in zip(PUBLISHED_RANGE, ('10 %, as published', '')):
+    right.plot(u, 100.0 * drag.tangent_error(u), **LINES['tangent'])
+    right.axvspan(*drag.tangent_range(0.1), color=RANGE_COLOR, zorder=0, label='10 %, solved')
+    for end, label in zip(drag.PUBLISHED_RANGE, ('10 %, as published', '')):
         right.axvline(end, color='#1a1a1a', linestyle=':', linewidth=1.0, label=label)
     for axis, low in ((middle, -150.0), (right, -60.0)):
         axis.set_ylim(low, 5.0)
@@ -156,7 +144,7 @@ def _check_best(low: float, high: float) -> None:
     u = np.linspace(low, high, 20_001)
 
     def largest(place: float, factor: float) -> float:
-        return float(np.max(np.abs(factor * (tangent_error(u / place) + 1.0) - 1.0)))
+        return float(np.max(np.abs(factor * (drag.tangent_error(u / place) + 1.0) - 1.0)))
 
     assert abs(largest(place, 1.0 + least) - least) < 1e-6
     for other in (0.99, 1.01):
@@ -171,8 +159,8 @@ def numbers() -> str:
     rows: list[tuple[str, str, str]] = []
     for surface, (base, side) in ROUNDED.items():
         # C0 = base / lambda + side, from two of its values
-        ends = np.array([SHORTEST, LONGEST])
-        found = drag_coefficient(ends, surface)
+        ends = np.array([drag.SHORTEST, drag.LONGEST])
+        found = drag.drag_coefficient(ends, surface)
         exact = (found[0] - found[1]) / (1.0 / ends[0] - 1.0 / ends[1])
         limit = f'{found[1] - exact / ends[1]:.5f}'
         rows += [
@@ -182,20 +170,20 @@ def numbers() -> str:
         ]
         for at, rounded, ours in zip(ends, base / ends + side, found):
             rows.append((f'C0 at l/d = {at:g}', f'{rounded:.5f} by (12)', f'{ours:.5f}'))
-    low, high = PUBLISHED_RANGE
-    ours = '{:.4f} to {:.4f}'.format(*tangent_range(0.1))
+    low, high = drag.PUBLISHED_RANGE
+    ours = '{:.4f} to {:.4f}'.format(*drag.tangent_range(0.1))
     rows.append(('u for 10 %, tangent', f'{low:g} to {high:g}', ours))
-    for u in PUBLISHED_RANGE:
-        error = f'{_percent(u, tangent_error)} %'
+    for u in drag.PUBLISHED_RANGE:
+        error = f'{_percent(u, drag.tangent_error)} %'
         rows.append((f'error of the tangent at u = {u:g}', '10 % at most', error))
     place, least = best_line(low, high)
     line = f'{place:.4f} V0, times {1.0 + least:.4f}: {100.0 * least:.1f} %'
     rows.append((f'least error of a line over {low:g} to {high:g}, tangent at', '', line))
-    ours = '{:.3f} to {:.3f} m/s'.format(*naive_range_m_s(0.1))
+    ours = '{:.3f} to {:.3f} m/s'.format(*drag.naive_range_m_s(0.1))
     rows.append(('V for 10 %, C V', '1 m/s alone has 0 %', ours))
     said = {0.05: '"larger, the smaller the speed"', 2.0: 'the same'}
     for v in (0.05, 0.5, 2.0, 3.0):
-        error = f'{_percent(v, naive_error)} %'
+        error = f'{_percent(v, drag.naive_error)} %'
         rows.append((f'error of C V at {v:g} m/s', said.get(v, ''), error))
     _check_best(low, high)
     return '\n'.join(table(('', 'paper', 'here'), rows))

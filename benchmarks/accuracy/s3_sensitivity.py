@@ -10,18 +10,14 @@ Noise, in the diagnoses alone, has seeds 0 and 1. Two minutes of a processor.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import math
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import table as markdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
@@ -33,37 +29,14 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.studies.manoeuvring import (
-    FORM,
-    Motions,
-    Side,
-    mariner,
-    overshoots_rad,
-    steer,
-    turn,
-    zigzag,
-)
-from shipdrag_ros.studies.sensitivity.coasting import (
-    CoastStudy,
-    coast_from,
-    particulars,
-    study_coast,
-)
+from shipdrag_ros.studies import manoeuvring
+from shipdrag_ros.studies.sensitivity import coasting, steering
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import verb as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
-from shipdrag_ros.studies.sensitivity.steering import (
-    APPROACH_S,
-    Experiment,
-    Observations,
-    SteeringStudy,
-    experiment,
-    respond,
-    study,
-)
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
-SHIP, PAPER, KEEP = mariner(), zigzag(15.0), 24
+DOCS = ROOT / 'docs'
+SHIP, PAPER, KEEP = manoeuvring.mariner(), manoeuvring.zigzag(15.0), 24
 CONTROLS_S = (0.0, 0.1, 0.5)
 KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s
 SHIP_SPEED_M_S = 8.2
@@ -75,17 +48,17 @@ def checks() -> Table:
     """
     rows = []
     for angle, (starboard, port) in KNOWN.items():
-        for first in Side:
-            manoeuvre = zigzag(angle, first=first)
+        for first in manoeuvring.Side:
+            manoeuvre = manoeuvring.zigzag(angle, first=first)
             cells = []
             for control_s in CONTROLS_S:
-                motion = steer(SHIP, manoeuvre, control_s=control_s)[0]
-                over = np.degrees(overshoots_rad(motion, manoeuvre))
+                motion = manoeuvring.steer(SHIP, manoeuvre, control_s=control_s)[0]
+                over = np.degrees(manoeuvring.overshoots_rad(motion, manoeuvre))
                 cells.append(f'{over[0]:.2f} / {over[1]:.2f}')
-            motion = steer(SHIP, manoeuvre, approach_s=APPROACH_S)[0]
-            over = np.degrees(overshoots_rad(motion, manoeuvre))
+            motion = manoeuvring.steer(SHIP, manoeuvre, approach_s=steering.APPROACH_S)[0]
+            over = np.degrees(manoeuvring.overshoots_rad(motion, manoeuvre))
             largest = f'{max(over[::2]):.2f} / {max(over[1::2]):.2f}'
-            known = f'{starboard} / {port}' if first is Side.STARBOARD else ''
+            known = f'{starboard} / {port}' if first is manoeuvring.Side.STARBOARD else ''
             rows.append((f'{manoeuvre.name}, to {first}', *cells, largest, known))
     heads = [f'looks every {control_s:g} s' for control_s in CONTROLS_S[1:]]
     return Table(
@@ -93,14 +66,14 @@ def checks() -> Table:
             'first / second overshoot [deg]',
             'at the very heading',
             *heads,
-            f'largest to each side, 0.1 s, order after {APPROACH_S:g} s',
+            f'largest to each side, 0.1 s, order after {steering.APPROACH_S:g} s',
             'known',
         ),
         tuple(rows),
     )
 
 
-def _turned(motion: Motions, heading_rad: float, value: Float64) -> float:
+def _turned(motion: manoeuvring.Motions, heading_rad: float, value: Float64) -> float:
     """Return what a turning ship has done when her heading has changed by so much."""
     turned = np.abs(motion.heading_rad)
     i = int(np.argmax(turned >= heading_rad))
@@ -112,20 +85,21 @@ def circles() -> Table:
     Show turning circles.
     """
     rows = []
-    for first in Side:
-        circle = turn(35.0, first=first)
-        motions = [steer(SHIP, circle, approach_s=each)[0] for each in (0.0, APPROACH_S)]
+    for first in manoeuvring.Side:
+        circle = manoeuvring.turn(35.0, first=first)
+        begins = (0.0, steering.APPROACH_S)
+        motions = [manoeuvring.steer(SHIP, circle, approach_s=each)[0] for each in begins]
         cells = [
             f'{_turned(motion, 0.5 * np.pi, motion.position_m[:, 0]):.0f} / '
             f'{_turned(motion, np.pi, motion.position_m[:, 1]):.0f}'
             for motion in motions
         ]
-        known = '566 / 1029' if first is Side.STARBOARD else ''
+        known = '566 / 1029' if first is manoeuvring.Side.STARBOARD else ''
         rows.append((f'turn:35 to {first}', *cells, known))
     heads = (
         'advance / tactical diameter [m]',
         'order at once',
-        f'order after {APPROACH_S:g} s',
+        f'order after {steering.APPROACH_S:g} s',
         'known',
     )
     return Table(heads, tuple(rows))
@@ -137,10 +111,10 @@ def observations() -> Table:
     """
     rows = []
     for control_s in CONTROLS_S:
-        responses = respond(SHIP, PAPER, control_s=control_s)
+        responses = steering.respond(SHIP, PAPER, control_s=control_s)
         kept = [set(responses.losses(norm).select(KEEP).kept) for norm in Norm]
         for norm in Norm:
-            seen = Observations.of(responses.losses(norm))
+            seen = steering.Observations.of(responses.losses(norm))
             rows.append(
                 (
                     'at the very heading' if control_s == 0.0 else f'looks every {control_s:g} s',
@@ -159,10 +133,10 @@ def surge() -> list[tuple[str, Float64]]:
     """
     Return the surge speed after changes of Xu, the paper's figure 1.
     """
-    i = FORM.index('Xu')
+    i = manoeuvring.FORM.index('Xu')
     sets = np.tile(SHIP.values, (1 + len(CHANGES), 1))
     sets[1:, i] *= 1.0 + np.array(CHANGES)
-    speeds = steer(SHIP, PAPER, sets, control_s=0.0).speeds[:, :, 0]
+    speeds = manoeuvring.steer(SHIP, PAPER, sets, control_s=0.0).speeds[:, :, 0]
     labels = ['as it is', *(f'Xu {change:+.0%}' for change in CHANGES)]
     return list(zip(labels, speeds))
 
@@ -177,7 +151,7 @@ def verdicts(ship: Ship) -> Table:
     Show the answers to two reciprocal coastdowns, log and positions at 1 Hz.
     """
     rows = []
-    for one in particulars(ship, speed_m_s=SPEED_M_S):
+    for one in coasting.particulars(ship, speed_m_s=SPEED_M_S):
         answers = []
         for error in ERRORS:
             truth = one.scaled(ship, 1.0 / (1.0 + error))
@@ -207,20 +181,16 @@ def _answer(found: DiagnosisResult) -> str:
     return f'{found.verdict}: {", ".join(shown)}' if shown else str(found.verdict)
 
 
-def lines_of(table: Table) -> list[str]:
-    """
-    Return a table in Markdown.
-    """
-    return markdown(table.columns, table.rows)
-
-
 def tables(
-    found: SteeringStudy, shown: Experiment, coast: CoastStudy, wrong: Table
+    found: steering.SteeringStudy,
+    shown: steering.Experiment,
+    coast: coasting.CoastStudy,
+    wrong: Table,
 ) -> Iterator[str]:
     """
     Yield the lines of the result file.
     """
-    root = Observations.of(found.losses)
+    root = steering.Observations.of(found.losses)
     for heading, table in (
         ('Losses, where the rudder is reversed', observations()),
         ('Overshoots', checks()),
@@ -232,9 +202,10 @@ def tables(
         (coasting_words.MIMICS, coasting_words.mimic_table(coast)),
         ('What diagnose says of one wrong value of the file, seeds 0 and 1', wrong),
     ):
-        yield from ('', heading, '', *lines_of(table))
+        yield from ('', heading, '', *markdown(table.columns, table.rows))
     yield ''
-    yield f'50 % over 10 %: {root.growth:.2f}; kept {len(found.selection.kept)} of {len(FORM)}'
+    kept = f'{len(found.selection.kept)} of {len(manoeuvring.FORM)}'
+    yield f'50 % over 10 %: {root.growth:.2f}; kept {kept}'
     yield coasting_words.sentence(coast)
     yield from (f'- {note}' for note in coasting_words.notes(coast))
 
@@ -259,8 +230,8 @@ def main() -> None:
     """
     options = asked(__doc__, pictures=False)
     ship = Ship.example()
-    found, shown = study(SHIP, PAPER, keep=KEEP), experiment(SHIP)
-    coast = study_coast(ship, coast_from(ship, SHIP_SPEED_M_S))
+    found, shown = steering.study(SHIP, PAPER, keep=KEEP), steering.experiment(SHIP)
+    coast = coasting.study_coast(ship, coasting.coast_from(ship, SHIP_SPEED_M_S))
     print(*tables(found, shown, coast, verdicts(ship)), sep='\n')
     if not options.pictures:
         return

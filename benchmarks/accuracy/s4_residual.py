@@ -17,32 +17,20 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for threads
-
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
+from benchmarks.accuracy import _river_ships as river
 from benchmarks.accuracy._delft import FILE as DELFT
-from benchmarks.accuracy._delft import delft
-from benchmarks.accuracy._regressions import WRONG, Predictor, gauss, rms, shown
-from benchmarks.accuracy._river_ships import (
-    LINES,
-    NAMES,
-    NOISE,
-    PROTOTYPE,
-    control,
-    models,
-    sweep,
-    wanted,
-)
+from benchmarks.accuracy._delft import WRONG, Predictor, delft, gauss, rms, shown
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import FORMS, Hulls, ResidualFit, fit_form
 
-ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / 'docs' / 'pictures'
 TABLE = ROOT / 'docs' / 'data' / 'river_ships.csv'  # tests to try the verb on
 SEED = 4
@@ -67,8 +55,11 @@ def lines_of(ratio: int, values: Float64, by: dict[str, Predictor]) -> dict[str,
     """
     Return 10^3 c_R of the prototype with a ratio varied, Fr 0.15.
     """
-    ships = sweep(ratio, values, 0.15)
-    return {'control': control(ships), **{name: foretell(ships) for name, foretell in by.items()}}
+    ships = river.sweep(ratio, values, 0.15)
+    return {
+        'control': river.control(ships),
+        **{name: foretell(ships) for name, foretell in by.items()},
+    }
 
 
 def of_forms(hulls: Hulls, values: Float64) -> dict[str, ResidualFit]:
@@ -100,7 +91,7 @@ def nine_ships(runs: int) -> Iterator[str]:
     passed = 0
     fits = {}
     for run in range(runs):
-        hulls, values = models(9, rng)
+        hulls, values = river.models(9, rng)
         fits = of_forms(hulls, values)
         by = foretellers(fits)
         if run < PROCESSES:
@@ -109,7 +100,7 @@ def nine_ships(runs: int) -> Iterator[str]:
             criteria[name].append(fit.criterion)
         for varied, (ratio, at) in SWEEPS.items():
             lines = lines_of(ratio, at, by)
-            away = np.abs(at - PROTOTYPE[ratio])
+            away = np.abs(at - river.PROTOTYPE[ratio])
             near = np.argsort(away)[:2]
             for name in by:
                 off = lines[name] - lines['control']
@@ -119,7 +110,7 @@ def nine_ships(runs: int) -> Iterator[str]:
                 wrong[varied, name] += slopes[0] * slopes[1] < 0.0
         if run < PROCESSES:
             for ratio, at in SWEEPS.values():
-                ships = sweep(ratio, at, 0.15)
+                ships = river.sweep(ratio, at, 0.15)
                 passed += sum(each.inside for fit in fits.values() for each in fit.predict(ships))
     yield from titled(
         f'Nine river ships, {runs} sets, the Gaussian process on {min(runs, PROCESSES)} of them',
@@ -152,11 +143,11 @@ def sweep_picture() -> Figure:
     """
     Draw the sweeps of one set of nine ships.
     """
-    hulls, values = models(9, np.random.default_rng(SEED))
+    hulls, values = river.models(9, np.random.default_rng(SEED))
     by = foretellers(found := of_forms(hulls, values))
     sirotina = found['sirotina']
     # along what the data leave open, until the trend is reversed
-    much = -4.0 / open_part(sirotina, sweep(0, np.array([6.0]), 0.15))[0]
+    much = -4.0 / open_part(sirotina, river.sweep(0, np.array([6.0]), 0.15))[0]
     by['Sirotina, another'] = lambda ships: (
         by['sirotina'](ships) + much * open_part(sirotina, ships)
     )
@@ -168,7 +159,7 @@ def sweep_picture() -> Figure:
         for axis, (varied, (ratio, at)) in zip(axes, SWEEPS.items()):
             for (name, line), (color, style) in zip(lines_of(ratio, at, by).items(), styles):
                 axis.plot(at, line, color=color, linestyle=style, label=name)
-            axis.axvline(PROTOTYPE[ratio], color='#777777', linewidth=0.8)
+            axis.axvline(river.PROTOTYPE[ratio], color='#777777', linewidth=0.8)
             axis.set_xlabel(f'{varied}; the line is the prototype')
         axes[0].set_ylabel('10³ c_R at Fr 0.15')
         axes[0].set_ylim(-1.0, 3.5)
@@ -199,15 +190,15 @@ def guard(runs: int) -> Iterator[str]:
             draw = np.random.default_rng([SEED, count, 1])
             off, passed, within = [], [], []
             for _ in range(runs):
-                found = fit_form(form, *models(count, rng))
-                ships = wanted(ASKED, rng)
-                truth = control(ships)
+                found = fit_form(form, *river.models(count, rng))
+                ships = river.wanted(ASKED, rng)
+                truth = river.control(ships)
                 said = found.predict(ships)
                 value = np.array([each.value for each in said])
                 off.append(value / truth - 1.0)
                 passed.append([each.inside for each in said])
-                test = truth * (1.0 + LINES * draw.normal(size=ASKED))
-                test *= 1.0 + NOISE * draw.normal(size=ASKED)
+                test = truth * (1.0 + river.LINES * draw.normal(size=ASKED))
+                test *= 1.0 + river.NOISE * draw.normal(size=ASKED)
                 within.append([abs(each.value - t) < 2.0 * each.sd for each, t in zip(said, test)])
                 if (name, count) == ('sirotina', 16):
                     _count(rules, totals, [each.reasons for each in said], np.abs(off[-1]) > WRONG)
@@ -277,9 +268,9 @@ def main() -> None:
         print(*of_delft, sep='\n')
     if not options.pictures:
         return
-    hulls, values = models(FLEETS[-1], np.random.default_rng(SEED))
-    places = [getattr(hulls, name) for name in NAMES]
-    write_csv(TABLE, (*NAMES, 'c_R'), np.column_stack([*places, 1e-3 * values]))
+    hulls, values = river.models(FLEETS[-1], np.random.default_rng(SEED))
+    places = [getattr(hulls, name) for name in river.NAMES]
+    write_csv(TABLE, (*river.NAMES, 'c_R'), np.column_stack([*places, 1e-3 * values]))
     save(sweep_picture(), PICTURES / 's4_sweeps.png')
     if folder is not None:
         save(errors, PICTURES / 's4_delft.png')

@@ -12,20 +12,17 @@ those of docs/s5_surfaces.md.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
-from pathlib import Path
 from timeit import repeat
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for threads
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import titled, write_csv
 from shipdrag_ros.report.drawing import STYLE, save
@@ -40,7 +37,6 @@ from shipdrag_ros.studies.surface.fit import (
     terms_up_to,
 )
 
-ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / 'docs' / 'pictures'
 TABLE = ROOT / 'docs' / 'data' / 'c_x.csv'  # a draw to try the verb on
 NOISE = 1e-4

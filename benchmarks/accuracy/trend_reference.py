@@ -15,10 +15,7 @@ level and jump of both, side by side; `r hat` of two chains says whether the sam
 
 from __future__ import annotations
 
-import os
 from typing import Any
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
 
 import numpy as np
 

@@ -13,12 +13,10 @@ one table.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
-
 from collections import defaultdict
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -88,77 +86,6 @@ def growth_by_means(runs: Runs) -> float:
     return float(rise / (runs.years[last].mean() - runs.years[first].mean()))
 
 
-@dataclass
-class Score:
-    """What is counted over ships of one kind."""
-
-    ships: int = 0
-    years: float = 0.0
-    inside: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
-    off: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-    level: list[float] = field(default_factory=list)
-    false: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-    bursts: int = 0
-    found: dict[str, int] = field(default_factory=lambda: defaultdict(int))
-    size: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-
-    def add(self, world: World, cleaning: float) -> None:
-        """Score one ship."""
-        runs, seen = world.runs, search(world.runs, Steps(), Growth())
-        self.ships += 1
-        self.years += float(runs.years[-1])
-        slope = seen.open.growth_per_year()
-        self._growth('trend', world, float(slope.value[0]), float(slope.sd[0]))
-        fit, covariance = np.polyfit(runs.years, runs.added, 1, cov=True)
-        self._growth('line', world, float(fit[0]), float(np.sqrt(covariance[0, 0])))
-        self._growth('means', world, growth_by_means(runs), None)
-        band = seen.open.level(runs.years)
-        self.level.append(float(np.mean(np.abs(band.value - world.level) < 1.96 * band.sd)))
-        for name, steps in (
-            ('trend', [step.year for step in seen.steps]),
-            ('ruptures', steps_by_ruptures(runs)),
-        ):
-            if steps is None:
-                continue
-            near = [world.cleaned and abs(year - world.cleaned) < MONTH for year in steps]
-            self.found[name] += any(near)
-            others = [year for year, right in zip(steps, near) if not right]
-            self.false[name] += sum(not _is_jump(world, year) for year in others)
-            if name == 'trend':
-                self.bursts += sum(_is_jump(world, year) for year in others)
-        if world.cleaned is not None:
-            known = HullState(runs, Steps(np.array([world.cleaned])), Growth())
-            self.size['trend'].append(float(known.changes().value[0]) + cleaning)
-            half = np.abs(runs.years - world.cleaned) < 0.25
-            after = runs.years >= world.cleaned
-            change = runs.added[half & after].mean() - runs.added[half & ~after].mean()
-            self.size['means'].append(float(change) + cleaning)
-
-    def _growth(self, name: str, world: World, value: float, sd: float | None) -> None:
-        self.off[name].append(value - world.growth)
-        if sd is not None:
-            self.inside[name].append(abs(value - world.growth) < 1.96 * sd)
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return what was counted: what, then of the trend and of each peer; '-': says nothing."""
-        inside = {name: f'{np.mean(each):.0%}' for name, each in self.inside.items()}
-        off = {name: _rms(each) for name, each in self.off.items()}
-        false = {name: str(many) for name, many in self.false.items()}
-        rows = [
-            _row('growth inside its 95 % band', inside),
-            _row('growth, rms error a year', off),
-            _row('level inside its 95 % band', {'trend': f'{np.mean(self.level):.0%}'}),
-            _row(f'false steps in {self.years:.0f} ship-years', false),
-            _row('sudden growth found beside them', {'trend': str(self.bursts)}),
-        ]
-        if self.size:
-            found = {name: f'{many / self.ships:.0%}' for name, many in self.found.items()}
-            rows.append(_row('found and dated within a month', found))
-            size = {name: _rms(each) for name, each in self.size.items()}
-            rows.append(_row('size where its date is known, rms error', size))
-        return rows
-
-
 METHODS = {
     'trend': 'trend',
     'line': 'straight line',
@@ -167,18 +94,84 @@ METHODS = {
 }
 
 
-def _row(what: str, values: dict[str, str]) -> tuple[str, ...]:
-    return (what, *(values.get(name, '-') for name in METHODS))
+def _rms(errors: list[float]) -> str:
+    return f'{np.sqrt(np.mean(np.square(errors))):.1%}'
+
+
+def _mean(shares: list[float]) -> str:
+    return f'{np.mean(shares):.0%}'
+
+
+def _sum(counts: list[int]) -> str:
+    return str(sum(counts))
+
+
+ROWS: dict[str, tuple[str, Callable[[list[Any]], str]]] = {
+    'inside': ('growth inside its 95 % band', _mean),
+    'off': ('growth, rms error a year', _rms),
+    'level': ('level inside its 95 % band', _mean),
+    'false': ('false steps in {years:.0f} ship-years', _sum),
+    'bursts': ('sudden growth found beside them', _sum),
+    'found': ('found and dated within a month', _mean),
+    'size': ('size where its date is known, rms error', _rms),
+}
+
+
+class Score:
+    """What is counted over ships of one kind, by row of the table and method."""
+
+    def __init__(self) -> None:
+        self.years = 0.0
+        self.of: dict[str, dict[str, list[Any]]] = defaultdict(lambda: defaultdict(list))
+
+    def add(self, world: World, cleaning: float) -> None:
+        """Score one ship."""
+        runs, seen = world.runs, search(world.runs, Steps(), Growth())
+        self.years += float(runs.years[-1])
+        slope = seen.open.growth_per_year()
+        fit, covariance = np.polyfit(runs.years, runs.added, 1, cov=True)
+        for name, value, sd in (
+            ('trend', float(slope.value[0]), float(slope.sd[0])),
+            ('line', float(fit[0]), float(np.sqrt(covariance[0, 0]))),
+            ('means', growth_by_means(runs), None),
+        ):
+            self.of['off'][name].append(value - world.growth)
+            if sd is not None:
+                self.of['inside'][name].append(abs(value - world.growth) < 1.96 * sd)
+        band = seen.open.level(runs.years)
+        held = float(np.mean(np.abs(band.value - world.level) < 1.96 * band.sd))
+        self.of['level']['trend'].append(held)
+        steps = {'trend': [step.year for step in seen.steps], 'ruptures': steps_by_ruptures(runs)}
+        for name, years in steps.items():
+            if years is None:
+                continue
+            near = [world.cleaned and abs(year - world.cleaned) < MONTH for year in years]
+            jumps = [_is_jump(world, year) for year, right in zip(years, near) if not right]
+            self.of['false'][name].append(len(jumps) - sum(jumps))
+            if name == 'trend':
+                self.of['bursts'][name].append(sum(jumps))
+            if world.cleaned is not None:
+                self.of['found'][name].append(any(near))
+        if world.cleaned is not None:
+            known = HullState(runs, Steps(np.array([world.cleaned])), Growth())
+            self.of['size']['trend'].append(float(known.changes().value[0]) + cleaning)
+            half = np.abs(runs.years - world.cleaned) < 0.25
+            after = runs.years >= world.cleaned
+            change = runs.added[half & after].mean() - runs.added[half & ~after].mean()
+            self.of['size']['means'].append(float(change) + cleaning)
+
+    def rows(self) -> Iterator[tuple[str, ...]]:
+        """Yield what was counted: what, then of the trend and of each peer; '-': says nothing."""
+        for row, (what, shown) in ROWS.items():
+            if of := self.of.get(row):
+                cells = (shown(of[name]) if name in of else '-' for name in METHODS)
+                yield what.format(years=self.years), *cells
 
 
 def show(rows: list[tuple[str, ...]]) -> None:
     """Print a table; a method that says nothing of something has a dash."""
     for what, *values in rows:
         print(f'{what:<50}' + ''.join(f'{value:>21}' for value in values))
-
-
-def _rms(errors: list[float]) -> str:
-    return f'{np.sqrt(np.mean(np.square(errors))):.1%}'
 
 
 def main() -> None:

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import table
 from shipdrag_ros.coastdown import Monitor
@@ -42,7 +43,7 @@ from shipdrag_ros.samples import (
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.reading import read_any
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'results' / 'vouching.txt'
+PAGE = ROOT / 'docs' / 'results' / 'vouching.txt'
 START_NS = 1_700_000_000 * SECOND_NS
 LEAD_S, COAST_S = 1200, 600
 LASTS_S = LEAD_S + COAST_S - 60
@@ -262,14 +263,11 @@ def main() -> None:
     )  # fmt: skip
     lines = [*(__doc__ or '').splitlines()[5:12], '', *table(head, rows), '']
     number, sailed = 0, dict.fromkeys(LENGTHS_M, 0)
-    for length_m in LENGTHS_M:
-        for inputs in INPUTS:
-            for heading in (True, False):
-                number += 1
-                block = sailing(
-                    options.seed + number, options.hours, length_m, inputs, heading=heading
-                )
-                sailed[length_m] += len(alarms(block, ship_of(length_m)))
+    for length_m, inputs, heading in product(LENGTHS_M, INPUTS, (True, False)):
+        number += 1
+        seed = options.seed + number
+        block = sailing(seed, options.hours, length_m, inputs, heading=heading)
+        sailed[length_m] += len(alarms(block, ship_of(length_m)))
     hours = options.hours * number
     each = ', '.join(f'{count} for {length_m:.0f} m' for length_m, count in sailed.items())
     lines.append(f'Contradictions said in {hours:.0f} h of sound sailing (simulated): {each}.')

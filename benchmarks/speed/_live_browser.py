@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import sync_playwright
 
+from benchmarks import ROOT
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.live.app import LivePage
@@ -25,7 +26,7 @@ from shipdrag_ros.messages.topics import Samples
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 
-SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+SHIP = ROOT / 'config' / 'vitus_bering.yaml'
 Milliseconds = np.ndarray[Any, np.dtype[np.float64]]
 FLAGS = ['--no-sandbox', '--disable-gpu']
 EVERY_S = 0.1

@@ -9,10 +9,6 @@ coastdown runs and after it, beside S1's joint problem. Process time, the best o
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -17,14 +17,14 @@ import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.fleet.update import update
 
-SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
+SHIP = ROOT / 'config' / 'vitus_bering.yaml'
 
 
 def simulated(folder: Path, bags: int) -> None:

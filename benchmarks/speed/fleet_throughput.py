@@ -26,6 +26,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.fleet.engine import Engine
@@ -33,7 +34,7 @@ from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, find
 from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.fleet.update import update
 
-OUT = Path(__file__).parents[1] / 'out' / 'fleet_throughput'
+OUT = ROOT / 'benchmarks' / 'out' / 'fleet_throughput'
 DISTINCT = 20
 CORES = 1, 2, 16, 370
 SAMPLES = 4  # of memory, over all bags

@@ -16,11 +16,11 @@ import shlex
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks import _verbs
+from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'results' / 'import.txt'
+PAGE = ROOT / 'docs' / 'results' / 'import.txt'
 FILES = (  # and the one option, '' where none is needed or none helps
     ('irene_2014_20140611.nmea.gz', ''),
     ('psaros_lake_geneva.nmea.gz', ''),

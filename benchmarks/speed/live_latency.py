@@ -27,8 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks._asked import asked
-from benchmarks.speed._onboard import PARAMETERS, SEED, late_ms, onboard, record
 from benchmarks.speed.live_page import read
+from benchmarks.speed.node_latency import PARAMETERS, SEED, late_ms, onboard, record
 
 RATE_HZ = 10.0
 LIVE_S = 700.0  # at most

@@ -25,9 +25,9 @@ from collections import defaultdict
 from pathlib import Path
 from tempfile import gettempdir
 
+from benchmarks import ROOT
 from benchmarks._asked import asked
 
-HERE = Path(__file__).resolve().parents[2]
 OUT = Path(gettempdir()) / 'shipdrag_mutations'
 PACKAGE = 'shipdrag_ros'
 # left out: what changes annotations only, or speed only, and what floats do not have
@@ -55,7 +55,7 @@ def main() -> None:
     if not session.exists():
         OUT.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(copy, ignore_errors=True)
-        subprocess.run(['git', 'clone', '-q', str(HERE), str(copy)], check=True)
+        subprocess.run(['git', 'clone', '-q', str(ROOT), str(copy)], check=True)
         rng = random.Random(options.seed)
         modules = drawn_modules(copy, options.count, rng)
         test = f'{sys.executable} -m benchmarks.speed.mutations --nearest'

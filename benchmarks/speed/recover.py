@@ -24,6 +24,7 @@ import resource
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Set
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from io import BytesIO
 from mmap import mmap
@@ -114,18 +115,12 @@ def write(options: dict[str, Any]) -> Sound:
     content = file.getvalue()
     spans = []
     for place in walk(content, len(MAGIC), len(content) - len(MAGIC)):
+        data, inside = content, [place]
         if place.opcode == Opcode.CHUNK:
-            records = unpack(content, place).records
-            inside = frozenset(
-                _number(records, each)
-                for each in walk(records, 0, len(records))
-                if each.opcode == Opcode.MESSAGE
-            )
-        elif place.opcode == Opcode.MESSAGE:
-            inside = frozenset([_number(content, place)])
-        else:
-            continue
-        spans.append((place.offset, place.end, inside))
+            data = unpack(content, place).records
+            inside = list(walk(data, 0, len(data)))
+        numbers = frozenset(_number(data, e) for e in inside if e.opcode == Opcode.MESSAGE)
+        spans.append((place.offset, place.end, numbers))
     return Sound(content, messages_of(content), tuple(spans))
 
 
@@ -326,22 +321,17 @@ def _save(path: Path) -> None:
 
 def _measured(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
     """Return CPU time [s] and growth of memory [MB] of a use, in a process of its own."""
-    context = multiprocessing.get_context('fork')
-    results = context.Queue()
+    with ProcessPoolExecutor(1, multiprocessing.get_context('fork')) as pool:
+        return pool.submit(_used, use, path).result(600)
 
-    def run() -> None:
-        before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        begin = time.process_time()
-        use(path)
-        took = time.process_time() - begin
-        after_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        results.put((took, (after_kib - before_kib) // 1000))
 
-    process = context.Process(target=run)
-    process.start()
-    measured: tuple[float, int] = results.get(timeout=600)
-    process.join()
-    return measured
+def _used(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
+    before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begin = time.process_time()
+    use(path)
+    took = time.process_time() - begin
+    after_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return took, (after_kib - before_kib) // 1000
 
 
 def main() -> None:

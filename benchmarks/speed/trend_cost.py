@@ -13,10 +13,6 @@ same rule, and a cleaning every two years whatever was measured.
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
-
 import numpy as np
 
 from benchmarks._asked import asked

@@ -361,11 +361,10 @@ def test_the_minimum_speed_ends_it_and_froude_min_says_which_that_is(ship, watch
     ('kind', 'hull', 'seed'), [('declutched', 'tanker', 45), ('slow run-down', 'ferry', 95)]
 )
 def test_noise_of_positions_begins_no_other_of_a_ship_that_is_too_slow(
-    monkeypatch, kind: str, hull: str, seed: int
+    kind: str, hull: str, seed: int
 ) -> None:
-    monkeypatch.setenv('SPANS', '1')  # no r(v) is estimated
     (case,) = [each for each in stops(seed) if (each.kind, each.hull) == (kind, hull)]
-    (row,) = score(case, {'track': SUITES['track + shaft']})
+    (row,) = score(case, {'track': SUITES['track + shaft']}, spans=True)
     assert (row.found, row.why) == (True, '')
 
 

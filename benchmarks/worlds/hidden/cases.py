@@ -13,21 +13,11 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from benchmarks.worlds.hidden import recording
 from benchmarks.worlds.hidden.effect import Effect, Leg
 from benchmarks.worlds.hidden.hull import SHAPE_TERMS, Array, Hull, draw_hull
 from benchmarks.worlds.hidden.library import FIRST_SHELF, SECOND_SHELF
 from benchmarks.worlds.hidden.outside import OUTSIDE
-from benchmarks.worlds.hidden.recording import (
-    BETWEEN_RUNS_NS,
-    INPUTS,
-    MOTION,
-    START_NS,
-    Noise,
-    Recording,
-    disturb,
-    draw_noise,
-    record,
-)
 from benchmarks.worlds.hidden.sailing import LEAD_IN_S, World, coasting_m_s2, sail
 
 SEED = 20260601
@@ -91,7 +81,7 @@ class Observation:
     """
 
     ship_file: str
-    runs: tuple[Recording, ...]
+    runs: tuple[recording.Recording, ...]
 
 
 @dataclass(frozen=True)
@@ -136,7 +126,7 @@ class _Voyage:
 @dataclass(frozen=True)
 class _Case:
     hull: Hull
-    noise: Noise
+    noise: recording.Noise
     world: World
     effects: tuple[Effect, ...]
     voyages: tuple[_Voyage, ...]
@@ -171,7 +161,7 @@ def observe(number: int) -> Observation:
     Return what a diagnosis may see of a case, counted from 0.
     """
     case, given = _case(number), condition(number)
-    inputs = INPUTS if given.context else MOTION
+    inputs = recording.INPUTS if given.context else recording.MOTION
     return Observation(
         case.hull.ship_file(), tuple(_run(number, case, k, inputs) for k in range(given.runs))
     )
@@ -192,10 +182,17 @@ def reveal(number: int) -> Truth:
     return Truth(
         kind,
         shelf,
-        tuple(sorted(effect.name for effect in case.effects)),
+        names(number),
         {effect.name: effect.parameters() for effect in case.effects},
         plan.condition,
     )
+
+
+def names(number: int) -> tuple[str, ...]:
+    """
+    Return the names of what is hidden in a case, in alphabetical order.
+    """
+    return tuple(sorted(kind.name for kind in _plans()[number].kinds))
 
 
 def condition(number: int) -> Condition:
@@ -209,8 +206,10 @@ def stops_ns(number: int) -> tuple[int, ...]:
     """
     Return when the engine was stopped, of each run.
     """
-    first = START_NS + round(LEAD_IN_S * 1e9)
-    return tuple(first + which * BETWEEN_RUNS_NS for which in range(condition(number).runs))
+    first = recording.START_NS + round(LEAD_IN_S * 1e9)
+    return tuple(
+        first + which * recording.BETWEEN_RUNS_NS for which in range(condition(number).runs)
+    )
 
 
 def first_speed(number: int, run: int = 0) -> float:
@@ -259,10 +258,10 @@ def _case(number: int) -> _Case:
         run_down_s=hull.run_down_sd * rng.standard_normal(),
     )
     effects = tuple(kind.draw(voyages[0].leg, rng) for kind in plan.kinds)
-    return _Case(hull, draw_noise(rng), world, effects, tuple(voyages))
+    return _Case(hull, recording.draw_noise(rng), world, effects, tuple(voyages))
 
 
-def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recording:
+def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> recording.Recording:
     leg, heading = case.voyages[which].leg, case.voyages[which].heading_rad
     effects = _acting(case, which)
     motion = sail(
@@ -271,19 +270,14 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recor
         heading_rad=heading,
         first_heading_rad=case.voyages[0].heading_rad,
         world=case.world,
-        disturbance=disturb(leg, case.noise, heading, _stream(number, 1, which)),
+        disturbance=recording.disturb(leg, case.noise, heading, _stream(number, 1, which)),
     )
-    streams = {name: _stream(number, 2, which, place) for place, name in enumerate(INPUTS)}
-    return record(
-        motion,
-        leg,
-        effects,
-        number=which,
-        inputs=inputs,
-        noise=case.noise,
-        heading_rad=heading,
-        streams=streams,
-    )
+    found = {}
+    for name in inputs:
+        rng = _stream(number, 2, which, recording.INPUTS.index(name))
+        scene = recording.Scene(motion, leg, effects, case.noise, heading, rng)
+        found[name] = recording.read(name, scene, which)
+    return found
 
 
 _WEATHER = ('wind', 'shallow_water', 'waves')

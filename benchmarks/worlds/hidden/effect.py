@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 from typing import ClassVar
 
@@ -33,6 +33,21 @@ class Leg:
     duration_s: float
     speed_m_s: float
 
+    @property
+    def resistance_n(self) -> float:
+        """At the stop, as stated."""
+        return float(self.hull.still_n(np.array([self.speed_m_s]))[0])
+
+    @property
+    def pressure_pa(self) -> float:
+        """Dynamic, at the stop."""
+        return 0.5 * self.hull.density_kg_m3 * self.speed_m_s**2
+
+    @property
+    def drag_area_m2(self) -> float:
+        """Of the hull at the stop."""
+        return self.resistance_n / self.pressure_pa
+
 
 @dataclass(frozen=True)
 class Size:
@@ -46,12 +61,15 @@ class Size:
     low, high
     signed
         Either sign is as likely.
+    unit
+        What they are in parts of, on the first run.
     """
 
     name: str
     low: float
     high: float
     signed: bool = False
+    unit: Callable[[Leg], float] = lambda _: 1.0
 
     def draw(self, rng: np.random.Generator) -> float:
         """
@@ -81,13 +99,6 @@ class Effect:
     single_run: ClassVar[bool] = False
 
     @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        """
-        Return what each of the sizes is in parts of, on the first run.
-        """
-        return (1.0,) * len(cls.sizes)
-
-    @classmethod
     def draw(cls, leg: Leg, rng: np.random.Generator) -> Effect:
         """
         Draw an effect for a ship.
@@ -99,7 +110,7 @@ class Effect:
         """
         Build the effect from sizes in their units.
         """
-        return cls(*(size * unit for size, unit in zip(sizes, cls.units(leg))))
+        return cls(*(size * each.unit(leg) for size, each in zip(sizes, cls.sizes)))
 
     def parameters(self) -> dict[str, float]:
         """
@@ -195,3 +206,11 @@ class Effect:
         Return how much too late the log's stamps are.
         """
         return 0.0
+
+
+class FirstShelf(Effect):
+    """One that a diagnosis is expected to know."""
+
+
+class SecondShelf(Effect):
+    """A rarer one of these."""

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
-from benchmarks.worlds.hidden.effect import Effect, Leg, Size
+from benchmarks.worlds.hidden.effect import FirstShelf, Leg, SecondShelf, Size
 from benchmarks.worlds.hidden.hull import GRAVITY, Array, Hull
 
 # four-quadrant propeller: axial drag on the disc at the speed of the ship, wake included
@@ -17,20 +18,13 @@ _ADVANCE_RATIO = 0.65
 _PITCH_LEFT = 0.3  # shaft speed, over that under power, that full thrust would add
 _SMOOTH = 0.15  # of a turn, in which its drag grows and falls
 _WAVE_LENGTH = 0.6  # over that of the ship
-
-
-def _resistance_n(leg: Leg) -> float:
-    """At the stop, as stated."""
-    return float(leg.hull.still_n(np.array([leg.speed_m_s]))[0])
-
-
-def _drag_area_m2(leg: Leg) -> float:
-    """Of the hull at the stop."""
-    return _resistance_n(leg) / (0.5 * leg.hull.density_kg_m3 * leg.speed_m_s**2)
+# what sizes are in parts of
+_RESISTANCE, _AREA = attrgetter('resistance_n'), attrgetter('drag_area_m2')
+_SPEED, _DURATION = attrgetter('speed_m_s'), attrgetter('duration_s')
 
 
 @dataclass(frozen=True)
-class Current(Effect):
+class Current(FirstShelf):
     """Water that moves as a whole."""
 
     along_track_m_s: float
@@ -46,7 +40,7 @@ class Current(Effect):
 
 
 @dataclass(frozen=True)
-class Wind(Effect):
+class Wind(FirstShelf):
     """Moving air; the ship file's drag is of still air."""
 
     head_m_s: float
@@ -69,7 +63,7 @@ class Wind(Effect):
 
 
 @dataclass(frozen=True)
-class Waves(Effect):
+class Waves(FirstShelf):
     """
     Short waves that the hull throws back.
 
@@ -81,11 +75,7 @@ class Waves(Effect):
 
     force: float
     name = 'waves'
-    sizes = (Size('force_n', 0.05, 0.25, signed=True),)  # of the resistance; + from ahead
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return (_resistance_n(leg),)
+    sizes = (Size('force_n', 0.05, 0.25, signed=True, unit=_RESISTANCE),)  # + from ahead
 
     def parameters(self) -> dict[str, float]:
         return {'force_n': abs(self.force)}
@@ -98,7 +88,7 @@ class Waves(Effect):
 
 
 @dataclass(frozen=True)
-class ShallowWater(Effect):
+class ShallowWater(FirstShelf):
     """
     Bottom near the keel.
 
@@ -110,11 +100,7 @@ class ShallowWater(Effect):
 
     depth: float
     name = 'shallow_water'
-    sizes = (Size('depth_m', 1.3, 2.6),)  # of the draught
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return (leg.hull.draught_m,)
+    sizes = (Size('depth_m', 1.3, 2.6, unit=attrgetter('hull.draught_m')),)
 
     def depth_m(self) -> float:
         return self.depth
@@ -133,7 +119,7 @@ class ShallowWater(Effect):
 
 
 @dataclass(frozen=True)
-class Fouling(Effect):
+class Fouling(FirstShelf):
     """A rough hull: friction grows in proportion to Schoenherr's line."""
 
     friction_factor: float
@@ -155,7 +141,7 @@ def _on_disc(leg: Leg, speed: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class LockedPropeller(Effect):
+class LockedPropeller(FirstShelf):
     """A propeller that does not turn after the stop."""
 
     drag_coefficient: float
@@ -170,7 +156,7 @@ class LockedPropeller(Effect):
 
 
 @dataclass(frozen=True)
-class WindmillingPropeller(Effect):
+class WindmillingPropeller(FirstShelf):
     """
     A propeller that the water turns against the friction of its shaft.
 
@@ -183,11 +169,10 @@ class WindmillingPropeller(Effect):
     drag_coefficient: float
     stall_speed_m_s: float
     name = 'windmilling_propeller'
-    sizes = (Size('drag_coefficient', 0.1, 0.25), Size('stall_speed_m_s', 0.4, 0.65))
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return 1.0, leg.speed_m_s
+    sizes = (
+        Size('drag_coefficient', 0.1, 0.25),
+        Size('stall_speed_m_s', 0.4, 0.65, unit=_SPEED),
+    )
 
     def _rate(self, speed: Array) -> Array:
         """Rate of turn over that without friction; 0 where it stands."""
@@ -209,23 +194,19 @@ class WindmillingPropeller(Effect):
 
 
 @dataclass(frozen=True)
-class TowedCable(Effect):
+class TowedCable(FirstShelf):
     """A cable or line along the flow, from the lead-in on."""
 
     area: float
     name = 'towed_cable'
-    sizes = (Size('drag_area_m2', 0.12, 0.6),)  # of that of the hull
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return (_drag_area_m2(leg),)
+    sizes = (Size('drag_area_m2', 0.12, 0.6, unit=_AREA),)
 
     def drag_n(self, leg: Leg, speed: Array) -> Array:
         return 0.5 * leg.hull.density_kg_m3 * self.area * speed**2
 
 
 @dataclass(frozen=True)
-class Turning(Effect):
+class Turning(FirstShelf):
     """The hull turns on to another course, with rudder; it drags more meanwhile."""
 
     drag_area: float
@@ -235,15 +216,11 @@ class Turning(Effect):
     name = 'turning'
     single_run = True
     sizes = (
-        Size('drag_area_m2', 0.4, 1.5),  # of that of the hull
-        Size('start_s', 0.06, 0.5),  # of the duration of the coastdown
-        Size('duration_s', 0.08, 0.25),
+        Size('drag_area_m2', 0.4, 1.5, unit=_AREA),
+        Size('start_s', 0.06, 0.5, unit=_DURATION),
+        Size('duration_s', 0.08, 0.25, unit=_DURATION),
         Size('turn_rad', 0.05, 0.2, signed=True),
     )
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return _drag_area_m2(leg), leg.duration_s, leg.duration_s, 1.0
 
     def parameters(self) -> dict[str, float]:
         return {
@@ -266,7 +243,7 @@ class Turning(Effect):
 
 
 @dataclass(frozen=True)
-class ResidualThrust(Effect):
+class ResidualThrust(FirstShelf):
     """
     The propeller still pushes, less and less: a pitch that was not taken back.
 
@@ -290,7 +267,7 @@ class ResidualThrust(Effect):
 
 
 @dataclass(frozen=True)
-class LogScale(Effect):
+class LogScale(FirstShelf):
     """A log that shows a fraction more."""
 
     factor: float
@@ -302,7 +279,7 @@ class LogScale(Effect):
 
 
 @dataclass(frozen=True)
-class RadarScale(Effect):
+class RadarScale(FirstShelf):
     """A radar that shows distances a fraction larger."""
 
     factor: float
@@ -314,7 +291,7 @@ class RadarScale(Effect):
 
 
 @dataclass(frozen=True)
-class LogOffset(Effect):
+class LogOffset(FirstShelf):
     """A log that shows a speed more."""
 
     offset_m_s: float
@@ -326,7 +303,7 @@ class LogOffset(Effect):
 
 
 @dataclass(frozen=True)
-class LogLag(Effect):
+class LogLag(SecondShelf):
     """A log that is smoothed by its own filter."""
 
     lag_s: float
@@ -342,16 +319,12 @@ class LogLag(Effect):
 
 
 @dataclass(frozen=True)
-class LogDeadBand(Effect):
+class LogDeadBand(SecondShelf):
     """A paddle wheel that slows down early and stands at a third of the threshold."""
 
     speed_m_s: float
     name = 'log_dead_band'
-    sizes = (Size('speed_m_s', 0.35, 0.6),)  # of the speed at the stop
-
-    @classmethod
-    def units(cls, leg: Leg) -> tuple[float, ...]:
-        return (leg.speed_m_s,)
+    sizes = (Size('speed_m_s', 0.35, 0.6, unit=_SPEED),)
 
     def log(self, leg: Leg, time: Array, speed: Array) -> Array:
         slowed = np.maximum(1.5 * speed - 0.5 * self.speed_m_s, 0.0)
@@ -359,7 +332,7 @@ class LogDeadBand(Effect):
 
 
 @dataclass(frozen=True)
-class TimeOffset(Effect):
+class TimeOffset(SecondShelf):
     """The clocks of log and radar differ."""
 
     offset_s: float
@@ -371,7 +344,7 @@ class TimeOffset(Effect):
 
 
 @dataclass(frozen=True)
-class CurrentChange(Effect):
+class CurrentChange(SecondShelf):
     """A tide that turns while the ship coasts."""
 
     change_m_s: float
@@ -384,7 +357,7 @@ class CurrentChange(Effect):
 
 
 @dataclass(frozen=True)
-class AddedMass(Effect):
+class AddedMass(SecondShelf):
     """More water is moved along than stated."""
 
     n_r_change: float
@@ -396,7 +369,7 @@ class AddedMass(Effect):
 
 
 @dataclass(frozen=True)
-class Displacement(Effect):
+class Displacement(SecondShelf):
     """A ship that is heavier than stated, at nearly the same wetted surface."""
 
     fraction: float
@@ -407,26 +380,4 @@ class Displacement(Effect):
         return 0.0, 1.0 + self.fraction
 
 
-FIRST_SHELF: tuple[type[Effect], ...] = (
-    Current,
-    Wind,
-    Waves,
-    ShallowWater,
-    Fouling,
-    LockedPropeller,
-    WindmillingPropeller,
-    TowedCable,
-    Turning,
-    ResidualThrust,
-    LogScale,
-    RadarScale,
-    LogOffset,
-)
-SECOND_SHELF: tuple[type[Effect], ...] = (
-    LogLag,
-    LogDeadBand,
-    TimeOffset,
-    CurrentChange,
-    AddedMass,
-    Displacement,
-)
+FIRST_SHELF, SECOND_SHELF = (tuple(each.__subclasses__()) for each in (FirstShelf, SecondShelf))

@@ -17,10 +17,6 @@ def _ramp(time: Array, start: float, length: float) -> Array:
     return np.clip((time - start) / length, 0.0, 1.0)
 
 
-def _resistance_n(leg: Leg) -> float:
-    return float(leg.hull.still_n(np.array([leg.speed_m_s]))[0])
-
-
 @dataclass(frozen=True)
 class _OfResistance(Effect):
     """Sized by the resistance at the stop; times are parts of the coastdown."""
@@ -38,7 +34,7 @@ class CreepingThrust(_OfResistance):
 
     def force_n(self, leg: Leg, time: Array) -> Array:
         start = self.moment * leg.duration_s
-        return self.size * _resistance_n(leg) * _ramp(time, start, leg.duration_s - start)
+        return self.size * leg.resistance_n * _ramp(time, start, leg.duration_s - start)
 
 
 @dataclass(frozen=True)
@@ -62,9 +58,7 @@ class WeedTornOff(_OfResistance):
     sizes = (Size('size', 0.4, 1.0), Size('moment', 0.15, 0.35))
 
     def drag_area_m2(self, leg: Leg, time: Array) -> Array:
-        hull = leg.hull
-        pressure = 0.5 * hull.density_kg_m3 * leg.speed_m_s**2
-        area = self.size * _resistance_n(leg) / pressure
+        area = self.size * leg.resistance_n / leg.pressure_pa
         return area * (1.0 - _ramp(time, self.moment * leg.duration_s, 5.0))
 
 
@@ -78,7 +72,7 @@ class IceField(_OfResistance):
     def force_n(self, leg: Leg, time: Array) -> Array:
         start, length = self.moment * leg.duration_s, 0.3 * leg.duration_s
         inside = _ramp(time, start, 30.0) - _ramp(time, start + length, 30.0)
-        return -self.size * _resistance_n(leg) * inside
+        return -self.size * leg.resistance_n * inside
 
 
 @dataclass(frozen=True)
@@ -90,7 +84,7 @@ class TugLine(_OfResistance):
 
     def force_n(self, leg: Leg, time: Array) -> Array:
         turns = np.maximum(time, 0.0) / (self.moment * leg.duration_s)
-        return self.size * _resistance_n(leg) * np.sin(2.0 * np.pi * turns)
+        return self.size * leg.resistance_n * np.sin(2.0 * np.pi * turns)
 
 
 @dataclass(frozen=True)
@@ -105,10 +99,8 @@ class Snaking(_OfResistance):
         return 0.2 * _ramp(time, 0.0, leg.duration_s) * np.sin(2.0 * np.pi * turns)
 
     def drag_area_m2(self, leg: Leg, time: Array) -> Array:
-        hull = leg.hull
-        pressure = 0.5 * hull.density_kg_m3 * leg.speed_m_s**2
         growth = _ramp(time, 0.0, leg.duration_s) ** 2
-        return self.size * _resistance_n(leg) / pressure * growth
+        return self.size * leg.resistance_n / leg.pressure_pa * growth
 
 
 @dataclass(frozen=True)
@@ -119,7 +111,7 @@ class DraggingAnchor(_OfResistance):
     sizes = (Size('size', 0.1, 0.2), Size('moment', 0.2, 0.4))
 
     def force_n(self, leg: Leg, time: Array) -> Array:
-        return -self.size * _resistance_n(leg) * _ramp(time, self.moment * leg.duration_s, 10.0)
+        return -self.size * leg.resistance_n * _ramp(time, self.moment * leg.duration_s, 10.0)
 
 
 @dataclass(frozen=True)
@@ -185,17 +177,4 @@ class OtherMark(_OfResistance):
         return position + self.size * jumped[:, None] * away
 
 
-OUTSIDE: tuple[type[Effect], ...] = (
-    CreepingThrust,
-    DragStep,
-    WeedTornOff,
-    IceField,
-    TugLine,
-    Snaking,
-    DraggingAnchor,
-    StickingLog,
-    BentLog,
-    CloggedLog,
-    BentRadar,
-    OtherMark,
-)
+OUTSIDE = tuple(_OfResistance.__subclasses__())

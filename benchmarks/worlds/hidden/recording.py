@@ -124,45 +124,19 @@ def gust_m_s2(leg: Leg, noise: Noise) -> float:
     return speed_sd * float(np.sqrt(damping * (damping + 1.0 / noise.gust[1])))
 
 
-def record(
-    motion: Motion,
-    leg: Leg,
-    effects: tuple[Effect, ...],
-    *,
-    number: int,
-    inputs: tuple[str, ...],
-    noise: Noise,
-    heading_rad: float,
-    streams: Mapping[str, np.random.Generator],
-) -> Recording:
+@dataclass(frozen=True)
+class Scene:
     """
-    Read a motion with the sensors.
+    What a sensor is in the middle of.
 
-    Parameters
+    Attributes
     ----------
-    motion, leg, effects
-    number
-        Of the run, from 0: the later the later.
-    inputs
-        Of `INPUTS`.
-    noise
+    motion, leg, effects, noise
     heading_rad
         Of this run, for where the radar mark is.
-    streams
-        Source of random numbers, by input; no input depends on another.
+    rng
+        Source of random numbers; no input depends on another.
     """
-    start_ns = START_NS + number * BETWEEN_RUNS_NS
-    return {
-        name: _read(
-            name, _Scene(motion, leg, effects, noise, heading_rad, streams[name]), start_ns
-        )
-        for name in inputs
-    }
-
-
-@dataclass(frozen=True)
-class _Scene:
-    """What a sensor is in the middle of."""
 
     motion: Motion
     leg: Leg
@@ -172,7 +146,11 @@ class _Scene:
     rng: np.random.Generator
 
 
-def _read(name: str, scene: _Scene, start_ns: int) -> Series:
+def read(name: str, scene: Scene, number: int) -> Series:
+    """
+    Read an input of a run; its number counts from 0, the later the later.
+    """
+    start_ns = START_NS + number * BETWEEN_RUNS_NS
     rng, motion = scene.rng, scene.motion
     every = _EVERY_S.get(name, 1.0)
     time = np.arange(-LEAD_IN_S + rng.uniform(0.0, every), scene.leg.duration_s, every)
@@ -189,7 +167,7 @@ def _read(name: str, scene: _Scene, start_ns: int) -> Series:
     return Series(stamp[keep], receive[keep], value[keep])
 
 
-def _log(scene: _Scene, time: Array) -> Array:
+def _log(scene: Scene, time: Array) -> Array:
     speed = np.interp(time, scene.motion.time_s, scene.motion.surge_m_s)
     for effect in scene.effects:
         speed = effect.log(scene.leg, time, speed)
@@ -204,7 +182,7 @@ def _log(scene: _Scene, time: Array) -> Array:
     return _columns(_rounded(speed, scene.noise.log_quantum_m_s))
 
 
-def _position(scene: _Scene, time: Array) -> Array:
+def _position(scene: Scene, time: Array) -> Array:
     place = np.column_stack(
         [np.interp(time, scene.motion.time_s, scene.motion.position_m[:, k]) for k in range(2)]
     )
@@ -225,25 +203,25 @@ def _position(scene: _Scene, time: Array) -> Array:
     return _rounded(place, scene.noise.position_quantum_m)
 
 
-def _heading(scene: _Scene, time: Array) -> Array:
+def _heading(scene: Scene, time: Array) -> Array:
     yaw = np.interp(time, scene.motion.time_s, scene.motion.heading_rad)
     yaw = yaw + scene.rng.normal(0.0, 0.005) + scene.rng.normal(0.0, 0.005, len(time))
     return _columns(np.arctan2(np.sin(yaw), np.cos(yaw)))
 
 
-def _shaft(scene: _Scene, time: Array) -> Array:
+def _shaft(scene: Scene, time: Array) -> Array:
     rate = np.interp(time, scene.motion.time_s, scene.motion.shaft_rad_s)
     return _columns(rate + scene.rng.normal(0.0, 0.02, len(time)))
 
 
-def _depth(scene: _Scene, time: Array) -> Array:
+def _depth(scene: Scene, time: Array) -> Array:
     stated = [depth for effect in scene.effects if (depth := effect.depth_m()) is not None]
     depth = stated[0] if stated else _DEEP * scene.leg.hull.draught_m
     depth = depth * (1.0 + 0.005 * _slow(time, 200.0, scene.rng))
     return _columns(depth + scene.rng.normal(0.0, 0.1, len(time)))
 
 
-def _wind(scene: _Scene, time: Array) -> Array:
+def _wind(scene: Scene, time: Array) -> Array:
     true = np.array([effect.wind_m_s() for effect in scene.effects] or [(0.0, 0.0)]).sum(axis=0)
     over_ground = [
         np.gradient(scene.motion.position_m[:, k], scene.motion.time_s) for k in range(2)

@@ -137,17 +137,21 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
 
     ones, pairs, outside, none = (of(kind) for kind in ('one', 'pair', 'outside', 'none'))
     first_shelf = [trial for trial in ones if trial.truth.shelf == 1]
-    named = [trial for trial in ones if trial.answer.verdict == 'named']
+    named, everywhere = (
+        [trial for trial in some if trial.answer.verdict == 'named'] for some in (ones, trials)
+    )
     right = [trial for trial in named if _right(trial)]
     chi2 = [
         trial.answer.held_out_chi2 for trial in right if trial.answer.held_out_chi2 is not None
     ]
+
+    def said(verdict: str, some: list[Trial]) -> Share:
+        return Share.over(trial.answer.verdict == verdict for trial in some)
+
     return {
-        'precision of a name': Share.over(_right(trial) for trial in named),
-        'precision, whatever is hidden': Share.over(
-            _right(trial) for trial in trials if trial.answer.verdict == 'named'
-        ),
-        'named, first shelf': Share.over(_right(trial) for trial in first_shelf),
+        'precision of a name': Share.over(map(_right, named)),
+        'precision, whatever is hidden': Share.over(map(_right, everywhere)),
+        'named, first shelf': Share.over(map(_right, first_shelf)),
         'name or set of <= 3 with the truth, first shelf': _covered(first_shelf),
         'name or set of <= 3 with the truth, second shelf': _covered(
             [trial for trial in ones if trial.truth.shelf == 2]
@@ -157,16 +161,10 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
             for trial in ones
         ),
         'alarm, nothing hidden': Share.over(trial.answer.verdict != 'none' for trial in none),
-        'false name, nothing hidden': Share.over(
-            trial.answer.verdict == 'named' for trial in none
-        ),
-        'unknown, outside the library': Share.over(
-            trial.answer.verdict == 'unknown' for trial in outside
-        ),
-        'falsely named, outside the library': Share.over(
-            trial.answer.verdict == 'named' for trial in outside
-        ),
-        'pair in the answer': Share.over(_has_pair(trial) for trial in pairs),
+        'false name, nothing hidden': said('named', none),
+        'unknown, outside the library': said('unknown', outside),
+        'falsely named, outside the library': said('named', outside),
+        'pair in the answer': Share.over(map(_has_pair, pairs)),
         'expected calibration error': calibration_error(
             [
                 (trial.answer.first[1], trial.answer.first[0] == _answer_sought(trial.truth))
@@ -180,7 +178,7 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         'held-out chi^2 per sample, median': float(np.median(chi2)) if chi2 else float('nan'),
         'held-out chi^2 per sample <= 1.1': Share.over(value <= 1.1 for value in chi2),
         'parameters within 2 sd': Share.over(
-            inside for trial in right for _, inside in _parameters(trial)
+            inside for trial in right for inside in _parameters(trial)
         ),
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
         'CPU s a case, 95 % are below': float(np.quantile([t.cpu_s for t in trials], 0.95)),
@@ -258,10 +256,10 @@ def _answer_sought(truth: Truth) -> Names:
     return UNKNOWN if truth.kind == 'outside' else truth.names
 
 
-def _parameters(trial: Trial) -> Iterable[tuple[str, bool]]:
-    """Yield each parameter that is known of both, and whether it is within 2 sd."""
+def _parameters(trial: Trial) -> Iterable[bool]:
+    """Yield of each parameter that is known of both whether it is within 2 sd."""
     for effect, true in trial.truth.parameters.items():
         found = trial.answer.parameters.get(effect, {})
         for name in true.keys() & found.keys():
             value, sd = found[name]
-            yield f'{effect} {name}', abs(value - true[name]) <= 2.0 * sd
+            yield abs(value - true[name]) <= 2.0 * sd

@@ -16,21 +16,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from benchmarks.worlds.hidden_b.effects import FREE, LIBRARY, SECOND, Draw, Hidden
-from benchmarks.worlds.hidden_b.facts import Facts, draw_facts
 from benchmarks.worlds.hidden_b.hulls import Array, Hull, draw_hull
-from benchmarks.worlds.hidden_b.instruments import INPUTS, MOTION, Recording, read
-from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.measure import moved, run_down_s
-from benchmarks.worlds.hidden_b.plans import Condition, plans_of
+from benchmarks.worlds.hidden_b.instruments import (
+    INPUTS,
+    MOTION,
+    Kit,
+    Recording,
+    draw_kit,
+    faulty_log,
+    faulty_place,
+    read,
+)
+from benchmarks.worlds.hidden_b.plans import Condition, Facts, draw_facts, plans_of
 from benchmarks.worlds.hidden_b.screws import Screw, draw_screw
 from benchmarks.worlds.hidden_b.setting import Faults, Setting
 from benchmarks.worlds.hidden_b.shipfile import Stated, draw_stated, ship_file
 from benchmarks.worlds.hidden_b.strangers import OUTSIDE
-from benchmarks.worlds.hidden_b.voyage import sail, steady_point
+from benchmarks.worlds.hidden_b.voyage import Track, sail, steady_point
 from benchmarks.worlds.hidden_b.weather import Weather, draw_weather
 
 SEED = 77_001
@@ -67,7 +74,7 @@ class Truth:
     what
         Names of the effects themselves.
     r_change
-        By how much each moves r, of its largest value; see `measure.moved`.
+        By how much each moves r, of its largest value; see `moved`.
     facts, lies
         What the crew says, and which of it is false.
     """
@@ -138,6 +145,13 @@ def condition(number: int, seed: int = SEED) -> Condition:
     return plans_of(seed)[number][1]
 
 
+def names(number: int, seed: int = SEED) -> tuple[str, ...]:
+    """
+    Return the names of what is hidden in a case, in alphabetical order.
+    """
+    return tuple(sorted(plans_of(seed)[number][0]))
+
+
 def observe(number: int, *, seed: int = SEED) -> Observation:
     """
     Return what a diagnosis may see of a case, counted from 0, of the world of a seed.
@@ -179,21 +193,20 @@ def reveal(number: int, seed: int = SEED) -> Truth:
     """
     Return what was hidden in a case.
     """
-    names, given = plans_of(seed)[number]
-    case = _case(number, seed)
-    outside = bool(set(names) & set(OUTSIDE))
-    kind = 'outside' if outside else ('none', 'one', 'pair')[len(names)]
+    what, case = names(number, seed), _case(number, seed)
+    outside = bool(set(what) & set(OUTSIDE))
+    kind = 'outside' if outside else ('none', 'one', 'pair')[len(what)]
     first = case.settings[0]
     wind = float(np.hypot(*np.sum([first.weather.wind, *first.wind], axis=0)))
     drive = first.screw.drive
-    facts, lies = draw_facts(np.random.default_rng([seed, number, 9]), names, drive, wind)
+    facts, lies = draw_facts(np.random.default_rng([seed, number, 9]), what, drive, wind)
     return Truth(
         kind,
-        0 if outside or not names else 2 if set(names) & set(SECOND) else 1,
-        ('unknown',) if outside else tuple(sorted(names)),
+        0 if outside or not what else 2 if set(what) & set(SECOND) else 1,
+        ('unknown',) if outside else what,
         {each.name: each.parameters for each in case.hidden},
-        given,
-        tuple(sorted(names)),
+        condition(number, seed),
+        what,
         {each.name: size for each, size in zip(case.hidden, case.sizes, strict=True)},
         facts,
         lies,
@@ -237,7 +250,7 @@ def steady_of(setting: Setting) -> tuple[float, float]:
     Return revs and torque before the stop.
     """
     need = float(np.interp(setting.speed_m_s, setting.hull.grid_m_s, setting.still_n()))
-    return steady_point(setting, need)[1:]
+    return steady_point(setting, need)
 
 
 @lru_cache(maxsize=16)
@@ -249,15 +262,12 @@ def _case(number: int, seed: int) -> _Case:
         drives = LIBRARY[name][1] if name in LIBRARY and LIBRARY[name][1] else drives
     if {'residual_thrust', 'locked_propeller'} & set(names):
         drives = FREE
-    hull = draw_hull(rng, drives)
-    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
-    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
-    lead = rng.uniform(900.0, 2400.0) if hull.time_s > 100.0 else rng.uniform(500.0, 1200.0)
-    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    ship, kit = draw_ship(rng, drives, (2400.0, 1200.0))
+    hull, screw = ship['hull'], ship['screw']
     if {'radar_scale', 'gyro_ballistic'} & set(names):
         kit = replace(kit, fix='radar', fix_every_s=3.0)
     weather = draw_weather(rng, hull.time_s, hull.speed_m_s)
-    bases = _legs(rng, hull, screw, weather, lead, coast, (seed, number))
+    bases = _legs(rng, ship, weather, (seed, number))
     weather, kit, moves = calm(bases, kit)
     bases = tuple(replace(base, weather=weather) for base in bases)
     stated = draw_stated(rng)
@@ -280,6 +290,31 @@ def _case(number: int, seed: int) -> _Case:
     return _Case(hull, screw, stated, kit, text, *found, moves)
 
 
+def draw_ship(
+    rng: np.random.Generator, drives: tuple[str, ...], longest_s: tuple[float, float]
+) -> tuple[dict[str, Any], Kit]:
+    """
+    Draw what all runs of a ship have in common, by the names of `Setting`, and her instruments.
+
+    Parameters
+    ----------
+    rng
+    drives
+        Those that will do; any where there are none.
+    longest_s
+        Of the steady part, of a ship that slows slowly and of a quick one.
+    """
+    hull = draw_hull(rng, drives)
+    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
+    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
+    slow, quick = longest_s
+    lead = rng.uniform(900.0, slow) if hull.time_s > 100.0 else rng.uniform(500.0, quick)
+    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
+    times = {'lead_s': round(lead / step) * step, 'coast_s': coast, 'step_s': step}
+    return {'hull': hull, 'screw': screw, **times}, kit
+
+
 def fresh(base: Setting) -> Setting:
     """
     Return a copy whose lists are its own.
@@ -289,40 +324,28 @@ def fresh(base: Setting) -> Setting:
 
 
 def _legs(
-    rng: np.random.Generator,
-    hull: Hull,
-    screw: object,
-    weather: Weather,
-    lead: float,
-    coast: float,
-    key: tuple[int, int],
+    rng: np.random.Generator, ship: dict[str, Any], weather: Weather, key: tuple[int, int]
 ) -> tuple[Setting, ...]:
     """Return three runs: a first, one back, one on another course."""
     first = rng.uniform(-np.pi, np.pi)
     headings = (first, first + np.pi + rng.normal(0, 0.03), first + rng.uniform(1.0, 2.1))
     clock = rng.uniform(6.0, 14.0) * 3600.0
-    legs = []
-    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
-    lead = round(lead / step) * step
+    legs, hull = [], ship['hull']
     for run, heading in enumerate(headings):
         speed = hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.8, 0.98))
         legs.append(
             Setting(
-                hull=hull,
-                screw=screw,  # type: ignore[arg-type]
+                **ship,
                 weather=weather,
                 speed_m_s=speed,
                 heading_rad=heading,
                 first_rad=first,
-                lead_s=lead,
-                coast_s=coast,
-                step_s=step,
                 clock_s=clock,
                 seed=(*key, 2, run),
                 depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),
             )
         )
-        clock += lead + coast + rng.uniform(300.0, 900.0)
+        clock += ship['lead_s'] + ship['coast_s'] + rng.uniform(300.0, 900.0)
     return tuple(legs)
 
 
@@ -391,3 +414,67 @@ def matters(
         within = least > 0.0 and np.isfinite(most)
         size = float(np.sqrt(least * most)) if within else size * (1.35 if least else 0.7)
     return tried, moves
+
+
+def quiet(setting: Setting) -> Setting:
+    """
+    Return the run without anything random, and with longer steps.
+    """
+    step = min(4.0 * setting.step_s, setting.hull.time_s / 120.0)
+    return replace(setting, quiet=True, step_s=step)
+
+
+def seen(track: Track, setting: Setting, kit: Kit) -> tuple[Array, Array]:
+    """
+    Return what log and track say of the speed, without noise.
+    """
+    log = faulty_log(track.t, track.water_m_s, setting.faults)
+    place = faulty_place(track, kit, setting.faults)
+    velocity = np.gradient(place, track.t, axis=0)
+    c, s = np.cos(setting.heading_rad), np.sin(setting.heading_rad)
+    return log, velocity[:, 0] * c + velocity[:, 1] * s
+
+
+def moved(changed: Setting, plain: Setting, kit: Kit) -> float:
+    """
+    Return by how much a change of the setting moves r, relative to its largest value.
+
+    The retardation of log and of track, each against what the plain run shows at the same
+    reading, and twice the gap between log and track over the first speed (r goes about as the
+    square): the largest of the three, rms.
+    """
+    found = [sail(quiet(setting)) for setting in (plain, changed)]
+    plain_seen, changed_seen = (
+        seen(track, setting, kit) for track, setting in zip(found, (plain, changed), strict=True)
+    )
+    t, first = found[0].t, plain.speed_m_s
+    skip = t > min(0.06 * plain.hull.time_s, 20.0)
+    sizes = []
+    for before, after in zip(plain_seen, changed_seen, strict=True):
+        slope = -np.gradient(before, t)[skip]
+        order = np.argsort(before[skip])
+        largest = float(np.max(slope[before[skip] > 0.3 * first]))
+        inside = (after > 0.3 * first) & (after < 1.1 * first)
+        # a reading that falls to nothing has no slope
+        inside[1:-1] &= inside[2:] & inside[:-2]
+        use = skip & inside
+        if use.sum() > 5:
+            usual = np.interp(after[use], before[skip][order], slope[order])
+            gap = -np.gradient(after, t)[use] - usual
+            sizes.append(float(np.sqrt(np.mean(gap**2))) / largest)
+    between = (changed_seen[0] - changed_seen[1]) - (plain_seen[0] - plain_seen[1])
+    fast = found[0].water_m_s > 0.15 * first
+    sizes.append(2.0 * float(np.sqrt(np.mean(between[fast] ** 2))) / first)
+    return max(sizes)
+
+
+def run_down_s(setting: Setting) -> float:
+    """
+    Return the time in which the thrust falls to a third after the stop.
+    """
+    track = sail(replace(setting, quiet=True, coast_s=max(60.0, 0.3 * setting.hull.time_s)))
+    hull = setting.hull
+    still = np.interp(track.water_m_s, hull.grid_m_s, setting.still_n())
+    thrust = track.force_n + still
+    under = np.flatnonzero(thrust < 0.37 * thrust[0])
+    return max(float(track.t[under[0]]) if len(under) else 10.0, 2.0 * setting.step_s)

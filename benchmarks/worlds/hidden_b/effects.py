@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.worlds.hidden_b.hulls import GRAVITY, SEA, Array, Hull
-from benchmarks.worlds.hidden_b.screws import Screw, with_drive
+from benchmarks.worlds.hidden_b.screws import Screw
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.weather import band
 
@@ -51,6 +51,19 @@ def hidden(name: str, scope: str, parameters: dict[str, float], **laws: Any) -> 
     def apply(setting: Setting) -> None:
         for field, law in laws.items():
             getattr(setting, field).append(law)
+
+    return Hidden(name, scope, parameters, apply)
+
+
+def changed(
+    name: str, scope: str, parameters: dict[str, float], part: str = 'faults', **to: Any
+) -> Hidden:
+    """
+    Return an effect that changes attributes of a part of a setting.
+    """
+
+    def apply(setting: Setting) -> None:
+        setattr(setting, part, replace(getattr(setting, part), **to))
 
     return Hidden(name, scope, parameters, apply)
 
@@ -139,18 +152,22 @@ def towed_cable(d: Draw) -> Hidden:
     return hidden('towed_cable', 'hull', {'drag_area_m2': area}, still=still)
 
 
-def locked_propeller(d: Draw) -> Hidden:
-    """The shaft is braked where it usually turns."""
-    locked = with_drive(d.screw, 'locked')
-    speed = 0.7 * d.hull.speed_m_s
+def _stopped(d: Draw, name: str, screw: Screw, speed: float, **parameters: float) -> Hidden:
+    """Return another state of the stopped propeller, with its drag on the disc at a speed."""
     disc = 0.25 * pi * d.screw.diameter_m**2 * d.screw.shafts * 0.5 * SEA[0] * speed**2
     one = np.array([speed])
-    more = float((locked.drag_n(one, d.steady) - d.screw.drag_n(one, d.steady))[0])
+    more = float((screw.drag_n(one, d.steady) - d.screw.drag_n(one, d.steady))[0])
 
     def apply(setting: Setting) -> None:
-        setting.screw = locked
+        setting.screw = screw
 
-    return Hidden('locked_propeller', 'hull', {'drag_coefficient': more / disc}, apply)
+    return Hidden(name, 'hull', {'drag_coefficient': more / disc, **parameters}, apply)
+
+
+def locked_propeller(d: Draw) -> Hidden:
+    """The shaft is braked where it usually turns."""
+    locked = replace(d.screw, drive='locked')
+    return _stopped(d, 'locked_propeller', locked, 0.7 * d.hull.speed_m_s)
 
 
 def windmilling_propeller(d: Draw) -> Hidden:
@@ -160,40 +177,36 @@ def windmilling_propeller(d: Draw) -> Hidden:
     viscous = d.rng.uniform(0.02, 0.06)
     spare = [-d.screw.loads(float(n), stall)[1] / d.steady[1] for n in turns]
     coulomb = max(s - viscous * n / d.steady[0] for s, n in zip(spare, turns, strict=True))
-    braked = replace(with_drive(d.screw, 'direct', max(coulomb, 0.01)), viscous=viscous)
+    braked = replace(d.screw, drive='direct', coulomb=max(coulomb, 0.01), viscous=viscous)
     speed = 0.5 * (stall + d.hull.speed_m_s)
-    disc = 0.25 * pi * d.screw.diameter_m**2 * d.screw.shafts * 0.5 * SEA[0] * speed**2
-    one = np.array([speed])
-    more = float((braked.drag_n(one, d.steady) - d.screw.drag_n(one, d.steady))[0])
-
-    def apply(setting: Setting) -> None:
-        setting.screw = braked
-
-    found = {'drag_coefficient': more / disc, 'stall_speed_m_s': stall}
-    return Hidden('windmilling_propeller', 'hull', found, apply)
+    return _stopped(d, 'windmilling_propeller', braked, speed, stall_speed_m_s=stall)
 
 
 def residual_thrust(d: Draw) -> Hidden:
     """The engine is not stopped but runs out."""
     left = float(np.clip(d.rng.uniform(0.12, 0.35) * d.size, 0.03, 0.7))
     left_s = d.hull.time_s * d.rng.uniform(0.2, 0.8)
+    found = {'decay_s': left_s, 'fraction': left}
+    return changed('residual_thrust', 'run', found, 'screw', left=left, left_s=left_s)
+
+
+def _moving(
+    name: str, field: str, velocity: tuple[float, float], parameters: dict[str, float]
+) -> Hidden:
+    """Return air or water that moves along the first run and to port of it."""
 
     def apply(setting: Setting) -> None:
-        setting.screw = replace(setting.screw, left=left, left_s=left_s)
+        getattr(setting, field).append(setting.along_first(*velocity))
 
-    found = {'decay_s': left_s, 'fraction': left}
-    return Hidden('residual_thrust', 'run', found, apply)
+    return Hidden(name, 'earth', parameters, apply)
 
 
 def wind(d: Draw) -> Hidden:
     """A breeze, more or less along the ship, with its gusts."""
     strength, angle = d.rng.uniform(3.0, 9.0) * d.size, d.rng.normal(0.0, 0.6)
     head, cross = d.sign * strength * np.cos(angle), strength * np.sin(angle)
-
-    def apply(setting: Setting) -> None:
-        setting.wind.append(setting.along_first(-head, -cross))
-
-    return Hidden('wind', 'earth', {'head_m_s': float(head), 'cross_m_s': float(cross)}, apply)
+    found = {'head_m_s': float(head), 'cross_m_s': float(cross)}
+    return _moving('wind', 'wind', (-head, -cross), found)
 
 
 def waves(d: Draw) -> Hidden:
@@ -225,11 +238,8 @@ def current(d: Draw) -> Hidden:
     """A stream."""
     along = d.sign * d.rng.uniform(0.03, 0.1) * d.size * d.hull.speed_m_s
     port = d.rng.normal(0.0, 0.04) * d.hull.speed_m_s
-
-    def apply(setting: Setting) -> None:
-        setting.flow.append(setting.along_first(along, port))
-
-    return Hidden('current', 'earth', {'along_track_m_s': along, 'cross_track_m_s': port}, apply)
+    found = {'along_track_m_s': along, 'cross_track_m_s': port}
+    return _moving('current', 'flow', (along, port), found)
 
 
 def current_change(d: Draw) -> Hidden:
@@ -284,74 +294,55 @@ def displacement(d: Draw) -> Hidden:
     return Hidden('displacement', 'hull', {'fraction': share}, apply)
 
 
-def _fault(name: str, parameter: str, field: str) -> Callable[[float], Hidden]:
-    def made(value: float) -> Hidden:
-        def apply(setting: Setting) -> None:
-            setting.faults = replace(setting.faults, **{field: value})
-
-        return Hidden(name, 'sensor', {parameter: value}, apply)
-
-    return made
-
-
 def log_scale(d: Draw) -> Hidden:
     """A paddle wheel or a Doppler log out of adjustment."""
-    value = d.sign * d.rng.uniform(0.03, 0.2) * d.size
-    return _fault('log_scale', 'factor', 'scale')(float(np.clip(value, -0.4, 0.6)))
+    value = float(np.clip(d.sign * d.rng.uniform(0.03, 0.2) * d.size, -0.4, 0.6))
+    return changed('log_scale', 'sensor', {'factor': value}, scale=value)
 
 
 def log_offset(d: Draw) -> Hidden:
     """Zero of an electromagnetic log."""
     value = d.sign * d.rng.uniform(0.02, 0.06) * d.size * d.hull.speed_m_s
-    return _fault('log_offset', 'offset_m_s', 'offset_m_s')(value)
+    return changed('log_offset', 'sensor', {'offset_m_s': value}, offset_m_s=value)
 
 
 def log_lag(d: Draw) -> Hidden:
     """Damping set to many seconds."""
     value = d.rng.uniform(0.05, 0.15) * d.size * d.hull.time_s
-    return _fault('log_lag', 'lag_s', 'lag_s')(value)
+    return changed('log_lag', 'sensor', {'lag_s': value}, lag_s=value)
 
 
 def log_dead_band(d: Draw) -> Hidden:
     """A wheel that does not turn below a speed."""
     value = float(np.clip(d.rng.uniform(0.3, 0.5) * d.size, 0.2, 0.7)) * d.hull.speed_m_s
-    return _fault('log_dead_band', 'speed_m_s', 'dead_m_s')(value)
+    return changed('log_dead_band', 'sensor', {'speed_m_s': value}, dead_m_s=value)
 
 
 def radar_scale(d: Draw) -> Hidden:
     """Ranges too long or too short."""
-    return _fault('radar_scale', 'factor', 'radar_scale')(
-        d.sign * d.rng.uniform(0.03, 0.08) * d.size
-    )
+    value = d.sign * d.rng.uniform(0.03, 0.08) * d.size
+    return changed('radar_scale', 'sensor', {'factor': value}, radar_scale=value)
 
 
 def time_offset(d: Draw) -> Hidden:
     """Clocks of log and radar apart."""
     value = d.sign * d.rng.uniform(0.03, 0.09) * d.size * d.hull.time_s
-    return _fault('time_offset', 'offset_s', 'late_s')(value)
+    return changed('time_offset', 'sensor', {'offset_s': value}, late_s=value)
 
 
 FREE = ('declutched', 'electric')
+_NEEDS = {
+    locked_propeller: FREE,
+    windmilling_propeller: ('declutched',),
+    residual_thrust: FREE,
+}
+_MAKERS = (
+    fouling, shallow_water, towed_cable, locked_propeller, windmilling_propeller,
+    residual_thrust, wind, waves, current, log_scale, log_offset, radar_scale, turning, log_lag,
+    log_dead_band, time_offset, current_change, added_mass, displacement,
+)  # fmt: skip
 LIBRARY: dict[str, tuple[Callable[[Draw], Hidden], tuple[str, ...]]] = {
-    'fouling': (fouling, ()),
-    'shallow_water': (shallow_water, ()),
-    'towed_cable': (towed_cable, ()),
-    'locked_propeller': (locked_propeller, FREE),
-    'windmilling_propeller': (windmilling_propeller, ('declutched',)),
-    'residual_thrust': (residual_thrust, FREE),
-    'wind': (wind, ()),
-    'waves': (waves, ()),
-    'current': (current, ()),
-    'log_scale': (log_scale, ()),
-    'log_offset': (log_offset, ()),
-    'radar_scale': (radar_scale, ()),
-    'turning': (turning, ()),
-    'log_lag': (log_lag, ()),
-    'log_dead_band': (log_dead_band, ()),
-    'time_offset': (time_offset, ()),
-    'current_change': (current_change, ()),
-    'added_mass': (added_mass, ()),
-    'displacement': (displacement, ()),
+    make.__name__: (make, _NEEDS.get(make, ())) for make in _MAKERS
 }
 """Its maker by name, and the drives that it needs."""
 SECOND = ('log_lag', 'log_dead_band', 'time_offset', 'current_change', 'added_mass',

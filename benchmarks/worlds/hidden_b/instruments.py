@@ -14,10 +14,100 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.worlds.hidden_b.hulls import Array
-from benchmarks.worlds.hidden_b.kit import Kit
 from benchmarks.worlds.hidden_b.setting import Faults, Setting
 from benchmarks.worlds.hidden_b.voyage import Track
 from benchmarks.worlds.hidden_b.weather import Sinusoids, band
+
+KNOT = 1852.0 / 3600.0
+
+
+@dataclass(frozen=True)
+class Kit:
+    """
+    The instruments of a ship.
+
+    Attributes
+    ----------
+    log_filter_s, log_every_s, log_step_m_s, log_sd_m_s, log_gain
+        Of the speed log; `log_gain` the sd of its wander, relative.
+    zeros, gaps_per_hour
+        Share of readings that are exactly zero; breaks of any source.
+    fix
+        `gnss`, `geodetic` (the same in degrees) or `radar`.
+    fix_every_s, wander_m, step_m
+        Of the positions; wander and steps of GNSS.
+    range_sd_m, bearing_sd_rad, marks_m
+        Of the radar: two marks, from the place of the stop.
+    """
+
+    log_filter_s: float
+    log_every_s: float
+    log_step_m_s: float
+    log_sd_m_s: float
+    log_gain: float
+    log_depth_m: float
+    log_scale: float
+    log_offset_m_s: float
+    zeros: float
+    gaps_per_hour: float
+    fix: str
+    fix_every_s: float
+    wander_m: float
+    step_m: float
+    range_sd_m: float
+    bearing_sd_rad: float
+    marks_m: tuple[tuple[float, float], tuple[float, float]]
+    origin_deg: tuple[float, float]
+    wind_gain: float
+    wind_turn_rad: float
+    turn_step: float
+
+
+def draw_kit(
+    rng: np.random.Generator, time_s: float, speed_m_s: float, draught_m: float, far_m: float
+) -> Kit:
+    """
+    Draw the instruments of a ship.
+
+    Parameters
+    ----------
+    rng
+    time_s, speed_m_s, draught_m
+        Of the ship.
+    far_m
+        How far she goes in a run.
+    """
+    slow = float(np.clip(0.015 * time_s, 0.5, 15.0))  # a fast craft has a quick log
+    fix = str(rng.choice(['gnss', 'geodetic', 'radar'], p=[0.3, 0.2, 0.5]))
+    marks = []
+    for side in rng.permutation([0.0, rng.uniform(0.4, 0.8)]):
+        angle = rng.uniform(0, 2 * np.pi) + side * np.pi
+        away = max(1500.0, 0.7 * far_m) * rng.uniform(0.8, 1.6)
+        marks.append((float(away * np.cos(angle)), float(away * np.sin(angle))))
+    return Kit(
+        log_filter_s=rng.uniform(min(2.0, 0.7 * slow), slow),
+        log_every_s=float(rng.choice([0.2, 0.5, 1.0, 1.0, 2.0])),
+        log_step_m_s=float(rng.choice([0.1 * KNOT, 0.01 * KNOT, 0.01, 0.05])),
+        log_sd_m_s=speed_m_s * 10 ** rng.uniform(-3.0, -1.9),
+        log_gain=10 ** rng.uniform(-3.5, -2.7),
+        log_depth_m=draught_m,
+        log_scale=rng.uniform(-0.003, 0.003),
+        log_offset_m_s=rng.uniform(-0.0012, 0.0012) * speed_m_s,
+        zeros=float(rng.choice([0.0, 0.0, 0.001, 0.006])),
+        gaps_per_hour=float(rng.choice([0.0, 1.0, 4.0])),
+        fix=fix,
+        fix_every_s=float(rng.choice([2.0, 3.0, 5.0]) if fix == 'radar' else 1.0),
+        wander_m=rng.uniform(0.4, 2.0),
+        step_m=float(rng.choice([0.0, rng.uniform(0.3, 2.5)])),
+        range_sd_m=rng.uniform(2.0, 9.0),
+        bearing_sd_rad=np.radians(rng.uniform(0.05, 0.25)),
+        marks_m=(marks[0], marks[1]),
+        origin_deg=(rng.uniform(-55.0, 65.0), rng.uniform(-180.0, 180.0)),
+        wind_gain=rng.uniform(0.92, 1.06),
+        wind_turn_rad=np.radians(rng.normal(0.0, 2.0)),
+        turn_step=float(rng.choice([0.1, 1.0])) * 2 * np.pi / 60.0,
+    )
+
 
 EARTH_M = 6_371_000.0
 MOTION = ('speed_through_water', 'position')
@@ -101,79 +191,12 @@ def read(
     found: dict[str, Series] = {}
     for name in inputs:
         rng = setting.stream(20, INPUTS.index(name))
-        found |= _READERS[name](track, setting, kit, rng, start_ns)
+        found |= getattr(_Readers(track, setting, kit, rng, start_ns), name)()
     return found
-
-
-def _series(
-    rng: np.random.Generator, kit: Kit, track: Track, every_s: float, start_ns: int
-) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
-    """Return times of readings [s], stamps and arrivals."""
-    t = np.arange(track.t[0] + rng.uniform(0.0, every_s), track.t[-1], every_s)
-    t = t + rng.uniform(-0.02, 0.02, len(t)) * min(every_s, 1.0)
-    kept = np.ones(len(t), np.bool_)
-    hours = (t[-1] - t[0]) / 3600.0
-    for _ in range(rng.poisson(kit.gaps_per_hour * hours)):
-        begin = rng.uniform(t[0], t[-1])
-        kept &= (t < begin) | (t > begin + rng.uniform(3.0, 25.0))
-    t = t[kept & (t >= track.t[0]) & (t <= track.t[-1])]
-    stamps = start_ns + np.round((t - track.t[0]) * 1e9).astype(np.int64)
-    late = rng.uniform(0.02, 0.15, len(t)) + rng.exponential(0.03, len(t))
-    arrivals = np.maximum.accumulate(stamps + np.round(late * 1e9).astype(np.int64))
-    return t, stamps, arrivals
 
 
 def _stepped(value: Array, step: float) -> Array:
     return np.round(value / step) * step
-
-
-def _log(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    grid, day = track.t, setting.weather
-    fine = np.linspace(
-        grid[0], grid[-1], round((grid[-1] - grid[0]) / min(1.0, grid[1] - grid[0]))
-    )
-    orbit = day.orbital(kit.log_depth_m)
-    swell = Sinusoids(
-        orbit * np.sqrt(rng.dirichlet(np.full(8, 3.0))),
-        2 * np.pi / (day.swell_s * rng.uniform(0.85, 1.15, 8)),
-        rng.uniform(0, 2 * np.pi, 8),
-    )
-    water = np.interp(fine, grid, track.water_m_s)
-    gain = 1.0 + band(rng, kit.log_gain, 100.0, 2000.0, 10).at(fine)
-    raw = filtered(fine, water * gain + swell.at(fine), kit.log_filter_s)
-    noise = filtered(fine, rng.standard_normal(len(fine)), 0.3 * kit.log_filter_s)
-    raw = raw + kit.log_sd_m_s * noise / noise.std()
-    value = faulty_log(fine, (1.0 + kit.log_scale) * raw + kit.log_offset_m_s, setting.faults)
-    t, stamps, arrivals = _series(rng, kit, track, kit.log_every_s, start_ns)
-    found = _stepped(np.interp(t, fine, value), kit.log_step_m_s)
-    found[rng.random(len(t)) < kit.zeros] = 0.0
-    return {'speed_through_water': Series(stamps, found, arrivals)}
-
-
-def _position(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    t, stamps, arrivals = _series(rng, kit, track, kit.fix_every_s, start_ns)
-    true = faulty_place(track, kit, setting.faults)
-    place = np.stack([np.interp(t, track.t, true[:, k]) for k in (0, 1)], axis=1)
-    if kit.fix == 'radar':
-        place = _radar(place, t, kit, rng)
-    else:
-        for k in (0, 1):
-            place[:, k] += band(rng, kit.wander_m, 80.0, 900.0, 14).at(t)
-            place[:, k] += band(rng, 0.06 * kit.wander_m, 10.0, 80.0, 10).at(t)
-            place[:, k] += 0.05 * rng.standard_normal(len(t))
-        for _ in range(rng.poisson(2.0)):
-            place[t > rng.uniform(t[0], t[-1])] += kit.step_m * rng.standard_normal(2)
-    if kit.fix != 'geodetic':
-        return {'position': Series(stamps, _stepped(place, 0.01), arrivals)}
-    latitude, longitude = kit.origin_deg
-    north = np.degrees(place[:, 1] / EARTH_M)
-    east = np.degrees(place[:, 0] / (EARTH_M * np.cos(np.radians(latitude))))
-    degrees = np.stack([latitude + north, longitude + east], axis=1)
-    return {'position_geodetic': Series(stamps, _stepped(degrees, 1e-5 / 6.0), arrivals)}
 
 
 def _radar(place: Array, t: Array, kit: Kit, rng: np.random.Generator) -> Array:
@@ -199,59 +222,111 @@ def _outer(a: Array, b: Array) -> Array:
     return np.stack([np.stack([a * a, a * b], 1), np.stack([a * b, b * b], 1)], 1)
 
 
-def _heading(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
-    value = np.interp(t, track.t, track.heading_rad)
-    value = value + np.radians(rng.normal(0.0, 0.4))
-    value = value + band(rng, np.radians(0.3), 100.0, 3000.0, 8).at(t)
-    if setting.faults.gyro is not None:
-        value = value + setting.faults.gyro(t)
-    value = _stepped(value, np.radians(0.1))
-    return {'heading': Series(stamps, (value + np.pi) % (2 * np.pi) - np.pi, arrivals)}
+@dataclass(frozen=True)
+class _Readers:
+    """What reads a run; a method each input, by its name."""
 
+    track: Track
+    setting: Setting
+    kit: Kit
+    rng: np.random.Generator
+    start_ns: int
 
-def _shaft(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    found = {}
-    for k in range(setting.screw.shafts):
-        t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
-        end = '' if k == 0 else f'_{k + 1}'
-        value = np.interp(t, track.t, track.shafts_rad_s[:, k])
-        found[f'shaft{end}'] = Series(stamps, _stepped(value, kit.turn_step), arrivals)
-        if setting.screw.drive == 'cpp':
-            pitch = _stepped(np.interp(t, track.t, track.pitch), 0.01)
-            found[f'pitch{end}'] = Series(stamps, pitch, arrivals)
-    return found
+    def _series(self, every_s: float) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+        """Return times of readings [s], stamps and arrivals."""
+        track, rng = self.track, self.rng
+        t = np.arange(track.t[0] + rng.uniform(0.0, every_s), track.t[-1], every_s)
+        t = t + rng.uniform(-0.02, 0.02, len(t)) * min(every_s, 1.0)
+        kept = np.ones(len(t), np.bool_)
+        hours = (t[-1] - t[0]) / 3600.0
+        for _ in range(rng.poisson(self.kit.gaps_per_hour * hours)):
+            begin = rng.uniform(t[0], t[-1])
+            kept &= (t < begin) | (t > begin + rng.uniform(3.0, 25.0))
+        t = t[kept & (t >= track.t[0]) & (t <= track.t[-1])]
+        stamps = self.start_ns + np.round((t - track.t[0]) * 1e9).astype(np.int64)
+        late = rng.uniform(0.02, 0.15, len(t)) + rng.exponential(0.03, len(t))
+        arrivals = np.maximum.accumulate(stamps + np.round(late * 1e9).astype(np.int64))
+        return t, stamps, arrivals
 
+    def speed_through_water(self) -> dict[str, Series]:
+        grid, day = self.track.t, self.setting.weather
+        fine = np.linspace(
+            grid[0], grid[-1], round((grid[-1] - grid[0]) / min(1.0, grid[1] - grid[0]))
+        )
+        orbit = day.orbital(self.kit.log_depth_m)
+        swell = Sinusoids(
+            orbit * np.sqrt(self.rng.dirichlet(np.full(8, 3.0))),
+            2 * np.pi / (day.swell_s * self.rng.uniform(0.85, 1.15, 8)),
+            self.rng.uniform(0, 2 * np.pi, 8),
+        )
+        water = np.interp(fine, grid, self.track.water_m_s)
+        gain = 1.0 + band(self.rng, self.kit.log_gain, 100.0, 2000.0, 10).at(fine)
+        raw = filtered(fine, water * gain + swell.at(fine), self.kit.log_filter_s)
+        noise = filtered(fine, self.rng.standard_normal(len(fine)), 0.3 * self.kit.log_filter_s)
+        raw = raw + self.kit.log_sd_m_s * noise / noise.std()
+        value = faulty_log(
+            fine, (1.0 + self.kit.log_scale) * raw + self.kit.log_offset_m_s, self.setting.faults
+        )
+        t, stamps, arrivals = self._series(self.kit.log_every_s)
+        found = _stepped(np.interp(t, fine, value), self.kit.log_step_m_s)
+        found[self.rng.random(len(t)) < self.kit.zeros] = 0.0
+        return {'speed_through_water': Series(stamps, found, arrivals)}
 
-def _wind(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    t, stamps, arrivals = _series(rng, kit, track, 1.0, start_ns)
-    c, s = np.cos(kit.wind_turn_rad), np.sin(kit.wind_turn_rad)
-    ahead, port = (np.interp(t, track.t, track.wind_m_s[:, k]) for k in (0, 1))
-    value = kit.wind_gain * np.stack([c * ahead - s * port, s * ahead + c * port], axis=1)
-    value = value + 0.2 * rng.standard_normal(value.shape)
-    return {'wind_apparent': Series(stamps, _stepped(value, 0.1), arrivals)}
+    def position(self) -> dict[str, Series]:
+        t, stamps, arrivals = self._series(self.kit.fix_every_s)
+        true = faulty_place(self.track, self.kit, self.setting.faults)
+        place = np.stack([np.interp(t, self.track.t, true[:, k]) for k in (0, 1)], axis=1)
+        if self.kit.fix == 'radar':
+            place = _radar(place, t, self.kit, self.rng)
+        else:
+            for k in (0, 1):
+                place[:, k] += band(self.rng, self.kit.wander_m, 80.0, 900.0, 14).at(t)
+                place[:, k] += band(self.rng, 0.06 * self.kit.wander_m, 10.0, 80.0, 10).at(t)
+                place[:, k] += 0.05 * self.rng.standard_normal(len(t))
+            for _ in range(self.rng.poisson(2.0)):
+                place[t > self.rng.uniform(t[0], t[-1])] += (
+                    self.kit.step_m * self.rng.standard_normal(2)
+                )
+        if self.kit.fix != 'geodetic':
+            return {'position': Series(stamps, _stepped(place, 0.01), arrivals)}
+        latitude, longitude = self.kit.origin_deg
+        north = np.degrees(place[:, 1] / EARTH_M)
+        east = np.degrees(place[:, 0] / (EARTH_M * np.cos(np.radians(latitude))))
+        degrees = np.stack([latitude + north, longitude + east], axis=1)
+        return {'position_geodetic': Series(stamps, _stepped(degrees, 1e-5 / 6.0), arrivals)}
 
+    def heading(self) -> dict[str, Series]:
+        t, stamps, arrivals = self._series(1.0)
+        value = np.interp(t, self.track.t, self.track.heading_rad)
+        value = value + np.radians(self.rng.normal(0.0, 0.4))
+        value = value + band(self.rng, np.radians(0.3), 100.0, 3000.0, 8).at(t)
+        if self.setting.faults.gyro is not None:
+            value = value + self.setting.faults.gyro(t)
+        value = _stepped(value, np.radians(0.1))
+        return {'heading': Series(stamps, (value + np.pi) % (2 * np.pi) - np.pi, arrivals)}
 
-def _depth(
-    track: Track, setting: Setting, kit: Kit, rng: np.random.Generator, start_ns: int
-) -> dict[str, Series]:
-    t, stamps, arrivals = _series(rng, kit, track, 2.0, start_ns)
-    bottom = setting.depth_m * (1.0 + band(rng, 0.02, 150.0, 2000.0, 8).at(t))
-    value = bottom + 0.1 * rng.standard_normal(len(t))
-    return {'depth': Series(stamps, _stepped(value, 0.1), arrivals)}
+    def shaft(self) -> dict[str, Series]:
+        found = {}
+        for k in range(self.setting.screw.shafts):
+            t, stamps, arrivals = self._series(1.0)
+            end = '' if k == 0 else f'_{k + 1}'
+            value = np.interp(t, self.track.t, self.track.shafts_rad_s[:, k])
+            found[f'shaft{end}'] = Series(stamps, _stepped(value, self.kit.turn_step), arrivals)
+            if self.setting.screw.drive == 'cpp':
+                pitch = _stepped(np.interp(t, self.track.t, self.track.pitch), 0.01)
+                found[f'pitch{end}'] = Series(stamps, pitch, arrivals)
+        return found
 
+    def wind_apparent(self) -> dict[str, Series]:
+        t, stamps, arrivals = self._series(1.0)
+        c, s = np.cos(self.kit.wind_turn_rad), np.sin(self.kit.wind_turn_rad)
+        ahead, port = (np.interp(t, self.track.t, self.track.wind_m_s[:, k]) for k in (0, 1))
+        value = self.kit.wind_gain * np.stack([c * ahead - s * port, s * ahead + c * port], axis=1)
+        value = value + 0.2 * self.rng.standard_normal(value.shape)
+        return {'wind_apparent': Series(stamps, _stepped(value, 0.1), arrivals)}
 
-_READERS = {
-    'speed_through_water': _log,
-    'position': _position,
-    'heading': _heading,
-    'shaft': _shaft,
-    'wind_apparent': _wind,
-    'depth': _depth,
-}
+    def depth(self) -> dict[str, Series]:
+        t, stamps, arrivals = self._series(2.0)
+        bottom = self.setting.depth_m * (1.0 + band(self.rng, 0.02, 150.0, 2000.0, 8).at(t))
+        value = bottom + 0.1 * self.rng.standard_normal(len(t))
+        return {'depth': Series(stamps, _stepped(value, 0.1), arrivals)}

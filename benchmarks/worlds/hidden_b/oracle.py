@@ -31,8 +31,15 @@ from benchmarks.worlds.hidden_b.oracle_priors import (
     possible,
     shares,
 )
-from benchmarks.worlds.hidden_b.oracle_rows import Run
-from benchmarks.worlds.hidden_b.oracle_sail import Change, made, run_of, sailed, shared, stated
+from benchmarks.worlds.hidden_b.oracle_sail import (
+    Change,
+    Run,
+    made,
+    run_of,
+    sailed,
+    shared,
+    stated,
+)
 from benchmarks.worlds.hidden_b.plans import PAIRS
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import steady_point
@@ -137,7 +144,7 @@ class Fit:
     names: Names
     signs: tuple[float, ...]
     z: Array
-    cost: float
+    cost: float = np.inf
     evidence: float = -np.inf
 
 
@@ -157,17 +164,15 @@ class _Oracle:
         self.scatters = [Scatter(run) for run in self.runs]
         need = float(np.interp(hull.speed_m_s, hull.grid_m_s, hull.still_n))
         first = run_of(known, hull, 0, hull.speed_m_s, 0.0)
-        self.steady = steady_point(first, need)[1:]
+        self.steady = steady_point(first, need)
         self.common = 2 * len(self.runs)
-        self._about(Fit((), (), np.zeros(self.common), np.inf))
+        self._about(Fit((), (), np.zeros(self.common)))
 
     # what would be seen
 
-    def _settings(
-        self, names: Names, signs: Sequence[float], z: Array, hull: Hull | None = None
-    ) -> list[Setting]:
+    def _settings(self, fit: Fit, hull: Hull | None = None) -> list[Setting]:
         hull = hull or self.stated.hull
-        effects = self._effects(names, signs, z)
+        effects, z = self._effects(fit), fit.z
         settings: list[Setting] = []
         for k, run in enumerate(self.runs):
             speed = run.speed_m_s * float(np.clip(1.0 + _SPEED_SD * z[2 * k], 0.2, 3.0))
@@ -180,15 +185,11 @@ class _Oracle:
             settings.append(setting)
         return settings
 
-    def _effects(self, names: Names, signs: Sequence[float], z: Array) -> list[Hidden]:
-        found, at = [], self.common
-        left = list(signs)
-        for name in names:
-            x = []
-            for size in SIZES[name]:
-                x.append(size.at(float(z[at]) if at < len(z) else 0.0, left.pop(0)))
-                at += 1
-            given = drawn(name, x)
+    def _effects(self, fit: Fit) -> list[Hidden]:
+        found = []
+        left = iter(zip(fit.z[self.common :].tolist(), fit.signs, strict=True))
+        for name in fit.names:
+            given = drawn(name, [size.at(*next(left)) for size in SIZES[name]])
             found.append(made(name, given, self.stated.hull, self.known, self.steady))
         return found
 
@@ -196,27 +197,23 @@ class _Oracle:
         sail = [sailed(setting, self.known) for setting in settings]
         return np.concatenate([run.predicted(each) for run, each in zip(self.runs, sail)])
 
-    def _shared(self, fit: Fit) -> Array:
-        """Return what is wrong alike in all runs, a column each, as it acts about a fit."""
+    def _about(self, fit: Fit) -> None:
+        """Linearize about a fit what is not fitted: what all runs share, speeds and courses."""
 
         def row(change: Change, hull: Hull) -> Array:
-            settings = self._settings(fit.names, fit.signs, fit.z, hull)
+            settings = self._settings(fit, hull)
             for each in settings:
                 change(each)
             return self._row(settings)
 
-        return shared(row, self.stated)
-
-    def _about(self, fit: Fit) -> None:
-        """Linearize about a fit what is not fitted: what all runs share, speeds and courses."""
-        self.shared = self._shared(fit)
-        self.slopes = self._slopes(fit.names, fit.signs, fit.z, range(self.common))
+        self.shared = shared(row, self.stated)
+        self.slopes = self._slopes(fit, range(self.common))
         covariance = summed(self._scatter(fit)[0], (EDDIES[1], HELM[1]))
         self.factor = np.linalg.cholesky(covariance)
 
     def _scatter(self, fit: Fit) -> tuple[list[Array], dict[str, Array]]:
         """Return covariances, apart, of eddies and of helm, and columns of smooth unknowns."""
-        settings = self._settings(fit.names, fit.signs, fit.z)
+        settings = self._settings(fit)
         parts = [
             scatter.about(setting, sailed(setting, self.known))
             for scatter, setting in zip(self.scatters, settings)
@@ -241,30 +238,24 @@ class _Oracle:
 
     # fits
 
-    def _residual(
-        self, names: Names, signs: Sequence[float], z: Array
-    ) -> tuple[Array, list[tuple[float, float]]]:
-        settings = self._settings(names, signs, z)
-        measured = np.concatenate([run.measured for run in self.runs])
-        return measured - self._row(settings), list(self._shoals(names, settings))
+    def _whitened(self, fit: Fit) -> Array:
+        return self._white(self._whole(fit)[0])
 
-    def _whitened(self, names: Names, signs: Sequence[float], z: Array) -> Array:
-        return self._white(self._whole(names, signs, z))
-
-    def _slopes(
-        self, names: Names, signs: Sequence[float], z: Array, which: Sequence[int]
-    ) -> Array:
+    def _slopes(self, fit: Fit, which: Sequence[int]) -> Array:
         """Return minus the slope of the residual (not whitened), echo sounders with it."""
-        columns, here = [], self._whole(names, signs, z)
+        columns, here = [], self._whole(fit)[0]
         for k in which:
-            step = np.zeros(len(z))
+            step = np.zeros(len(fit.z))
             step[k] = 3e-4 if k < self.common else 0.01
-            columns.append((here - self._whole(names, signs, z + step)) / step[k])
+            columns.append((here - self._whole(replace(fit, z=fit.z + step))[0]) / step[k])
         return np.stack(columns, axis=1) if columns else np.zeros((len(here), 0))
 
-    def _whole(self, names: Names, signs: Sequence[float], z: Array) -> Array:
-        off, shoals = self._residual(names, signs, z)
-        return np.concatenate([off, [each for each, _ in shoals]])
+    def _whole(self, fit: Fit) -> tuple[Array, list[float]]:
+        """Return by how much all is off, the echo sounders in their sd, and these sd."""
+        settings = self._settings(fit)
+        shoals = list(self._shoals(fit.names, settings))
+        off = np.concatenate([run.measured for run in self.runs]) - self._row(settings)
+        return np.concatenate([off, [each for each, _ in shoals]]), [sd for _, sd in shoals]
 
     def _white(self, columns: Array) -> Array:
         n = len(self.factor)
@@ -292,7 +283,7 @@ class _Oracle:
             for point in grid:
                 z = np.zeros(self.common + len(sizes))
                 z[self.common + np.array(varied, int)] = point
-                white = self._whitened(names, signs, z)
+                white = self._whitened(Fit(names, signs, z))
                 z[: self.common] = np.linalg.solve(precision, nuisance.T @ white)
                 white = white - nuisance @ z[: self.common]
                 tried.append(Fit(names, signs, z, float(white @ white + z @ z)))
@@ -306,53 +297,53 @@ class _Oracle:
 
         The slopes of speed and course stay those of the plain run.
         """
-        names, signs, z = fit.names, fit.signs, fit.z
-        which = [self.common + k for k in free(names)]
+        which = [self.common + k for k in free(fit.names)]
         used = [*range(self.common), *which]
-        white = self._whitened(names, signs, z)
-        cost, damping = float(white @ white + z @ z), 1e-3
+        white = self._whitened(fit)
+        fit, damping = replace(fit, cost=float(white @ white + fit.z @ fit.z)), 1e-3
         plain = self._white(self.slopes)
-        slopes = np.concatenate([plain, self._white(self._slopes(names, signs, z, which))], 1)
+        slopes = np.concatenate([plain, self._white(self._slopes(fit, which))], 1)
         for done in range(_STEPS):
             precision = slopes.T @ slopes + np.eye(len(used))
             turn = precision + damping * np.diag(np.diag(precision))
-            step = np.linalg.solve(turn, slopes.T @ white - z[used])
-            after = z.copy()
-            after[used] += np.clip(step, -1.5, 1.5)
-            after_white = self._whitened(names, signs, after)
-            after_cost = float(after_white @ after_white + after @ after)
-            if not after_cost < cost:
+            step = np.linalg.solve(turn, slopes.T @ white - fit.z[used])
+            z = fit.z.copy()
+            z[used] += np.clip(step, -1.5, 1.5)
+            after = replace(fit, z=z)
+            after_white = self._whitened(after)
+            cost = float(after_white @ after_white + z @ z)
+            if not cost < fit.cost:
                 damping = max(10.0 * damping, 0.01)
                 if damping > 1e2:
                     break
                 continue
-            gained, cost, z, white = cost - after_cost, after_cost, after, after_white
+            gained, fit, white = fit.cost - cost, replace(after, cost=cost), after_white
             damping *= 0.1
             # what more runs cost in any case is no hope of gaining more; far off, slopes mislead
             above = cost - floor
             hopeless = above > 4.0 * _WORTH_NATS and gained < 0.2 * above
             if gained < 0.3 or (done > 1 and hopeless):
                 break
-            slopes[:, self.common :] = self._white(self._slopes(names, signs, z, which))
-        return Fit(names, signs, z, cost)
+            slopes[:, self.common :] = self._white(self._slopes(fit, which))
+        return fit
 
     # evidence
 
     def _terms(self, fit: Fit) -> Terms:
         """Return what the evidence of a fit is made of."""
         around = self._scatter(fit) if set(fit.names) & _GUSTY else self.around
-        off, shoals = self._residual(fit.names, fit.signs, fit.z)
+        off, sds = self._whole(fit)
         sizes = range(self.common, len(fit.z))
-        slopes = self._slopes(fit.names, fit.signs, fit.z, sizes)
+        slopes = self._slopes(fit, sizes)
         slopes = np.concatenate([self.slopes, slopes], axis=1)
-        whole = np.concatenate([off, [each for each, _ in shoals]]) + slopes @ fit.z
+        whole = off + slopes @ fit.z
         halves = sum(size.sign for name in fit.names for size in SIZES[name])
-        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0]))) + halves * np.log(2.0)
+        less = float(np.sum(np.log(sds or [1.0]))) + halves * np.log(2.0)
         return Terms(*around, whole, slopes, less - float(np.log(shares()[fit.names])))
 
     def answer(self) -> dict[str, Any]:
         """Weigh all, and say what they come to."""
-        nothing = self._climbed(Fit((), (), np.zeros(self.common), np.inf))
+        nothing = self._climbed(Fit((), (), np.zeros(self.common)))
         begun = [fit for name in possible(self.known) for fit in self._begun((name,), {})]
         fits = [nothing, *self._all_climbed(begun, nothing.cost)]
         starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
@@ -452,5 +443,5 @@ class _Oracle:
                 'probability': chance,
                 'parameters': {name: {'value': v} for name, v in effect.parameters.items()},
             }
-            for effect in self._effects(fit.names, fit.signs, fit.z)
+            for effect in self._effects(fit)
         ]

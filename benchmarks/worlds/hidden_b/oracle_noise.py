@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.worlds.hidden_b.hulls import AIR, GRAVITY, Array
-from benchmarks.worlds.hidden_b.kit import Kit
-from benchmarks.worlds.hidden_b.oracle_rows import Means, Run
-from benchmarks.worlds.hidden_b.oracle_sail import Sailed
+from benchmarks.worlds.hidden_b.instruments import Kit
+from benchmarks.worlds.hidden_b.oracle_sail import Means, Run, Sailed
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.voyage import Track, sail_at
 
@@ -25,6 +24,13 @@ _SHAFT_SD = 0.01  # of the revs over those before the stop
 _GUST_LEAST = 0.26  # [m/s], root mean square of what is drawn, gusts of light air in it
 _GUST_SHARE = 0.19  # of the wind
 _SIDES = 0.88  # of a gust along the wind and one across, root mean square
+_MOVED = {  # what moves an input
+    'speed_through_water': ('log',),
+    'position': ('along', 'across'),
+    'heading': ('heading',),
+    'shaft': ('shaft',),
+    'wind_apparent': ('ahead', 'port'),
+}
 OUTSIDE = ('force, quick', 'force, slow', 'force and helm', 'log', 'gyro')
 
 
@@ -69,19 +75,12 @@ class Scatter:
         none = np.zeros((len(t), m))
         parts = []
         for name, means in self.run.means.items():
-            curves = [none]
-            if name == 'speed_through_water':
-                curves = [moves.get('log', none)]
-            elif name == 'position':
-                ways = [_summed(t, moves[k]) if k in moves else none for k in ('along', 'across')]
+            curves = [moves.get(each, none) for each in _MOVED[name]]
+            if name == 'position':
+                curves = [_summed(t, moves[k]) if k in moves else none for k in _MOVED[name]]
                 if 'east' in moves:
                     off = np.einsum('ij,jtm->itm', self.run.frame, [moves['east'], moves['north']])
-                    ways = [ways[0] + off[0], ways[1] + off[1]]
-                curves = ways
-            elif name == 'heading':
-                curves = [moves.get('heading', none)]
-            elif name == 'wind_apparent':
-                curves = [moves.get('ahead', none), moves.get('port', none)]
+                    curves = [curves[0] + off[0], curves[1] + off[1]]
             parts += [means.of(t, curve) for curve in curves]
         return np.concatenate(parts)
 

@@ -13,7 +13,7 @@ stand; `folding` folds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -159,10 +159,3 @@ def draw_screw(
         stopped=rng.uniform(0.5, 0.75),
         stagger_s=rng.uniform(0.0, 12.0) * quick if shafts > 1 else 0.0,
     )
-
-
-def with_drive(screw: Screw, drive: str, coulomb: float | None = None) -> Screw:
-    """
-    Return the same propeller, driven otherwise.
-    """
-    return replace(screw, drive=drive, coulomb=screw.coulomb if coulomb is None else coulomb)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,26 +88,26 @@ def ship_file(
         'baseline:',
         '  source: trials and tests',
     ]
+
+    def usual(speed: Array) -> Array:
+        """Return the resistance of hull and stopped propeller."""
+        return np.interp(speed, hull.grid_m_s, hull.still_n) + screw.drag_n(speed, steady)
+
     baseline = None
     if not stated.table and screw.drive not in ('locked', 'direct', 'cpp'):
-        baseline = _coefficients(hull, screw, steady, stated)
-    return '\n'.join(lines + (baseline or _table(hull, screw, steady, stated)))
+        baseline = _coefficients(hull, usual, stated)
+    return '\n'.join(lines + (baseline or _table(hull, usual, stated)))
 
 
-def usual_n(hull: Hull, screw: Screw, steady: tuple[float, float], speed: Array) -> Array:
-    """
-    Return the resistance of hull and stopped propeller.
-    """
-    drag = screw.drag_n(speed, steady)
-    return np.interp(speed, hull.grid_m_s, hull.still_n) + drag
+Law = Callable[[Array], Array]
 
 
-def _table(hull: Hull, screw: Screw, steady: tuple[float, float], stated: Stated) -> list[str]:
+def _table(hull: Hull, usual: Law, stated: Stated) -> list[str]:
     share = np.array([0.0, 0.05, 0.1, 0.15, *np.arange(0.2, 1.11, 0.075), 1.15, 1.3])
     speed = share * hull.speed_m_s
     miss = stated.misses
     wrong = stated.friction_sd * (0.8 * miss[2] + 0.6 * miss[3] * np.cos(np.pi * share))
-    found = usual_n(hull, screw, steady, speed) / (1.0 + wrong)
+    found = usual(speed) / (1.0 + wrong)
     found = np.maximum.accumulate(found)
     return [
         f'  speed_m_s: [{", ".join(f"{v:.5g}" for v in speed)}]',
@@ -116,15 +117,13 @@ def _table(hull: Hull, screw: Screw, steady: tuple[float, float], stated: Stated
     ]
 
 
-def _coefficients(
-    hull: Hull, screw: Screw, steady: tuple[float, float], stated: Stated
-) -> list[str] | None:
+def _coefficients(hull: Hull, usual: Law, stated: Stated) -> list[str] | None:
     """Return a baseline of coefficients, None where they would be no sensible ones."""
     share = np.array([0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.05, 1.15, 1.3])
     speed = share * hull.speed_m_s
     pressure = 0.5 * SEA[0] * hull.wetted_m2 * speed**2
     air = 0.5 * AIR * hull.frontal_m2 * hull.air_drag * speed**2
-    total = (usual_n(hull, screw, steady, speed) - air) / pressure
+    total = (usual(speed) - air) / pressure
     line = ittc57(speed * hull.length_m / SEA[1])
     allowance = 2e-4
     # what is left at the slowest speeds is friction

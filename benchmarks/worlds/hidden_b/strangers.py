@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden, hidden
+from benchmarks.worlds.hidden_b.effects import Draw, Hidden, changed, hidden
 from benchmarks.worlds.hidden_b.hulls import Array
-from benchmarks.worlds.hidden_b.setting import Setting
 
 
 def _along(u: Array) -> Array:
@@ -67,14 +64,14 @@ def bank(d: Draw) -> Hidden:
     def near(t: Array) -> Array:
         return np.exp(-0.5 * ((t - start - 0.5 * lasts) / (0.25 * lasts)) ** 2)
 
-    def apply(setting: Setting) -> None:
-        setting.timed.append(lambda t, u: 512.0 * area * u * np.abs(u) * near(t) * (t > 0.0))
-        middle = start + 0.5 * lasts
-        setting.helm.append(
-            lambda t: -sheer * (t - middle) / (0.25 * lasts) ** 2 * near(t) * (t > 0.0)
-        )
+    def drags(t: Array, u: Array) -> Array:
+        return 512.0 * area * u * np.abs(u) * near(t) * (t > 0.0)
 
-    return Hidden('bank', 'run', {'share': share, 'start_s': start}, apply)
+    def helm(t: Array) -> Array:
+        off = t - (start + 0.5 * lasts)
+        return -sheer * off / (0.25 * lasts) ** 2 * near(t) * (t > 0.0)
+
+    return hidden('bank', 'run', {'share': share, 'start_s': start}, timed=drags, helm=helm)
 
 
 def list_change(d: Draw) -> Hidden:
@@ -109,10 +106,7 @@ def gyro_ballistic(d: Draw) -> Hidden:
         quick = 1.0 - np.exp(-since / (0.15 * d.coast_s))
         return size * quick * np.cos(2 * np.pi * since / period) * np.exp(-since / 4000.0)
 
-    def apply(setting: Setting) -> None:
-        setting.faults = replace(setting.faults, gyro=law)
-
-    return Hidden('gyro_ballistic', 'sensor', {'angle_rad': float(size)}, apply)
+    return changed('gyro_ballistic', 'sensor', {'angle_rad': float(size)}, gyro=law)
 
 
 def aerated_log(d: Draw) -> Hidden:
@@ -123,19 +117,11 @@ def aerated_log(d: Draw) -> Hidden:
     def law(t: Array) -> Array:
         return share * np.sin(2 * np.pi * t / period + phase) * np.clip(t / (0.1 * period), 0, 1)
 
-    def apply(setting: Setting) -> None:
-        setting.faults = replace(setting.faults, swing=law)
-
-    return Hidden('aerated_log', 'run', {'share': share, 'period_s': period}, apply)
+    return changed('aerated_log', 'run', {'share': share, 'period_s': period}, swing=law)
 
 
-OUTSIDE = {
-    'swinging_force': swinging_force,
-    'dragging_anchor': dragging_anchor,
-    'ice': ice,
-    'bank': bank,
-    'list_change': list_change,
-    'caught_net': caught_net,
-    'gyro_ballistic': gyro_ballistic,
-    'aerated_log': aerated_log,
-}
+_MAKERS = (
+    swinging_force, dragging_anchor, ice, bank, list_change, caught_net, gyro_ballistic,
+    aerated_log,
+)  # fmt: skip
+OUTSIDE = {make.__name__: make for make in _MAKERS}

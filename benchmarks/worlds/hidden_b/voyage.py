@@ -10,7 +10,6 @@ import numpy as np
 
 from benchmarks.worlds.hidden_b.hulls import AIR, Array
 from benchmarks.worlds.hidden_b.kernel import air, go
-from benchmarks.worlds.hidden_b.screws import Screw
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.weather import band, gusts
 
@@ -51,9 +50,9 @@ class Track:
     steady: tuple[float, float]
 
 
-def steady_point(setting: Setting, need_n: float) -> tuple[Screw, float, float]:
+def steady_point(setting: Setting, need_n: float) -> tuple[float, float]:
     """
-    Return the propeller, its revs and its torque at the steady speed.
+    Return revs and torque of each propeller at the steady speed.
 
     Parameters
     ----------
@@ -64,7 +63,7 @@ def steady_point(setting: Setting, need_n: float) -> tuple[Screw, float, float]:
     screw = setting.screw
     each = max(need_n, 1.0) / (1.0 - screw.deduction) / screw.shafts
     revs = screw.revs_for(each, setting.speed_m_s)
-    return screw, revs, screw.loads(revs, setting.speed_m_s)[1]
+    return revs, screw.loads(revs, setting.speed_m_s)[1]
 
 
 def sail(setting: Setting) -> Track:
@@ -117,7 +116,7 @@ def sail_at(setting: Setting, t: Array, push_m_s: float = 0.0) -> Track:
     ]))  # fmt: skip
     at_first = sum(float(f(np.array([-1.0]), np.array([u]))[0]) for f in setting.timed)
     need = float(np.interp(u, hull.grid_m_s, table)) - mean + at_first
-    screw, *steady = steady_point(setting, need)
+    screw, steady = setting.screw, steady_point(setting, need)
     inertia = setting.mass_kg * (1.0 + setting.n_r)
     body = np.array([hull.grid_m_s[1], inertia, 1.0 + setting.n_r, still_air])
     revs, rows = np.full(screw.shafts, steady[0]), np.empty((3, n))
@@ -133,9 +132,7 @@ def sail_at(setting: Setting, t: Array, push_m_s: float = 0.0) -> Track:
     steps = 0.5 * (ground[1:] + ground[:-1]) * dt
     place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     apparent = np.stack([ahead - water, port - sideways], 1)
-    return Track(
-        t, water, ground, place, heading, 2 * pi * turns, pitch, apparent, force, (*steady,)
-    )
+    return Track(t, water, ground, place, heading, 2 * pi * turns, pitch, apparent, force, steady)
 
 
 def _heading(setting: Setting, t: Array) -> tuple[Array, Array]:

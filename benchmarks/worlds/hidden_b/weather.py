@@ -45,12 +45,6 @@ class Sinusoids:
             found -= size * omega * np.sin(omega * np.asarray(t) + phase)
         return found
 
-    def times(self, factor: float) -> Sinusoids:
-        """
-        Return them all larger by a factor.
-        """
-        return Sinusoids(self.size * factor, self.omega, self.phase)
-
 
 def band(rng: np.random.Generator, sd: float, short_s: float, long_s: float, n: int) -> Sinusoids:
     """

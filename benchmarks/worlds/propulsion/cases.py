@@ -6,7 +6,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Case:
         return SEAS[self.sea]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Plan:
     """
     What a case does.
@@ -69,85 +69,67 @@ class Plan:
     ----------
     at
         When the first thing happens [s], PRE_ROLL_S included.
+    orders
+        In the making.
     spoilt_at
         When a glide is spoilt; beyond the record where it is not.
     pitch_heard
         Whether the pitch of a controllable propeller is on a topic.
     """
 
-    drive: Drive
-    hold: Hold
-    shafts: int
-    speed_m_s: float
-    orders: Orders
-    at: int
-    spoilt_at: int
-    pitch_heard: bool
-
-
-@dataclass
-class _Draft:
-    """Orders in the making."""
-
     hull: Hull
     random: np.random.Generator
     at: int
-    seconds: int
     drive: Drive
     hold: Hold
     shafts: int
-    spoilt_at: int
-    pitch_heard: bool = False
-
-    def __post_init__(self) -> None:
-        shape = (self.shafts, self.seconds)
-        self.mode = np.full(shape, int(Mode.AHEAD))
-        self.level = np.ones(shape)
-        self.pitch = np.ones(shape)
-        self.turn = np.zeros(self.seconds)
+    orders: Orders
+    pitch_heard: bool
+    spoilt_at: int = 1 << 40
+    speed_m_s: float = 0.0
 
     def ramp(self, start: int, length: int, goal: float) -> None:
         """Bring the revs from what they are to a goal."""
-        begin = self.level[0, start - 1]
-        self.level[:, start : start + length] = np.linspace(begin, goal, length)
-        self.level[:, start + length :] = goal
+        level = self.orders.level
+        level[:, start : start + length] = np.linspace(level[0, start - 1], goal, length)
+        level[:, start + length :] = goal
 
 
-def _off(draft: _Draft) -> None:
-    draft.mode[:, draft.at :] = Mode.OFF
+def _off(plan: Plan) -> None:
+    plan.orders.mode[:, plan.at :] = Mode.OFF
 
 
-def _braked(draft: _Draft) -> None:
-    wait = draft.at + int(draft.random.integers(2, 12))
-    draft.mode[:, draft.at : wait] = Mode.OFF
-    draft.mode[:, wait:] = Mode.BRAKE
+def _braked(plan: Plan) -> None:
+    wait = plan.at + int(plan.random.integers(2, 12))
+    plan.orders.mode[:, plan.at : wait] = Mode.OFF
+    plan.orders.mode[:, wait:] = Mode.BRAKE
 
 
-def _zero_pitch(draft: _Draft) -> None:
-    draft.hold = Hold.REVS
-    draft.mode[:, draft.at :] = Mode.KEPT
-    draft.pitch[:, draft.at :] = 0.0
+def _zero_pitch(plan: Plan) -> None:
+    plan.hold = Hold.REVS
+    plan.orders.mode[:, plan.at :] = Mode.KEPT
+    plan.orders.pitch[:, plan.at :] = 0.0
     # revs are brought down after the pitch, as a combinator does
-    draft.ramp(draft.at + 5, 20, float(draft.random.uniform(0.35, 1.0)))
+    plan.ramp(plan.at + 5, 20, float(plan.random.uniform(0.35, 1.0)))
 
 
-def _staggered(draft: _Draft) -> None:
-    when = draft.at
-    for shaft in range(draft.shafts):
-        draft.mode[shaft, when:] = Mode.OFF
-        when += int(np.exp(draft.random.uniform(np.log(4.0), np.log(180.0))))
+def _staggered(plan: Plan) -> None:
+    when = plan.at
+    for shaft in range(plan.shafts):
+        plan.orders.mode[shaft, when:] = Mode.OFF
+        when += int(np.exp(plan.random.uniform(np.log(4.0), np.log(180.0))))
 
 
-def _slow(draft: _Draft) -> None:
-    draft.ramp(draft.at, 60, 0.3)
-    draft.mode[:, draft.at + 60 :] = Mode.OFF
+def _slow(plan: Plan) -> None:
+    plan.ramp(plan.at, 60, 0.3)
+    plan.orders.mode[:, plan.at + 60 :] = Mode.OFF
 
 
-def _regenerating(draft: _Draft) -> None:
-    draft.mode[:, draft.at :] = Mode.REGENERATE
+def _regenerating(plan: Plan) -> None:
+    plan.orders.mode[:, plan.at :] = Mode.REGENERATE
 
 
-STOPS: dict[str, Callable[[_Draft], None]] = {
+STOPS: dict[str, Callable[[Plan], None]] = {
     'direct drive, fuel cut': _off,
     'declutched': _off,
     'declutched, shaft locked': _braked,
@@ -159,82 +141,73 @@ STOPS: dict[str, Callable[[_Draft], None]] = {
 }
 
 
-def _slow_down(fraction: float) -> Callable[[_Draft], None]:
-    def act(draft: _Draft) -> None:
-        draft.ramp(draft.at, int(draft.random.integers(5, 90)), fraction)
-
-    return act
+def _slow_down(plan: Plan, fraction: float) -> None:
+    plan.ramp(plan.at, int(plan.random.integers(5, 90)), fraction)
 
 
-def _turn(degrees: float) -> Callable[[_Draft], None]:
-    def act(draft: _Draft) -> None:
-        draft.hold = Hold.POWER
-        rate = draft.random.uniform(0.12, 0.35) * 6.0 / draft.hull.length_m
-        rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
-        length = int(np.radians(degrees) / rate)
-        side = draft.random.choice([-1.0, 1.0])
-        shape = np.ones(length)
-        edge = min(15, length // 3)
-        shape[:edge] = np.linspace(0.0, 1.0, edge)
-        shape[-edge:] = shape[:edge][::-1]
-        shape *= np.radians(degrees) / shape.sum()
-        draft.turn[draft.at : draft.at + length] = side * shape
-
-    return act
+def _turn(plan: Plan, degrees: float) -> None:
+    plan.hold = Hold.POWER
+    rate = plan.random.uniform(0.12, 0.35) * 6.0 / plan.hull.length_m
+    rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
+    length = int(np.radians(degrees) / rate)
+    side = plan.random.choice([-1.0, 1.0])
+    shape = np.ones(length)
+    edge = min(15, length // 3)
+    shape[:edge] = np.linspace(0.0, 1.0, edge)
+    shape[-edge:] = shape[:edge][::-1]
+    shape *= np.radians(degrees) / shape.sum()
+    plan.orders.turn[plan.at : plan.at + length] = side * shape
 
 
-def _crash_stop(draft: _Draft) -> None:
-    wait = draft.at + int(draft.random.integers(5, 90))
-    if draft.pitch_heard:
-        draft.pitch[:, draft.at :] = -0.6
-        draft.hold = Hold.REVS
+def _crash_stop(plan: Plan) -> None:
+    wait = plan.at + int(plan.random.integers(5, 90))
+    if plan.pitch_heard:
+        plan.orders.pitch[:, plan.at :] = -0.6
+        plan.hold = Hold.REVS
         return
-    draft.mode[:, draft.at : wait] = Mode.OFF
-    draft.mode[:, wait:] = Mode.ASTERN
+    plan.orders.mode[:, plan.at : wait] = Mode.OFF
+    plan.orders.mode[:, wait:] = Mode.ASTERN
 
 
-def _kick(mode: Mode) -> Callable[[_Draft], None]:
-    def act(draft: _Draft) -> None:
-        long = 1.0 if draft.hull.length_m > 50 else 0.5
-        draft.spoilt_at = draft.at + int(long * draft.random.uniform(200, 600))
-        end = draft.spoilt_at + int(draft.random.uniform(20, 60))
-        draft.mode[:, draft.at :] = Mode.OFF
-        draft.mode[:, draft.spoilt_at : end] = mode
-        draft.level[:, draft.spoilt_at : end] = draft.random.uniform(0.4, 0.7)
-        if mode is Mode.AHEAD:
-            draft.hold = Hold.REVS
-
-    return act
+def _kick(plan: Plan, mode: Mode) -> None:
+    long = 1.0 if plan.hull.length_m > 50 else 0.5
+    plan.spoilt_at = plan.at + int(long * plan.random.uniform(200, 600))
+    end = plan.spoilt_at + int(plan.random.uniform(20, 60))
+    plan.orders.mode[:, plan.at :] = Mode.OFF
+    plan.orders.mode[:, plan.spoilt_at : end] = mode
+    plan.orders.level[:, plan.spoilt_at : end] = plan.random.uniform(0.4, 0.7)
+    if mode is Mode.AHEAD:
+        plan.hold = Hold.REVS
 
 
-def _one_of_two(draft: _Draft) -> None:
-    draft.mode[0, draft.at :] = Mode.OFF
+def _one_of_two(plan: Plan) -> None:
+    plan.orders.mode[0, plan.at :] = Mode.OFF
 
 
-def _nothing(draft: _Draft) -> None:
+def _nothing(plan: Plan) -> None:
     pass
 
 
-def _harbour(draft: _Draft) -> None:
-    draft.hold = Hold.REVS
-    when = draft.at
+def _harbour(plan: Plan) -> None:
+    plan.hold = Hold.REVS
+    when = plan.at
     for level in (0.75, 0.55, 0.4, 0.28):
-        draft.ramp(when, int(draft.random.integers(10, 40)), level)
-        when += int(draft.random.uniform(150, 500))
-    draft.mode[:, when:] = Mode.OFF
+        plan.ramp(when, int(plan.random.integers(10, 40)), level)
+        when += int(plan.random.uniform(150, 500))
+    plan.orders.mode[:, when:] = Mode.OFF
 
 
-OTHERS: dict[str, Callable[[_Draft], None]] = {
-    'slow-down to 80 %': _slow_down(0.8),
-    'slow-down to 60 %': _slow_down(0.6),
-    'slow-down to 50 %': _slow_down(0.5),
-    'slow-down to 30 %': _slow_down(0.3),
-    'turn of 35 deg': _turn(35.0),
-    'turn of 60 deg': _turn(60.0),
-    'turn of 90 deg': _turn(90.0),
+OTHERS: dict[str, Callable[[Plan], None]] = {
+    'slow-down to 80 %': partial(_slow_down, fraction=0.8),
+    'slow-down to 60 %': partial(_slow_down, fraction=0.6),
+    'slow-down to 50 %': partial(_slow_down, fraction=0.5),
+    'slow-down to 30 %': partial(_slow_down, fraction=0.3),
+    'turn of 35 deg': partial(_turn, degrees=35.0),
+    'turn of 60 deg': partial(_turn, degrees=60.0),
+    'turn of 90 deg': partial(_turn, degrees=90.0),
     'crash stop': _crash_stop,
-    'kick ahead in a glide': _kick(Mode.AHEAD),
-    'kick astern in a glide': _kick(Mode.ASTERN),
+    'kick ahead in a glide': partial(_kick, mode=Mode.AHEAD),
+    'kick astern in a glide': partial(_kick, mode=Mode.ASTERN),
     'one shaft of two': _one_of_two,
     'shallow water': _nothing,
     'current changes': _nothing,
@@ -249,39 +222,26 @@ _DRIVES = {
 }
 
 
-def plan(case: Case, random: np.random.Generator) -> Plan:
+def planned(case: Case, random: np.random.Generator) -> Plan:
     """
     Draw what a case does.
     """
     hull = case.ship
-    lead = int(random.uniform(720, 2100))
-    after = 3000 if hull.length_m > 50 else 1800
-    draft = _Draft(
-        hull=hull,
-        random=random,
-        at=PRE_ROLL_S + lead,
-        seconds=PRE_ROLL_S + lead + after,
-        drive=_drive(case, random),
-        hold=Hold(int(random.integers(3))),
-        shafts=_shafts(case, hull, random),
-        spoilt_at=1 << 40,
-        pitch_heard=case.kind == 'pitch to zero, pitch heard'
-        or (case.kind == 'crash stop' and hull.name == 'ferry'),
-    )
-    {**STOPS, **OTHERS}[case.kind](draft)
-    return Plan(
-        draft.drive,
-        draft.hold,
-        draft.shafts,
-        hull.service_m_s * float(random.uniform(0.65, 1.0)),
-        Orders(draft.mode, draft.level, draft.pitch, draft.turn),
-        draft.at,
-        draft.spoilt_at,
-        draft.pitch_heard,
-    )
+    at = PRE_ROLL_S + int(random.uniform(720, 2100))
+    seconds = at + (3000 if hull.length_m > 50 else 1800)
+    drive, hold = _drive(case), Hold(int(random.integers(3)))
+    shape = (_shafts(case, hull), seconds)
+    mode = np.full(shape, int(Mode.AHEAD))
+    orders = Orders(mode, np.ones(shape), np.ones(shape), np.zeros(seconds))
+    heard = case.kind == 'pitch to zero, pitch heard'
+    heard |= case.kind == 'crash stop' and hull.name == 'ferry'
+    plan = Plan(hull, random, at, drive, hold, shape[0], orders, heard)
+    {**STOPS, **OTHERS}[case.kind](plan)
+    plan.speed_m_s = hull.service_m_s * float(random.uniform(0.65, 1.0))
+    return plan
 
 
-def _drive(case: Case, random: np.random.Generator) -> Drive:
+def _drive(case: Case) -> Drive:
     if case.kind in _DRIVES:
         return _DRIVES[case.kind]
     small = GEARBOX if case.hull == 'workboat' else CLUTCHED
@@ -290,7 +250,7 @@ def _drive(case: Case, random: np.random.Generator) -> Drive:
     return DIRECT if case.hull == 'tanker' else small
 
 
-def _shafts(case: Case, hull: Hull, random: np.random.Generator) -> int:
+def _shafts(case: Case, hull: Hull) -> int:
     if case.kind == 'shafts one by one':
         return 4 if hull.name == 'workboat' else 2
     return 2 if case.kind == 'one shaft of two' else hull.shafts

@@ -9,9 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from benchmarks.worlds.propulsion.drive import Drive, Hold, Steady
+from benchmarks.worlds.propulsion.drive import CAMBER_RAD, Drive, Hold, Steady, thrust_and_torque
 from benchmarks.worlds.propulsion.hull import Hull, air_drag, water_drag
-from benchmarks.worlds.propulsion.propeller import CAMBER_RAD, thrust_and_torque
 
 STEP_S = 0.05
 EVERY = 4  # steps between stored rows

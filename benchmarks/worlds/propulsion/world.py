@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from benchmarks.worlds.propulsion.cases import PRE_ROLL_S, STOPS, Case, Plan, disturbed, plan
+from benchmarks.worlds.propulsion.cases import PRE_ROLL_S, STOPS, Case, Plan, disturbed, planned
 from benchmarks.worlds.propulsion.drive import Steady, steady
 from benchmarks.worlds.propulsion.hull import Hull, water_drag
 from benchmarks.worlds.propulsion.instruments import EPOCH_NS, fit_out, read
@@ -50,7 +50,6 @@ class Truth:
     idle: np.ndarray
     glide: tuple[float, float] | None
     first_speed_m_s: float
-    seconds: float
     speed: Float64
     retardation: Float64
 
@@ -67,7 +66,6 @@ class World:
     truth: Truth
     motion: Motion
     start: Steady
-    plan: Plan
 
 
 def build(case: Case) -> World:
@@ -76,19 +74,19 @@ def build(case: Case) -> World:
     """
     random = case.random
     hull = case.ship
-    plan_ = plan(case, random)
-    seconds = plan_.orders.mode.shape[1]
+    plan = planned(case, random)
+    seconds = plan.orders.mode.shape[1]
     course = float(random.uniform(-np.pi, np.pi))
     around, weather = surroundings(hull, case.weather, course, seconds, random)
-    around = disturbed(case, around, plan_.at, course, random)
-    start = steady(hull, plan_.speed_m_s, plan_.shafts, weather.drag_n(hull, plan_.speed_m_s))
-    rated = steady(hull, hull.service_m_s, plan_.shafts)
-    whole = move(hull, plan_.drive, plan_.hold, start, rated, plan_.orders, around, course)
+    around = disturbed(case, around, plan.at, course, random)
+    start = steady(hull, plan.speed_m_s, plan.shafts, weather.drag_n(hull, plan.speed_m_s))
+    rated = steady(hull, hull.service_m_s, plan.shafts)
+    whole = move(hull, plan.drive, plan.hold, start, rated, plan.orders, around, course)
     motion = _after(whole, PRE_ROLL_S)
-    sea = waves(hull, case.weather, weather.head, plan_.speed_m_s)
-    blocks = read(motion, fit_out(random), sea, plan_.pitch_heard, start.omega, random)
-    truth = _truth(case, plan_, motion, start, weather)
-    return World(case, ship_file(hull, random), blocks, truth, motion, start, plan_)
+    sea = waves(hull, case.weather, weather.head, plan.speed_m_s)
+    blocks = read(motion, fit_out(random), sea, plan.pitch_heard, start.omega, random)
+    truth = _truth(case, plan, motion, start, weather)
+    return World(case, ship_file(hull, random), blocks, truth, motion, start)
 
 
 def ship_file(hull: Hull, random: np.random.Generator) -> Ship:
@@ -133,22 +131,14 @@ def seconds(stamp_ns: int) -> float:
 def _after(motion: Motion, start_s: int) -> Motion:
     """The part that is read; times, places and yaw go on from it."""
     first = round(start_s / ROW_S)
-    return Motion(
-        motion.time_s[first:] - start_s,
-        *(
-            getattr(motion, name)[..., first:]
-            for name in (
-                'speed', 'east', 'north', 'yaw', 'drift', 'thrust', 'drive', 'engaged', 'drag',
-                'omega', 'pitch',
-            )
-        ),
-    )  # fmt: skip
+    read = {each.name: getattr(motion, each.name)[..., first:] for each in fields(motion)}
+    return Motion(**{**read, 'time_s': read['time_s'] - start_s})
 
 
-def _truth(case: Case, plan_: Plan, motion: Motion, start: Steady, weather: Weather) -> Truth:
+def _truth(case: Case, plan: Plan, motion: Motion, start: Steady, weather: Weather) -> Truth:
     hull = case.ship
-    stop = plan_.at - PRE_ROLL_S
-    spoilt = plan_.spoilt_at - PRE_ROLL_S
+    stop = plan.at - PRE_ROLL_S
+    spoilt = plan.spoilt_at - PRE_ROLL_S
     driven = motion.drive > DRIVEN_SHARE * start.thrust * start.shafts
     gliding = (motion.engaged == 0.0) & ~driven & (motion.speed > hull.end_m_s)
     pushes_not = (motion.engaged > 0.0) & (motion.drive == 0.0)
@@ -171,7 +161,6 @@ def _truth(case: Case, plan_: Plan, motion: Motion, start: Steady, weather: Weat
         pushes_not | (motion.speed <= hull.end_m_s),
         glide,
         float(motion.speed[before_stop].mean()) if before_stop.any() else start.speed_m_s,
-        float(time[-1]),
         speed,
         force / hull.mass_kg,
     )

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.worlds.hidden_b import strangers as b
-from benchmarks.worlds.hidden_b.effects import Draw, Hidden, hidden
+from benchmarks.worlds.hidden_b.effects import Draw, Hidden, changed, hidden
 from benchmarks.worlds.hidden_b.hulls import SEA, Array
 from benchmarks.worlds.hidden_b.setting import Setting
 
@@ -147,11 +147,10 @@ def log_recovers(d: Draw) -> Hidden:
     share = d.sign * d.rng.uniform(0.04, 0.12) * d.size
     tau = d.rng.uniform(0.12, 0.35) * d.coast_s
 
-    def apply(setting: Setting) -> None:
-        swing = lambda t: share * np.exp(-np.maximum(t, 0.0) / tau)  # noqa: E731
-        setting.faults = replace(setting.faults, swing=swing)
+    def law(t: Array) -> Array:
+        return share * np.exp(-np.maximum(t, 0.0) / tau)
 
-    return Hidden('log_recovers', 'sensor', {'share': share, 'decay_s': tau}, apply)
+    return changed('log_recovers', 'sensor', {'share': share, 'decay_s': tau}, swing=law)
 
 
 def sloshing(d: Draw) -> Hidden:
@@ -200,43 +199,25 @@ def two_at_once(d: Draw) -> Hidden:
     return Hidden('two_at_once', 'hull', {**one.parameters, **other.parameters}, apply)
 
 
-PLAIN: dict[str, Make] = {
-    each.__name__: each
-    for each in (
-        kelp_below,
-        rail_above,
-        dry_friction,
-        film,
-        steep,
-        hump,
-        bubbles,
-        flooding,
-        flap,
-        pull_of_the_earth,
-        drag_of_the_earth,
-        log_recovers,
-    )
-}
+# where a plain one acts, by which variable, and by which curve
+_KINDS = (
+    (kelp_below, 'force', 'speed', 'step'),
+    (rail_above, 'force', 'speed', 'step'),
+    (dry_friction, 'force', 'speed', 'constant'),
+    (film, 'force', 'speed', 'power'),
+    (steep, 'force', 'speed', 'power'),
+    (hump, 'force', 'speed', 'hump'),
+    (bubbles, 'force', 'time', 'decay'),
+    (flooding, 'force', 'time', 'ramp'),
+    (flap, 'force', 'time', 'step'),
+    (pull_of_the_earth, 'force', 'heading', 'periodic'),
+    (drag_of_the_earth, 'force', 'heading', 'periodic'),
+    (log_recovers, 'log', 'time', 'decay'),
+)
+PLAIN: dict[str, Make] = {make.__name__: make for make, *_ in _KINDS}
+CURVES = {make.__name__: tuple(kind) for make, *kind in _KINDS}
 OTHER: dict[str, Make] = {
     **b.OUTSIDE,
-    'sloshing': sloshing,
-    'late_and_slow': late_and_slow,
-    'never_alike': never_alike,
-    'two_at_once': two_at_once,
+    **{each.__name__: each for each in (sloshing, late_and_slow, never_alike, two_at_once)},
 }
 STRANGERS = PLAIN | OTHER
-CURVES = {
-    'kelp_below': ('force', 'speed', 'step'),
-    'rail_above': ('force', 'speed', 'step'),
-    'dry_friction': ('force', 'speed', 'constant'),
-    'film': ('force', 'speed', 'power'),
-    'steep': ('force', 'speed', 'power'),
-    'hump': ('force', 'speed', 'hump'),
-    'bubbles': ('force', 'time', 'decay'),
-    'flooding': ('force', 'time', 'ramp'),
-    'flap': ('force', 'time', 'step'),
-    'pull_of_the_earth': ('force', 'heading', 'periodic'),
-    'drag_of_the_earth': ('force', 'heading', 'periodic'),
-    'log_recovers': ('log', 'time', 'decay'),
-}
-"""Where a plain one acts, by which variable, and by which curve."""

@@ -8,13 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.worlds.hidden_b.cases import EPOCH_NS, LEAST, calm, fresh, matters, steady_of
+from benchmarks.worlds.hidden_b import cases as world_b
 from benchmarks.worlds.hidden_b.effects import FREE, Draw, Hidden
-from benchmarks.worlds.hidden_b.hulls import Array, draw_hull
-from benchmarks.worlds.hidden_b.instruments import INPUTS, Recording, read
-from benchmarks.worlds.hidden_b.kit import Kit, draw_kit
-from benchmarks.worlds.hidden_b.measure import quiet, run_down_s, seen
-from benchmarks.worlds.hidden_b.screws import draw_screw
+from benchmarks.worlds.hidden_b.hulls import Array
+from benchmarks.worlds.hidden_b.instruments import INPUTS, Kit, Recording, read
 from benchmarks.worlds.hidden_b.setting import Setting
 from benchmarks.worlds.hidden_b.shipfile import draw_stated, ship_file
 from benchmarks.worlds.hidden_b.voyage import sail
@@ -33,8 +30,6 @@ class Case:
 
     Attributes
     ----------
-    stranger
-        '' without.
     ship_file
     kit
     plain, settings
@@ -43,7 +38,6 @@ class Case:
         Of the stranger in the first run.
     """
 
-    stranger: str
     ship_file: str
     kit: Kit
     plain: tuple[Setting, ...]
@@ -55,7 +49,7 @@ class Case:
         Return what the instruments say of a run.
         """
         setting = self.settings[run]
-        start = EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
+        start = world_b.EPOCH_NS + round((setting.clock_s - setting.lead_s) * 1e9)
         return read(sail(setting), setting, self.kit, INPUTS, start)
 
     def shown(self, run: int) -> tuple[Array, Array, Array, Array]:
@@ -65,8 +59,8 @@ class Case:
         """
         found = []
         for settings in (self.plain, self.settings):
-            track = sail(quiet(settings[run]))
-            found.append((track.t, *seen(track, settings[run], self.kit)))
+            track = sail(world_b.quiet(settings[run]))
+            found.append((track.t, *world_b.seen(track, settings[run], self.kit)))
         (t, log, ground), (_, log_with, ground_with) = found
         return t, log_with - log, ground_with - ground, ground
 
@@ -78,28 +72,20 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
     """
     number = list(STRANGERS).index(stranger) if stranger else _NONE
     rng = np.random.default_rng([seed, number, ship])
-    hull = draw_hull(rng, FREE)
-    screw = draw_screw(rng, hull.drive, hull.diameter_m, hull.shafts, hull.time_s)
-    coast = float(np.clip(rng.uniform(2.0, 3.5) * hull.time_s, 180.0, 3600.0))
-    lead = rng.uniform(900.0, 1500.0) if hull.time_s > 100.0 else rng.uniform(500.0, 900.0)
-    kit = draw_kit(rng, hull.time_s, hull.speed_m_s, hull.draught_m, coast * hull.speed_m_s)
+    board, kit = world_b.draw_ship(rng, FREE, (1500.0, 900.0))
+    hull = board['hull']
     if stranger == 'gyro_ballistic':
         kit = replace(kit, fix='radar', fix_every_s=3.0)
-    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
     clock = rng.uniform(6.0, 14.0) * 3600.0
     first = rng.uniform(-np.pi, np.pi)
     days = [draw_weather(rng, hull.time_s, hull.speed_m_s) for _ in range(3)]
     bases = [
         Setting(
-            hull=hull,
-            screw=screw,
+            **board,
             weather=days[2 if run == LATER else run % 2],
             speed_m_s=hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.65, 1.0)),
             heading_rad=first if run == 0 else rng.uniform(-np.pi, np.pi),
             first_rad=first,
-            lead_s=round(lead / step) * step,
-            coast_s=coast,
-            step_s=step,
             clock_s=clock + run * 86400.0,
             seed=(seed, number, ship, run),
             depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),
@@ -108,25 +94,27 @@ def case(stranger: str, ship: int, seed: int = SEED) -> Case:
     ]
     for which in (0, 1, 2):
         legs = tuple(base for base in bases if base.weather is days[which])
-        weather, kit, _ = calm(legs[:3], kit)
+        weather, kit, _ = world_b.calm(legs[:3], kit)
         bases = [replace(b, weather=weather) if b.weather is days[which] else b for b in bases]
-    key, steady = (seed, number, ship), steady_of(bases[0])
-    text = ship_file(hull, screw, steady, run_down_s(bases[0]), draw_stated(rng), ship)
-    settings = [fresh(base) for base in bases]
+    key, steady = (seed, number, ship), world_b.steady_of(bases[0])
+    text = ship_file(
+        hull, board['screw'], steady, world_b.run_down_s(bases[0]), draw_stated(rng), ship
+    )
+    settings = [world_b.fresh(base) for base in bases]
     hidden: Hidden | None = None
     if stranger:
-        size, _ = matters(
+        size, _ = world_b.matters(
             lambda size: _made(stranger, size, bases[0], steady, key, 0),
             bases[0],
             kit,
-            1.5 * LEAST,
+            1.5 * world_b.LEAST,
         )
         for run, setting in enumerate(settings):
             made = _made(stranger, size, bases[0], steady, key, run)
             hidden = hidden or made
             made.apply(setting)
     found = {} if hidden is None else hidden.parameters
-    return Case(stranger, text, kit, tuple(bases), tuple(settings), found)
+    return Case(text, kit, tuple(bases), tuple(settings), found)
 
 
 def _made(

@@ -11,9 +11,15 @@ import pytest
 from benchmarks.worlds.hidden.effect import Leg
 from benchmarks.worlds.hidden.hull import draw_hull
 from benchmarks.worlds.hidden.library import FIRST_SHELF, SECOND_SHELF
-from benchmarks.worlds.hidden.motion import TABLE_POINTS, Drive, integrate
 from benchmarks.worlds.hidden.outside import OUTSIDE
-from benchmarks.worlds.hidden.sailing import Disturbance, World, sail
+from benchmarks.worlds.hidden.sailing import (
+    TABLE_POINTS,
+    Disturbance,
+    Drive,
+    World,
+    integrate,
+    sail,
+)
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from benchmarks.worlds.hidden_b import cases
-from benchmarks.worlds.hidden_b.facts import arguments, draw_facts
+from benchmarks.worlds.hidden_b.plans import arguments, draw_facts
 from benchmarks.worlds.hidden_b.voyage import sail
 from shipdrag_ros.samples import Channel
 

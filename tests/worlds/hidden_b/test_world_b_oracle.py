@@ -9,8 +9,7 @@ import pytest
 from benchmarks.worlds.hidden_b import cases
 from benchmarks.worlds.hidden_b.instruments import Series
 from benchmarks.worlds.hidden_b.oracle import diagnose
-from benchmarks.worlds.hidden_b.oracle_rows import _means
-from benchmarks.worlds.hidden_b.oracle_sail import made, run_of, stated
+from benchmarks.worlds.hidden_b.oracle_sail import _means, made, run_of, stated
 
 # even, one run: a stream, a radar that is wrong in scale, and nothing
 CURRENT, SCALE, NOTHING = 4, 188, 34

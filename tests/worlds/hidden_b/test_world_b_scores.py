@@ -30,11 +30,11 @@ def test_the_scoreboard_asks_and_reveals_world_b(monkeypatch) -> None:
 @pytest.mark.parametrize('name', ['a', 'b'])
 @pytest.mark.parametrize(('off', 'cover', 'chi2'), [(0.0, 1.0, 0.0), (3.0, 0.0, 9.0)])
 def test_the_band_is_held_against_the_true_curve(off, cover, chi2, name) -> None:
-    world = getattr(band_score.World, name)()
+    world = diagnosis_score.drawn(name)
     number = band_score.chosen(world, 'odd', 'own', 0, 1)[0]
     first, stop = world.first_speed(number, 0), world.stops_ns(number)[0]
     speed = np.linspace(0.3, 1.0, 50) * first
-    true = world.true_r(number, speed, 0)
+    true = world.true_r(number, speed, 0, calm=True)
     sigma = np.full(50, 0.01 * true.max())
     found = {
         'coastdowns': [
@@ -57,7 +57,7 @@ def test_the_band_is_held_against_the_true_curve(off, cover, chi2, name) -> None
 
 
 def test_odd_cases_are_odd() -> None:
-    numbers = band_score.chosen(band_score.World.b(), 'odd', 'nothing', 0, 20)
+    numbers = band_score.chosen(diagnosis_score.drawn('b'), 'odd', 'nothing', 0, 20)
     assert len(numbers) == 20
     assert all(number % 2 for number in numbers)
     assert not any(cases.reveal(number).what for number in numbers[:3])

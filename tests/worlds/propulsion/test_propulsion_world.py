@@ -11,14 +11,16 @@ import numpy as np
 import pytest
 
 from benchmarks.worlds.propulsion.cases import Case
-from benchmarks.worlds.propulsion.drive import CLUTCHED, Mode, steady
-from benchmarks.worlds.propulsion.motion import Hold, Orders, Surroundings, move
-from benchmarks.worlds.propulsion.propeller import (
+from benchmarks.worlds.propulsion.drive import (
     AREA_RATIO,
+    CLUTCHED,
+    Mode,
     open_water,
+    steady,
     thrust_and_torque,
     windmilling,
 )
+from benchmarks.worlds.propulsion.motion import Hold, Orders, Surroundings, move
 from benchmarks.worlds.propulsion.score import INPUTS, score
 from benchmarks.worlds.propulsion.world import build
 
