@@ -16,7 +16,7 @@ from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, told_beside
+from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, in_run, told_beside
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
@@ -139,7 +139,12 @@ def replay_run(
     with listener.progress(f'replaying {each.name}') as progress:
         result = RunResult.of(
             replay(
-                each, ship=ship, parameters=parameters, window=window, stop=stop, progress=progress
+                each,
+                ship=in_run(each, ship),
+                parameters=parameters,
+                window=window,
+                stop=stop,
+                progress=progress,
             )
         )
     if stop is not None:

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
+from shipdrag_ros.replay.playback import ship_of
 from shipdrag_ros.ship import Ship
 
 # a coastdown, without the estimates on the way
@@ -219,3 +221,20 @@ def test_wrong_usage_is_explained(coastdown_bag: Path, capsys, line: list[str], 
 def test_a_user_error_is_told(coastdown_bag: Path, capsys, option: list[str], said: str) -> None:
     assert main(['replay', str(coastdown_bag), *option]) == 1
     assert said in capsys.readouterr().err
+
+
+def test_what_stands_beside_a_bag_holds_for_its_replay(coastdown_bag, tmp_path, replay):
+    bag = tmp_path / 'own.mcap'
+    bag.write_bytes(coastdown_bag.read_bytes())
+    found, said = replay(bag, *WINDOW)
+    (alone,) = found['coastdowns']
+    (run,) = open_runs([bag])
+    ship = ship_of(run, None)
+    assert f'{ship.mass_kg / 1e3:,.0f} t' in said
+    sheet = tmp_path / 'own.mcap.run.yaml'
+    sheet.write_text(f'displaced_volume_m3: {0.9 * ship.displaced_volume_m3}\nfacts: [calm]\n')
+    found, said = replay(bag, *WINDOW)
+    assert f'{0.9 * ship.mass_kg / 1e3:,.0f} t' in said
+    assert {'bag': str(bag), 'warning': f'{sheet} holds for this run'} in found['warnings']
+    (of_run,) = found['coastdowns']
+    assert (alone['reference']['wind'], of_run['reference']['wind']) == ('unknown', 'stated')
