@@ -10,7 +10,6 @@ once, and numbers and times are filled in.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from math import cos, inf, nan, sin
@@ -36,13 +35,6 @@ from shipdrag_ros.samples import (
 FieldNumbers = int | Callable[[Float64], Float64]
 """A column of (n, 4) values and variances, 0 where not known, or the (n,) numbers made of them."""
 _X, _Y, _VARIANCE_X, _VARIANCE_Y = range(4)
-
-# stand for the numbers of a message until their places in it are known
-_MARKS: dict[str, tuple[str, tuple[float, ...]]] = {
-    'float64': ('<d', tuple(1e-200 * k for k in range(1, 5))),
-    'float32': ('<f', tuple(2.0**-k for k in range(60, 64))),
-    'uint8': ('<B', (0xA7,)),
-}
 
 
 class EncodedMessage(NamedTuple):
@@ -174,29 +166,21 @@ def _rows(channel: Channel, block: Block) -> NDArray[np.uint8]:
 def _template(channel: Channel) -> tuple[bytes, np.dtype[Any]]:
     """Return the bytes of a message of a channel, and where its time and numbers lie."""
     encoder = _ENCODERS[channel]
-    kinds = {leaf.path: leaf.kind for leaf in types.leaves(encoder.type)}
-    marks = {kind: iter(each) for kind, (_, each) in _MARKS.items()}
-    marked = {path: next(marks[_kind(kinds, path)]) for path in encoder.numbers}
     constants = {'header': types.header(0, encoder.frame), **encoder.constants}
-    payload = types.serialize(encoder.type, types.make(encoder.type, constants | marked))
-    first = types.ENCAPSULATION_BYTES
-    places = {'seconds': ('<i4', first), 'nanoseconds': ('<u4', first + 4)}
-    for path, mark in marked.items():
-        form, _ = _MARKS[_kind(kinds, path)]
-        places[path] = form, payload.index(struct.pack(form, mark))
+    payload = types.serialize(encoder.type, types.make(encoder.type, constants))
+    number = types.layout_of(encoder.type, payload).number
+    paths = {path: path for path in encoder.numbers}
+    paths |= {'seconds': 'header.stamp.sec', 'nanoseconds': 'header.stamp.nanosec'}
+    forms, offsets = zip(*map(number, paths.values()), strict=True)
     layout = np.dtype(
         {
-            'names': list(places),
-            'formats': [form for form, _ in places.values()],
-            'offsets': [place for _, place in places.values()],
+            'names': list(paths),
+            'formats': list(forms),
+            'offsets': list(offsets),
             'itemsize': len(payload),
         }
     )
     return payload, layout
-
-
-def _kind(kinds: Mapping[str, str], path: str) -> str:
-    return kinds[path.partition('[')[0]]
 
 
 def _kind_of_covariance(given: Float64) -> Float64:
