@@ -13,11 +13,14 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 import reprlib
 import stat
 from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from functools import cache
+from inspect import cleandoc
 from os import PathLike
 from types import MappingProxyType
 from typing import Any
@@ -64,6 +67,7 @@ def read_small_text(path: str | PathLike[str], *, most_bytes: int) -> str:
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
 
+_ATTRIBUTE = re.compile(r'^(\w+)\n((?: +.+\n)+)', re.MULTILINE)
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxlevel = 2  # lists that hold themselves would fill pages
@@ -120,9 +124,11 @@ class Key:
     default: Any = MISSING
 
 
-def declare(kind: Kind, text: str, *, default: Any = MISSING, hashed: bool = True) -> Any:
+def declare(kind: Kind, text: str = '', *, default: Any = MISSING, hashed: bool = True) -> Any:
     """
     Declare a dataclass field that is read from a mapping.
+
+    What it means may stand in the docstring of the dataclass instead, under `Attributes`.
     """
     metadata = {'key': Key(kind, text, default)}
     hash_ = None if hashed else False
@@ -135,7 +141,20 @@ def keys_of(cls: type[Any]) -> dict[str, Key]:
     """
     Return the declared fields of a dataclass, by name.
     """
-    return {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
+    declared = {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
+    if all(key.text for key in declared.values()):
+        return declared
+    texts = _attributes(cls.__doc__ or '')  # python -OO drops it
+    return {
+        name: key if key.text else replace(key, text=texts.get(name, ''))
+        for name, key in declared.items()
+    }
+
+
+@cache
+def _attributes(doc: str) -> dict[str, str]:
+    """Return what a docstring says of attributes, by name."""
+    return {name: ' '.join(text.split()) for name, text in _ATTRIBUTE.findall(cleandoc(doc))}
 
 
 def number(low: float, high: float, unit: str = '') -> Kind:

@@ -16,8 +16,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.cli import arguments
@@ -67,6 +66,8 @@ _OWN = tuple(
     Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
     for name, summary in _SUMMARIES.items()
 )
+Helps = dict[str, tuple[list[str], str]]
+"""What the values of an argument are called, and its help."""
 _SECTION = re.compile(r'^(\w+)\n-+\n', re.MULTILINE)
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -190,45 +191,55 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            sections = _sections(module)
-            added.description = sections.get('', known.summary)
-            if examples := known.examples or sections.get('Examples', '').splitlines():
+            said = sections(module.__doc__)
+            added.description = said.get('', known.summary)
+            if examples := known.examples or said.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
             module.add_arguments(added)
             if known.name != 'effect':  # each of its parts has what it needs
                 arguments.add(added, '--effects')
             added.set_defaults(run=module.run)
-            _explain(added, _helps(arguments) | _helps(module))
+            names = vars(arguments) | vars(module)
+            _explain(added, helps(arguments.__doc__, names) | helps(module.__doc__, names))
     return top
 
 
-def _sections(module: ModuleType) -> dict[str, str]:
-    """Return the docstring of a module by its sections; python -OO drops it."""
-    parts = ['', *_SECTION.split(module.__doc__ or '')]
-    return dict(zip(parts[::2], parts[1::2])) if module.__doc__ else {}
+def sections(text: str | None) -> dict[str, str]:
+    """
+    Return a docstring by its sections; python -OO drops it.
+    """
+    parts = ['', *_SECTION.split(text or '')]
+    return dict(zip(parts[::2], parts[1::2])) if text else {}
 
 
-def _helps(module: ModuleType) -> dict[str, tuple[list[str], str]]:
+def helps(text: str | None, names: Mapping[str, Any]) -> Helps:
     """
-    Return what the docstring of a module says of arguments, names of the module filled in: what
-    the values of an option are called, and its help.
+    Return what a docstring says of arguments: what the values of each are called, and its help.
+
+    Parameters
+    ----------
+    text
+        Of the docstring.
+    names
+        That it may hold in braces.
     """
-    text = _sections(module).get('Options', '')
+    listed = sections(text).get('Options', '')
     with suppress(LookupError, ValueError):  # a study of another package may write braces
-        text = text.format_map(vars(arguments) | vars(module))
-    found = re.findall(r'^(\S+)(.*)\n((?: .*\n?)+)', text, re.MULTILINE)
+        listed = listed.format_map(names)
+    found = re.findall(r'^(\S+)(.*)\n((?: .*\n?)+)', listed, re.MULTILINE)
     return {name: (values.split(), ' '.join(lines.split())) for name, values, lines in found}
 
 
-def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, tuple[list[str], str]]) -> None:
+def _explain(parser: argparse.ArgumentParser, known: Helps) -> None:
+    """Give each argument that has none its help."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for below in action.choices.values():
-                _explain(below, helps)
+                _explain(below, known)
         elif action.help is None:
             names = (*action.option_strings, str(action.metavar), action.dest)
             values, action.help = next(
-                (helps[name] for name in names if name in helps), ([], None)
+                (known[name] for name in names if name in known), ([], None)
             )
             if action.option_strings and values and action.metavar is None:
                 action.metavar = values[0] if len(values) == 1 else tuple(values)

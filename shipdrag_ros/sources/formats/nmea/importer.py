@@ -4,6 +4,11 @@ VHW VBW VTG RMC GGA GLL HDT HDG THS RPM MWV DPT DBT RSA ZDA, each input from one
 RPM, up to four shafts (numbers 0 to 4) and their pitch. A sentence without a time has that of
 the last one with a time; where the logger wrote the time of receipt before each line (also as
 OpenRVDAS does), the time since is added.
+
+Options
+-------
+--no-checksum
+    take sentences without a checksum too; one that is there must be right
 """
 
 # What a sentence does not hold is counted by reason with its first lines; what it holds is
@@ -417,10 +422,6 @@ FORMAT = format.Format(
     options=(
         format.DATE,
         format.TRANSDUCER,
-        format.Option(
-            '--no-checksum',
-            '',
-            'take sentences without a checksum too; one that is there must be right',
-        ),
+        format.Option('--no-checksum', ''),
     ),
 )
