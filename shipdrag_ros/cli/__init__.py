@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The command line: one module a verb, each with `add_arguments` and `run`.
+The command line: a module has `add_arguments` and `run` of its verb, or `add_NAME` and
+`run_NAME` of each of its verbs.
 
 Only the module of the verb that was asked for is imported, so that help comes
 at once and a verb does not pay for what another needs.
@@ -9,6 +10,7 @@ at once and a verb does not pay for what another needs.
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import re
 import sys
@@ -30,8 +32,8 @@ class Verb(NamedTuple):
     """
     A verb, what it does in one line, and the module it stands in.
 
-    What its help says stands in the docstring of its module: how it is described, and
-    examples; a study gives these by itself.
+    What its help says stands in the docstring of its module, or of its `run_NAME`: how it is
+    described, and examples; a study gives these by itself.
     """
 
     name: str
@@ -62,9 +64,16 @@ _SUMMARIES = {
     'check': 'is a bag sound',
     'recover': 'save what is whole in a damaged bag',
 }
+_SHARED = {  # modules of more than one verb
+    '.bags': ('info', 'check', 'recover'),
+    '.fleet': ('fleet', 'trend', 'poster'),
+    '.installation': ('doctor', 'completion'),
+    '.learn': ('baseline', 'learn', 'effect'),
+    '.simulate': ('simulate', 'simulate-fleet'),
+}
+_MODULES = {'import': '.import_'} | {name: m for m, names in _SHARED.items() for name in names}
 _OWN = tuple(
-    Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
-    for name, summary in _SUMMARIES.items()
+    Verb(name, summary, _MODULES.get(name, f'.{name}')) for name, summary in _SUMMARIES.items()
 )
 Helps = dict[str, tuple[list[str], str]]
 """What the values of an argument are called, and its help."""
@@ -191,16 +200,20 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            said = sections(module.__doc__)
+            own = known.name.replace('-', '_')
+            add = getattr(module, f'add_{own}', None) or module.add_arguments
+            run = getattr(module, f'run_{own}', None) or module.run
+            text = inspect.getdoc(module if run.__name__ == 'run' else run)
+            said = sections(text)
             added.description = said.get('', known.summary)
             if examples := known.examples or said.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
-            module.add_arguments(added)
+            add(added)
             if known.name != 'effect':  # each of its parts has what it needs
                 arguments.add(added, '--effects')
-            added.set_defaults(run=module.run)
+            added.set_defaults(run=run)
             names = vars(arguments) | vars(module)
-            _explain(added, helps(arguments.__doc__, names) | helps(module.__doc__, names))
+            _explain(added, helps(arguments.__doc__, names) | helps(text, names))
     return top
 
 

@@ -219,3 +219,13 @@ def test_wrong_usage_is_explained(coastdown_bag: Path, capsys, line: list[str], 
 def test_a_user_error_is_told(coastdown_bag: Path, capsys, option: list[str], said: str) -> None:
     assert main(['replay', str(coastdown_bag), *option]) == 1
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('wrong', [['--ship', 'none.yaml'], ['--parameters', 'none.yaml']])
+def test_no_folder_is_made_where_a_file_cannot_be_read(
+    coastdown_bag: Path, tmp_path: Path, wrong: list[str]
+) -> None:
+    out = tmp_path / 'report'
+    assert main(['replay', str(coastdown_bag), '--out', str(out), *wrong]) == 1
+    assert main(['replay', str(tmp_path / 'none.mcap'), '--out', str(out)]) == 1
+    assert not out.exists()
