@@ -80,6 +80,14 @@ class _Invalid:
 INVALID = _Invalid()
 
 
+def unexpected(value: object, path: str, problems: Problems, expectation: str) -> _Invalid:
+    """
+    Report a value that is not as expected.
+    """
+    problems.append(f'{path}: {show(value)}, expected {expectation}')
+    return INVALID
+
+
 @dataclass(frozen=True)
 class Kind:
     """
@@ -168,12 +176,10 @@ def number(low: float, high: float, unit: str = '') -> Kind:
             value, int | float | np.integer | np.floating
         ):
             hint = ' without quotes or unit' if isinstance(value, str) else ''
-            problems.append(f'{path}: {show(value)}, expected a number{hint}, {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, f'a number{hint}, {expectation}')
         # an integer may be too large for a float; comparing it is safe
         if not (low <= value <= high):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         return float(value)
 
     return Kind(read, expectation, unit, low, high)
@@ -187,8 +193,7 @@ def whole_number(low: int, high: int, unit: str = '') -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> int | _Invalid:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         return value
 
     return Kind(read, expectation, unit, low, high)
@@ -202,8 +207,7 @@ def flag() -> Kind:
     def read(value: object, path: str, problems: Problems) -> bool | _Invalid:
         if isinstance(value, bool):
             return value
-        problems.append(f'{path}: {show(value)}, expected true or false')
-        return INVALID
+        return unexpected(value, path, problems, 'true or false')
 
     return Kind(read, 'true or false')
 
@@ -220,8 +224,7 @@ def numbers(
 
     def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
         if not isinstance(value, list | tuple | array) or len(value) < minimum:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
         if any(item is INVALID for item in row):
             return INVALID
@@ -244,8 +247,7 @@ def text() -> Kind:
     def read(value: object, path: str, problems: Problems) -> str | _Invalid:
         if isinstance(value, str):
             return value
-        problems.append(f'{path}: {show(value)}, expected text; put it in quotes')
-        return INVALID
+        return unexpected(value, path, problems, 'text; put it in quotes')
 
     return Kind(read, 'text')
 
@@ -294,8 +296,7 @@ def list_of(kind: Kind, *, minimum: int = 0, maximum: float = math.inf) -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> tuple[Any, ...] | _Invalid:
         if not isinstance(value, list) or not minimum <= len(value) <= maximum:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         items = tuple(kind.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value))
         return INVALID if any(item is INVALID for item in items) else items
 
@@ -310,8 +311,7 @@ def named(kind: Kind) -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> dict[str, Any] | _Invalid:
         if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         items = {
             name: kind.read(item, dotted(path, name), problems) for name, item in value.items()
         }

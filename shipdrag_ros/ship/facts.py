@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.fields import INVALID, Kind, Problems, number, show
+from shipdrag_ros.fields import INVALID, Kind, Problems, number, show, unexpected
 
 RATE = 0.02  # how often a fact that is stated is wrong, unless given
 LEAST_RATE, MOST_RATE = 1e-4, 0.5
@@ -194,8 +194,7 @@ def fact_list() -> Kind:
         elif isinstance(value, list):
             given = [_of_item(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
         else:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         facts = [fact for fact in given if fact is not None]
         names = [fact.name for fact in facts]
         for name in dict.fromkeys(names):
