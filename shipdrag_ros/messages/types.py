@@ -12,6 +12,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 from functools import cache, reduce
+from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -56,6 +57,8 @@ _LENGTH, _CHARACTER = np.dtype('u4'), np.dtype('u1')
 _TIME = struct.Struct('iI')  # builtin_interfaces/Time: the first that a header holds
 
 RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
+_FURTHER = {RANGE_BEFORE_IRON: 'RangeBeforeIron.msg', DVL: 'Dvl.msg'}
+"""Not of ROS 2 Jazzy itself; what a bag holds is read without its package."""
 
 
 @cache
@@ -64,27 +67,9 @@ def _store() -> Typestore:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(
-        get_types_from_msg(
-            'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
-            'float32 min_range\nfloat32 max_range\nfloat32 range\n',
-            RANGE_BEFORE_IRON,
-        )
-    )
-    # not of ROS itself; what a bag holds is read without its package
-    store.register(
-        get_types_from_msg(
-            'uint8 DVL_MODE_BOTTOM=1\nuint8 DVL_MODE_WATER=2\n'
-            'uint8 DVL_TYPE_PISTON=0\nuint8 DVL_TYPE_PHASED_ARRAY=1\n'
-            'std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\n'
-            'geometry_msgs/Vector3 velocity\nfloat64[9] velocity_covar\n'
-            'float64 altitude\nfloat64 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n'
-            'float32 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\n'
-            'geometry_msgs/Vector3[4] beam_unit_vec\nfloat64[4] range\nfloat32[4] range_covar\n'
-            'float32[4] beam_quality\nfloat32[4] beam_velocity\nfloat32[4] beam_velocity_covar\n',
-            DVL,
-        )
-    )
+    for name, file in _FURTHER.items():
+        text = (resources.files('shipdrag_ros') / 'data' / file).read_text(encoding='utf-8')
+        store.register(get_types_from_msg(text, name))
     return store
 
 
