@@ -189,27 +189,27 @@ def whole_number(low: int, high: int, unit: str = '') -> Kind:
     """
     Expect a whole number in low..high.
     """
-    expectation = f'a whole number, {low:g}..{high:g} {unit}'.rstrip()
-
-    def read(value: object, path: str, problems: Problems) -> int | _Invalid:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            return unexpected(value, path, problems, expectation)
-        return value
-
-    return Kind(read, expectation, unit, low, high)
+    return _plain_value(
+        lambda value: type(value) is int and low <= value <= high,
+        f'a whole number, {low:g}..{high:g} {unit}'.rstrip(),
+        *(unit, low, high),
+    )
 
 
 def flag() -> Kind:
     """
     Expect true or false.
     """
+    return _plain_value(lambda value: isinstance(value, bool), 'true or false')
 
-    def read(value: object, path: str, problems: Problems) -> bool | _Invalid:
-        if isinstance(value, bool):
-            return value
-        return unexpected(value, path, problems, 'true or false')
 
-    return Kind(read, 'true or false')
+def _plain_value(accepts: Callable[[Any], bool], expectation: str, *about: Any) -> Kind:
+    """Expect a value that is taken as it is; `about` it as in `Kind`."""
+
+    def read(value: object, path: str, problems: Problems) -> Any:
+        return value if accepts(value) else unexpected(value, path, problems, expectation)
+
+    return Kind(read, expectation, *about)
 
 
 def numbers(
@@ -243,13 +243,8 @@ def text() -> Kind:
     """
     Expect a string.
     """
-
-    def read(value: object, path: str, problems: Problems) -> str | _Invalid:
-        if isinstance(value, str):
-            return value
-        return unexpected(value, path, problems, 'text; put it in quotes')
-
-    return Kind(read, 'text')
+    told = 'text; put it in quotes'
+    return replace(_plain_value(lambda value: isinstance(value, str), told), expectation='text')
 
 
 def choice(*values: str, former: Mapping[str, str] = MappingProxyType({})) -> Kind:

@@ -486,6 +486,14 @@ def _readings() -> Mapping[Source, _Reading]:
     return found
 
 
+def fields_of(channel: Channel, type_name: str) -> dict[str, int]:
+    """
+    Return the fields that hold values and variances of a channel, with the column of each.
+    """
+    ((_, fields), *_) = _readings()[Source(channel.input, type_name)].ways
+    return {field: column for column, field in enumerate(fields[:COLUMNS]) if field}
+
+
 def _each_reading() -> Iterator[tuple[Source, _Reading]]:
     speed, ground = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
     linear, x, y = 'twist.twist.linear.x', 'twist.linear.x', 'twist.linear.y'
