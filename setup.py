@@ -71,7 +71,7 @@ FORMATS = {  # of logs: name and module
     'csv': 'csv.importer',
     'gpx': 'gpx',
     'n2k': 'n2k',
-    'nmea': 'nmea.importer',
+    'nmea': 'nmea',
     'rosbag': 'rosbag',
     'signalk': 'signalk',
     'ulog': 'ulog',

@@ -13,11 +13,14 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 import reprlib
 import stat
 from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from functools import cache
+from inspect import cleandoc
 from os import PathLike
 from types import MappingProxyType
 from typing import Any
@@ -64,6 +67,7 @@ def read_small_text(path: str | PathLike[str], *, most_bytes: int) -> str:
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
 
+_ATTRIBUTE = re.compile(r'^(\w+)\n((?: +.+\n)+)', re.MULTILINE)
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxlevel = 2  # lists that hold themselves would fill pages
@@ -74,6 +78,14 @@ class _Invalid:
 
 
 INVALID = _Invalid()
+
+
+def unexpected(value: object, path: str, problems: Problems, expectation: str) -> _Invalid:
+    """
+    Report a value that is not as expected.
+    """
+    problems.append(f'{path}: {show(value)}, expected {expectation}')
+    return INVALID
 
 
 @dataclass(frozen=True)
@@ -120,9 +132,11 @@ class Key:
     default: Any = MISSING
 
 
-def declare(kind: Kind, text: str, *, default: Any = MISSING, hashed: bool = True) -> Any:
+def declare(kind: Kind, text: str = '', *, default: Any = MISSING, hashed: bool = True) -> Any:
     """
     Declare a dataclass field that is read from a mapping.
+
+    What it means may stand in the docstring of the dataclass instead, under `Attributes`.
     """
     metadata = {'key': Key(kind, text, default)}
     hash_ = None if hashed else False
@@ -135,7 +149,20 @@ def keys_of(cls: type[Any]) -> dict[str, Key]:
     """
     Return the declared fields of a dataclass, by name.
     """
-    return {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
+    declared = {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
+    if all(key.text for key in declared.values()):
+        return declared
+    texts = _attributes(cls.__doc__ or '')  # python -OO drops it
+    return {
+        name: key if key.text else replace(key, text=texts.get(name, ''))
+        for name, key in declared.items()
+    }
+
+
+@cache
+def _attributes(doc: str) -> dict[str, str]:
+    """Return what a docstring says of attributes, by name."""
+    return {name: ' '.join(text.split()) for name, text in _ATTRIBUTE.findall(cleandoc(doc))}
 
 
 def number(low: float, high: float, unit: str = '') -> Kind:
@@ -149,12 +176,10 @@ def number(low: float, high: float, unit: str = '') -> Kind:
             value, int | float | np.integer | np.floating
         ):
             hint = ' without quotes or unit' if isinstance(value, str) else ''
-            problems.append(f'{path}: {show(value)}, expected a number{hint}, {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, f'a number{hint}, {expectation}')
         # an integer may be too large for a float; comparing it is safe
         if not (low <= value <= high):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         return float(value)
 
     return Kind(read, expectation, unit, low, high)
@@ -164,29 +189,27 @@ def whole_number(low: int, high: int, unit: str = '') -> Kind:
     """
     Expect a whole number in low..high.
     """
-    expectation = f'a whole number, {low:g}..{high:g} {unit}'.rstrip()
-
-    def read(value: object, path: str, problems: Problems) -> int | _Invalid:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
-        return value
-
-    return Kind(read, expectation, unit, low, high)
+    return _plain_value(
+        lambda value: type(value) is int and low <= value <= high,
+        f'a whole number, {low:g}..{high:g} {unit}'.rstrip(),
+        *(unit, low, high),
+    )
 
 
 def flag() -> Kind:
     """
     Expect true or false.
     """
+    return _plain_value(lambda value: isinstance(value, bool), 'true or false')
 
-    def read(value: object, path: str, problems: Problems) -> bool | _Invalid:
-        if isinstance(value, bool):
-            return value
-        problems.append(f'{path}: {show(value)}, expected true or false')
-        return INVALID
 
-    return Kind(read, 'true or false')
+def _plain_value(accepts: Callable[[Any], bool], expectation: str, *about: Any) -> Kind:
+    """Expect a value that is taken as it is; `about` it as in `Kind`."""
+
+    def read(value: object, path: str, problems: Problems) -> Any:
+        return value if accepts(value) else unexpected(value, path, problems, expectation)
+
+    return Kind(read, expectation, *about)
 
 
 def numbers(
@@ -201,8 +224,7 @@ def numbers(
 
     def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
         if not isinstance(value, list | tuple | array) or len(value) < minimum:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
         if any(item is INVALID for item in row):
             return INVALID
@@ -221,14 +243,8 @@ def text() -> Kind:
     """
     Expect a string.
     """
-
-    def read(value: object, path: str, problems: Problems) -> str | _Invalid:
-        if isinstance(value, str):
-            return value
-        problems.append(f'{path}: {show(value)}, expected text; put it in quotes')
-        return INVALID
-
-    return Kind(read, 'text')
+    told = 'text; put it in quotes'
+    return replace(_plain_value(lambda value: isinstance(value, str), told), expectation='text')
 
 
 def choice(*values: str, former: Mapping[str, str] = MappingProxyType({})) -> Kind:
@@ -275,8 +291,7 @@ def list_of(kind: Kind, *, minimum: int = 0, maximum: float = math.inf) -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> tuple[Any, ...] | _Invalid:
         if not isinstance(value, list) or not minimum <= len(value) <= maximum:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         items = tuple(kind.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value))
         return INVALID if any(item is INVALID for item in items) else items
 
@@ -291,8 +306,7 @@ def named(kind: Kind) -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> dict[str, Any] | _Invalid:
         if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         items = {
             name: kind.read(item, dotted(path, name), problems) for name, item in value.items()
         }

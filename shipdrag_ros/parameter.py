@@ -92,20 +92,17 @@ class Prior:
         """
         a, b = self.first, self.second
         match self.shape:
-            case Shape.NORMAL:
-                return float(rng.normal(a, b))
-            case Shape.HALF_NORMAL:
-                return float(abs(rng.normal(0.0, b)))
-            case Shape.LOG_NORMAL:
-                return float(a * math.exp(b * rng.standard_normal()))
             case Shape.EITHER_SIGN:
-                return float(rng.choice([a, -a]) * math.exp(b * rng.standard_normal()))
+                return float(rng.choice([1.0, -1.0])) * self.at(rng.standard_normal())
             case Shape.UNIFORM:
                 return float(rng.uniform(a, b))
             case Shape.CHOICE:
                 return float(rng.choice([a, b]))
             case Shape.FLAT:
                 raise ValueError('a flat prior cannot be drawn from')
+            case _:
+                value = self.at(rng.standard_normal())
+                return abs(value) if self.shape is Shape.HALF_NORMAL else value
 
     def at(self, z: float) -> float:
         """

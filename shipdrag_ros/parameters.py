@@ -61,28 +61,64 @@ ESTIMATORS = tuple(ESTIMATOR_POINTS)
 SPEEDS_M_S = (2.0, 1.0)
 
 
-def _parameter(
-    default: float | int | str,
-    text: str,
-    *,
-    unit: str = '',
-    low: float = 0.0,
-    high: float = 0.0,
-    choices: tuple[str, ...] = (),
-) -> Any:
-    if isinstance(default, str):
-        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else {})
-    elif isinstance(default, int):
-        kind = whole_number(int(low), int(high), unit)
-    else:
-        kind = number(low, high, unit)
-    return declare(kind, text, default=default)
-
-
 @dataclass(frozen=True)
 class Parameters:
     """
     Everything that changes a result, apart from the ship.
+
+    Attributes
+    ----------
+    frozen_s
+        a speed or position that repeats unchanged for longer is rejected as frozen; shorter: a
+        coarse sensor in a calm is rejected too; longer: a stuck one is believed for longer
+    late_s
+        a sample stamped this much before the newest stamp of any input is rejected as late;
+        longer: slow networks are borne, and events are told later
+    data_stop_s
+        a coastdown ends when the speed source is silent for longer; shorter: a short loss of the
+        signal ends it
+    steady_s
+        record before the present from which the noise of the speed is learnt; kept in memory;
+        shorter: wider bands, and effects are harder to name
+    slope_window_s
+        length of the slope test that proposes an onset from speed alone; longer: fewer false
+        alarms in a seaway, and a later onset
+    false_alarms_per_day
+        rate of chance proposals in steady sailing that sets the threshold of the slope test;
+        larger: gentler stops are seen, and more are proposed that are none
+    turn_rad
+        a change of heading, or of course over ground, from which on a window that is given by hand
+        is cut; larger: turning slows the ship and is counted as resistance
+    froude_min
+        Froude number at which a coastdown ends and below which no resistance is given; smaller:
+        longer runs, in which wind and current weigh more
+    window_s
+        longest record behind one estimate; an older part of a longer coastdown rolls out; longer:
+        each estimate takes more memory and time
+    update_s
+        spacing of the estimates during a coastdown, in stamps; shorter: more load on the CPU
+    first_relative_sigma
+        standard deviation of the resistance, as a fraction of it, below which the first estimate
+        of a coastdown is given; those after it are all given; larger: it comes sooner and is worth
+        less
+    forecast_speeds
+        speeds of which the forecast of a glide speaks, and of 90, 75, 50 and 25 % of that at the
+        stop; lower: it reaches further, where less is known
+    heading_convention
+        rep103: yaw from east, anticlockwise; compass: from north, clockwise; the wrong one turns
+        current and wind into the wrong quarter
+    estimator
+        one: one posterior of hull, thrust, instruments and noise, of all inputs, while a coastdown
+        runs and after it; s1_...: the published problems
+    order_max
+        largest number of coefficients that the order search of the published estimators tries;
+        larger: more detail, more time
+    speed_sigma_m_s
+        known standard deviation of the speed reading, for the order search and the weights; 0:
+        unknown; one that is too small makes bands too narrow
+    position_sigma_m
+        known standard deviation of the position, for the order search and the weights; 0: unknown;
+        one that is too small makes bands too narrow
 
     Raises
     ------
@@ -96,133 +132,25 @@ class Parameters:
     5.0
     """
 
-    frozen_s: float = _parameter(
-        120.0,
-        'a speed or position that repeats unchanged for longer is rejected as frozen; shorter: a '
-        'coarse sensor in a calm is rejected too; longer: a stuck one is believed for longer',
-        unit='s',
-        low=1.0,
-        high=86400.0,
-    )
-    late_s: float = _parameter(
-        5.0,
-        'a sample stamped this much before the newest stamp of any input is rejected as late; '
-        'longer: slow networks are borne, and events are told later',
-        unit='s',
-        low=0.1,
-        high=3600.0,
-    )
-    data_stop_s: float = _parameter(
-        60.0,
-        'a coastdown ends when the speed source is silent for longer; shorter: a short loss of '
-        'the signal ends it',
-        unit='s',
-        low=1.0,
-        high=3600.0,
-    )
-    steady_s: float = _parameter(
-        1800.0,
-        'record before the present from which the noise of the speed is learnt; kept in memory; '
-        'shorter: wider bands, and effects are harder to name',
-        unit='s',
-        low=60.0,
-        high=7200.0,
-    )
-    slope_window_s: float = _parameter(
-        60.0,
-        'length of the slope test that proposes an onset from speed alone; longer: fewer false '
-        'alarms in a seaway, and a later onset',
-        unit='s',
-        low=5.0,
-        high=600.0,
-    )
-    false_alarms_per_day: float = _parameter(
-        0.1,
-        'rate of chance proposals in steady sailing that sets the threshold of the slope test; '
-        'larger: gentler stops are seen, and more are proposed that are none',
-        unit='1/day',
-        low=1e-3,
-        high=100.0,
-    )
-    turn_rad: float = _parameter(
-        0.35,
-        'a change of heading, or of course over ground, from which on a window that is given by '
-        'hand is cut; larger: turning slows the ship and is counted as resistance',
-        unit='rad',
-        low=0.05,
-        high=3.0,
-    )
-    froude_min: float = _parameter(
-        0.05,
-        'Froude number at which a coastdown ends and below which no resistance is given; smaller: '
-        'longer runs, in which wind and current weigh more',
-        low=0.001,
-        high=1.0,
-    )
-    window_s: float = _parameter(
-        3600.0,
-        'longest record behind one estimate; an older part of a longer coastdown rolls out; '
-        'longer: each estimate takes more memory and time',
-        unit='s',
-        low=60.0,
-        high=21600.0,
-    )
-    update_s: float = _parameter(
-        10.0,
-        'spacing of the estimates during a coastdown, in stamps; shorter: more load on the CPU',
-        unit='s',
-        low=0.1,
-        high=3600.0,
-    )
-    first_relative_sigma: float = _parameter(
-        0.25,
-        'standard deviation of the resistance, as a fraction of it, below which the first '
-        'estimate of a coastdown is given; those after it are all given; larger: it comes sooner '
-        'and is worth less',
-        low=0.01,
-        high=10.0,
-    )
+    frozen_s: float = declare(number(1.0, 86400.0, 's'), default=120.0)
+    late_s: float = declare(number(0.1, 3600.0, 's'), default=5.0)
+    data_stop_s: float = declare(number(1.0, 3600.0, 's'), default=60.0)
+    steady_s: float = declare(number(60.0, 7200.0, 's'), default=1800.0)
+    slope_window_s: float = declare(number(5.0, 600.0, 's'), default=60.0)
+    false_alarms_per_day: float = declare(number(1e-3, 100.0, '1/day'), default=0.1)
+    turn_rad: float = declare(number(0.05, 3.0, 'rad'), default=0.35)
+    froude_min: float = declare(number(0.001, 1.0), default=0.05)
+    window_s: float = declare(number(60.0, 21600.0, 's'), default=3600.0)
+    update_s: float = declare(number(0.1, 3600.0, 's'), default=10.0)
+    first_relative_sigma: float = declare(number(0.01, 10.0), default=0.25)
     forecast_speeds: tuple[float, ...] = declare(
-        numbers(0.01, 40.0, 'm/s', minimum=1),
-        'speeds of which the forecast of a glide speaks, and of 90, 75, 50 and 25 % of that at '
-        'the stop; lower: it reaches further, where less is known',
-        default=SPEEDS_M_S,
+        numbers(0.01, 40.0, 'm/s', minimum=1), default=SPEEDS_M_S
     )
-    heading_convention: str = _parameter(
-        'rep103',
-        'rep103: yaw from east, anticlockwise; compass: from north, clockwise; the wrong one '
-        'turns current and wind into the wrong quarter',
-        choices=('rep103', 'compass'),
-    )
-    estimator: str = _parameter(
-        'one',
-        'one: one posterior of hull, thrust, instruments and noise, of all inputs, while a '
-        'coastdown runs and after it; s1_...: the published problems',
-        choices=ESTIMATORS,
-    )
-    order_max: int = _parameter(
-        20,
-        'largest number of coefficients that the order search of the published estimators tries; '
-        'larger: more detail, more time',
-        low=3,
-        high=40,
-    )
-    speed_sigma_m_s: float = _parameter(
-        0.0,
-        'known standard deviation of the speed reading, for the order search and the weights; '
-        '0: unknown; one that is too small makes bands too narrow',
-        unit='m/s',
-        low=0.0,
-        high=10.0,
-    )
-    position_sigma_m: float = _parameter(
-        0.0,
-        'known standard deviation of the position, for the order search and the weights; '
-        '0: unknown; one that is too small makes bands too narrow',
-        unit='m',
-        low=0.0,
-        high=1000.0,
-    )
+    heading_convention: str = declare(choice('rep103', 'compass'), default='rep103')
+    estimator: str = declare(choice(*ESTIMATORS, former=FORMER_ESTIMATORS), default='one')
+    order_max: int = declare(whole_number(3, 40), default=20)
+    speed_sigma_m_s: float = declare(number(0.0, 10.0, 'm/s'), default=0.0)
+    position_sigma_m: float = declare(number(0.0, 1000.0, 'm'), default=0.0)
 
     def __post_init__(self) -> None:
         given = {item.name: getattr(self, item.name) for item in fields(self)}

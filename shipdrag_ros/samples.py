@@ -170,13 +170,7 @@ class Block:
         """
         Return a block without samples.
         """
-        return cls(
-            np.empty(0, np.uint8),
-            np.empty(0, np.int64),
-            np.empty(0, np.int64),
-            np.empty((0, 2)),
-            np.empty((0, 2)),
-        )
+        return cls.of(Channel.SPEED_THROUGH_WATER, [], [])
 
     @classmethod
     def of_samples(cls, samples: Sequence[tuple[int, int, int, float, float]]) -> Block:

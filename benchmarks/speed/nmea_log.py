@@ -24,7 +24,7 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.sources.format import Job
-from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
+from shipdrag_ros.sources.formats.nmea import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log, new_bag
 
 LOG = 'psaros_lake_geneva.nmea.gz'

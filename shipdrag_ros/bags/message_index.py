@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.messages.gather import OCTETS, PLACES, long_word
 from shipdrag_ros.samples import Int64, UInt8
 
 CHANNELS = 1 << 16
@@ -178,6 +177,25 @@ def index_messages(
     return Indexed(found[:n], others[:m], notes)
 
 
+_GIVEN = 'Array({}, 1, "C", readonly=True)'
+OCTETS, PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
+
+
+@compiled(inline=True, uncounted=True)
+def _long_word(data: Any, place: int) -> Any:
+    at = _U(place)
+    return (
+        _U(data[at])
+        | _U(data[at + _U(1)]) << _U(8)
+        | _U(data[at + _U(2)]) << _U(16)
+        | _U(data[at + _U(3)]) << _U(24)
+        | _U(data[at + _U(4)]) << _U(32)
+        | _U(data[at + _U(5)]) << _U(40)
+        | _U(data[at + _U(6)]) << _U(48)
+        | _U(data[at + _U(7)]) << _U(56)
+    )
+
+
 @compiled(
     f'UniTuple(i8, 3)({OCTETS}, {PLACES}, {PLACES}, {OCTETS}, '
     'i8[::1], i8[:, ::1], i8[::1], i8[::1], u2[::1], i8[::1], i8[::1])',
@@ -206,7 +224,7 @@ def _index(
             if content > limit:
                 kind = _CUT_OFF
             else:
-                length = np.int64(long_word(data, at + 1))
+                length = np.int64(_long_word(data, at + 1))
                 if data[_U(at)] == 0:
                     kind = _NO_RECORD
                 elif length < 0 or length > limit - content:  # from 2^63 on it is negative
@@ -219,7 +237,7 @@ def _index(
                     kind = _TOO_SHORT
                 else:
                     number = data[_U(content)] | np.uint16(data[_U(content + 1)]) << 8
-                    time = np.int64(long_word(data, content + 6))
+                    time = np.int64(_long_word(data, content + 6))
                     if time < 0:
                         kind = _NO_TIME
                     elif wanted[number]:

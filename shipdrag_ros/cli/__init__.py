@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The command line: one module a verb, each with `add_arguments` and `run`.
+The command line: a module has `add_arguments` and `run` of its verb, or `add_NAME` and
+`run_NAME` of each of its verbs.
 
 Only the module of the verb that was asked for is imported, so that help comes
 at once and a verb does not pay for what another needs.
@@ -9,6 +10,7 @@ at once and a verb does not pay for what another needs.
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import re
 import sys
@@ -16,8 +18,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.cli import arguments
@@ -31,8 +32,8 @@ class Verb(NamedTuple):
     """
     A verb, what it does in one line, and the module it stands in.
 
-    What its help says stands in the docstring of its module: how it is described, and
-    examples; a study gives these by itself.
+    What its help says stands in the docstring of its module, or of its `run_NAME`: how it is
+    described, and examples; a study gives these by itself.
     """
 
     name: str
@@ -63,10 +64,19 @@ _SUMMARIES = {
     'check': 'is a bag sound',
     'recover': 'save what is whole in a damaged bag',
 }
+_SHARED = {  # modules of more than one verb
+    '.bags': ('info', 'check', 'recover'),
+    '.fleet': ('fleet', 'trend', 'poster'),
+    '.installation': ('doctor', 'completion'),
+    '.learn': ('baseline', 'learn', 'effect'),
+    '.simulate': ('simulate', 'simulate-fleet'),
+}
+_MODULES = {'import': '.import_'} | {name: m for m, names in _SHARED.items() for name in names}
 _OWN = tuple(
-    Verb(name, summary, '.import_' if name == 'import' else f'.{name.replace("-", "_")}')
-    for name, summary in _SUMMARIES.items()
+    Verb(name, summary, _MODULES.get(name, f'.{name}')) for name, summary in _SUMMARIES.items()
 )
+Helps = dict[str, tuple[list[str], str]]
+"""What the values of an argument are called, and its help."""
 _SECTION = re.compile(r'^(\w+)\n-+\n', re.MULTILINE)
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -190,45 +200,59 @@ def parser(*of: str) -> argparse.ArgumentParser:
         if known.name in of:
             with uncollected():
                 module = import_module(known.module, __name__)
-            sections = _sections(module)
-            added.description = sections.get('', known.summary)
-            if examples := known.examples or sections.get('Examples', '').splitlines():
+            own = known.name.replace('-', '_')
+            add = getattr(module, f'add_{own}', None) or module.add_arguments
+            run = getattr(module, f'run_{own}', None) or module.run
+            text = inspect.getdoc(module if run.__name__ == 'run' else run)
+            said = sections(text)
+            added.description = said.get('', known.summary)
+            if examples := known.examples or said.get('Examples', '').splitlines():
                 added.epilog = '\n  '.join(['examples:', *examples])
-            module.add_arguments(added)
+            add(added)
             if known.name != 'effect':  # each of its parts has what it needs
                 arguments.add(added, '--effects')
-            added.set_defaults(run=module.run)
-            _explain(added, _helps(arguments) | _helps(module))
+            added.set_defaults(run=run)
+            names = vars(arguments) | vars(module)
+            _explain(added, helps(arguments.__doc__, names) | helps(text, names))
     return top
 
 
-def _sections(module: ModuleType) -> dict[str, str]:
-    """Return the docstring of a module by its sections; python -OO drops it."""
-    parts = ['', *_SECTION.split(module.__doc__ or '')]
-    return dict(zip(parts[::2], parts[1::2])) if module.__doc__ else {}
+def sections(text: str | None) -> dict[str, str]:
+    """
+    Return a docstring by its sections; python -OO drops it.
+    """
+    parts = ['', *_SECTION.split(text or '')]
+    return dict(zip(parts[::2], parts[1::2])) if text else {}
 
 
-def _helps(module: ModuleType) -> dict[str, tuple[list[str], str]]:
+def helps(text: str | None, names: Mapping[str, Any]) -> Helps:
     """
-    Return what the docstring of a module says of arguments, names of the module filled in: what
-    the values of an option are called, and its help.
+    Return what a docstring says of arguments: what the values of each are called, and its help.
+
+    Parameters
+    ----------
+    text
+        Of the docstring.
+    names
+        That it may hold in braces.
     """
-    text = _sections(module).get('Options', '')
+    listed = sections(text).get('Options', '')
     with suppress(LookupError, ValueError):  # a study of another package may write braces
-        text = text.format_map(vars(arguments) | vars(module))
-    found = re.findall(r'^(\S+)(.*)\n((?: .*\n?)+)', text, re.MULTILINE)
+        listed = listed.format_map(names)
+    found = re.findall(r'^(\S+)(.*)\n((?: .*\n?)+)', listed, re.MULTILINE)
     return {name: (values.split(), ' '.join(lines.split())) for name, values, lines in found}
 
 
-def _explain(parser: argparse.ArgumentParser, helps: Mapping[str, tuple[list[str], str]]) -> None:
+def _explain(parser: argparse.ArgumentParser, known: Helps) -> None:
+    """Give each argument that has none its help."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for below in action.choices.values():
-                _explain(below, helps)
+                _explain(below, known)
         elif action.help is None:
             names = (*action.option_strings, str(action.metavar), action.dest)
             values, action.help = next(
-                (helps[name] for name in names if name in helps), ([], None)
+                (known[name] for name in names if name in known), ([], None)
             )
             if action.option_strings and values and action.metavar is None:
                 action.metavar = values[0] if len(values) == 1 else tuple(values)

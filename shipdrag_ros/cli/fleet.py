@@ -1,55 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Replay and diagnose every bag below folders, here or in an object store, and write one row a
-coastdown into a data set of Parquet files. The ship file of a bag is the nearest ship.yaml
-upwards, or the one attached. What is done already is not done again. Bags that cannot be read
-are skipped and listed, and the exit status is then 1.
-
-Options
--------
-DIR_OR_URL
-    folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): bags (MCAP,
-    rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows without options,
-    and logs that `shipdrag import` knows by their first bytes, whatever their names
---out STORE
-    folder; made if missing
---workers N
-    processes on this machine (default: one a core)
---scheduler ADDRESS
-    a Dask cluster that exists, as tcp://host:8786; its workers have one thread each, this version
-    of the program, and see the folders under the same paths
-
-Examples
---------
-shipdrag fleet records -o store --workers 1
-shipdrag fleet records -o store --json fleet.json
-"""
+"""Months of a fleet: a store of what its bags gave, the trend of each ship, a poster."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
-from shipdrag_ros.cli.arguments import add, whole
+from shipdrag_ros.cli.arguments import add, new_file, whole
 from shipdrag_ros.cli.output import Output, ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
+from shipdrag_ros.imports import need
 from shipdrag_ros.progress import Progress
+from shipdrag_ros.ship import Ship
 
-if TYPE_CHECKING:  # help must come at once
+if TYPE_CHECKING:
     from shipdrag_ros.fleet.update import Report
+    from shipdrag_ros.trend import ShipTrend
+
 
 _SKIPPED = 1
 _EVERY_S = 15.0  # a line of progress, where there is no terminal
 _SHOWN = 50  # of the bags that were skipped; all are in the JSON and in the store
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_fleet(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
@@ -61,9 +43,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, '--json')
 
 
-def run(options: argparse.Namespace) -> int:
+def run_fleet(options: argparse.Namespace) -> int:
     """
-    Bring the store up to date and say what became of the bags.
+    Replay and diagnose every bag below folders, here or in an object store, and write one row a
+    coastdown into a data set of Parquet files. The ship file of a bag is the nearest ship.yaml
+    upwards, or the one attached. What is done already is not done again. Bags that cannot be read
+    are skipped and listed, and the exit status is then 1.
+
+    Options
+    -------
+    DIR_OR_URL
+        folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): bags
+        (MCAP, rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows without
+        options, and logs that `shipdrag import` knows by their first bytes, whatever their names
+    --out STORE
+        folder; made if missing
+    --workers N
+        processes on this machine (default: one a core)
+    --scheduler ADDRESS
+        a Dask cluster that exists, as tcp://host:8786; its workers have one thread each, this
+        version of the program, and see the folders under the same paths
+
+    Examples
+    --------
+    shipdrag fleet records -o store --workers 1
+    shipdrag fleet records -o store --json fleet.json
     """
     from shipdrag_ros.fleet.engine import Engine
     from shipdrag_ros.fleet.find import find
@@ -89,12 +93,12 @@ def run(options: argparse.Namespace) -> int:
         _progress(output) as progress,
     ):
         report = update(found, store, engine, progress)
-    _show(output, options.out, report)
+    _show_fleet(output, options.out, report)
     output.json(_document(options.out, report))
     return _SKIPPED if report.skipped else 0
 
 
-def _show(output: Output, store: Path, report: Report) -> None:
+def _show_fleet(output: Output, store: Path, report: Report) -> None:
     coastdowns = sum(done.coastdowns for done in report.bags.values())
     read = [done for done in report.bags.values() if done.error is None]
     output.say(
@@ -161,3 +165,255 @@ def _progress(output: Output) -> Iterator[Progress]:
             yield lambda text, done, total: bar(done, total)
         return
     yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).show
+
+
+_LISTED = 4
+_CLOSED: dict[str, str | bool | int | float | list[str]] = {
+    'enable_external_access': 'false',
+    'python_enable_replacements': 'false',
+}
+
+
+def add_trend(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    add(parser, 'store')
+    parser.add_argument('--sql')
+    parser.add_argument('--csv', type=new_file('.csv'))
+    parser.add_argument('--parquet', type=new_file('.parquet'))
+    add(parser, '--report')
+    parser.add_argument('--pages', type=Path)
+    add(parser, '--json')
+
+
+def run_trend(options: argparse.Namespace) -> int:
+    """
+    Added resistance of each ship against time from the store of `shipdrag fleet`: how fast it
+    grows, cleanings and dockings that are known and steps that are not, outliers, when cleaning
+    pays (with `economics` in the ship file), and which hull comes first.
+
+    Options
+    -------
+    --sql QUERY
+        put a question to the store instead: runs (date, added percent, kN, USD), ships (the
+        ranking), coastdowns and bags (docs/trend.md)
+    --csv FILE.csv
+        write a row a coastdown, for a spreadsheet
+    --parquet FILE.parquet
+        the same as Parquet, for a data frame
+    --report FILE.html
+        write the trend with its pictures to one HTML file
+    --pages DIR
+        with --report: write a page a coastdown there, to which the rows of the report lead
+
+    Examples
+    --------
+    shipdrag trend store --json trend.json
+    shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'
+    """
+    need('pyarrow')
+    output = Output(options.json)
+    if options.sql is not None:
+        if any((options.csv, options.parquet, options.report, options.pages)):
+            raise FleetError('--sql: leave out --csv, --parquet, --report and --pages, or --sql')
+        _answer(output, options.store, options.sql)
+        return 0
+    if options.pages is not None and options.report is None:
+        raise FleetError('--pages DIR: give --report FILE.html too, whose rows lead there')
+    from shipdrag_ros.library.trends import Trends, trends_of
+
+    trends, skipped = trends_of(output, options.store)
+    for file in filter(None, (options.csv, options.parquet)):
+        from shipdrag_ros.trend.export import write_rows
+
+        write_rows(file, trends)
+        output.log(f'rows in {file}')
+    _show_trends(output, trends, skipped)
+    if options.report is not None:
+        from shipdrag_ros.trend.page import write_trends  # pictures take long to import
+
+        links = None if options.pages is None else _write_pages(output, options)
+        write_trends(options.report, trends, skipped, links=links)
+        output.log(f'report in {options.report}')
+    output.json(Trends(tuple(trends), tuple(skipped)).to_dict())
+    return 0
+
+
+def _write_pages(output: Output, options: argparse.Namespace) -> dict[tuple[str, int], str]:
+    """Write a page for each coastdown, and return where each is from the report."""
+    from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.trend.page import coastdown_page, links, page_name
+
+    folder, report = options.pages.absolute(), options.report.absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = read_coastdowns(options.store).to_pylist()
+        for row in rows:
+            text = coastdown_page(row, fleet=_way(folder, report))
+            (folder / page_name(row)).write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise FleetError(f'--pages {str(options.pages)!r}: {error.strerror}') from error
+    output.log(f'{len(rows)} page(s) in {options.pages}')
+    return links(rows, f'{_way(report.parent, folder)}/')
+
+
+def _way(here: Path, there: Path) -> str:
+    """Return a relative URL."""
+    return quote(os.path.relpath(there, here).replace(os.sep, '/'))
+
+
+def _show_trends(
+    output: Output, trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]
+) -> None:
+    """Show the fleet, then each ship."""
+    from shipdrag_ros.trend import words
+
+    if not trends:
+        output.say('The store holds no coastdown: no trend.')
+    else:
+        output.heading('Which hull first')
+        output.table(words.ranking(trends))
+        output.say(words.ranked_by(trends))
+    for trend in trends:
+        output.heading(trend.series.name)
+        for line in words.lines(trend):
+            output.say(line)
+        if trend.events:
+            output.table(words.event_table(trend))
+    if skipped:
+        output.heading(f'{len(skipped)} bag(s) could not be used')
+        output.table(Table(('bag', 'reason'), tuple(skipped)))
+
+
+def _answer(output: Output, store: Path, query: str) -> None:
+    """
+    Answer a question in SQL.
+
+    The tables are in memory and the database reads no file, whatever the question.
+    """
+    import duckdb
+
+    from shipdrag_ros.fleet.store import read_bags, read_coastdowns
+    from shipdrag_ros.library.trends import trends_of
+    from shipdrag_ros.trend.export import run_table, ship_table
+
+    trends, _ = trends_of(output, store)
+    tables = {
+        'runs': run_table(trends),
+        'ships': ship_table(trends),
+        'coastdowns': read_coastdowns(store),
+        'bags': read_bags(store),
+    }
+    with duckdb.connect(':memory:', config=_CLOSED) as database:
+        for name, table in tables.items():
+            database.register(name, table)
+        try:
+            database.execute("SET TimeZone = 'UTC'")
+            # as Arrow: a time with a zone needs no further package
+            found = database.sql(query)
+            answer = None if found is None else found.to_arrow_table()
+        except duckdb.Error as error:
+            known = '; '.join(
+                f'{name} ({", ".join(table.column_names)})' for name, table in tables.items()
+            )
+            raise FleetError(
+                f'the question cannot be answered: {error}; the tables are {known}'
+            ) from error
+    if answer is None:
+        raise FleetError('--sql: that is no question; begin with SELECT')
+    columns = tuple(answer.column_names)
+    rows = [tuple(row) for row in zip(*(column.to_pylist() for column in answer.columns))]
+    output.table(Table(columns, tuple(tuple(_cell(value) for value in row) for row in rows)))
+    output.json(
+        {'columns': list(columns), 'rows': [[_plain(cell) for cell in row] for row in rows]}
+    )
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, list) and len(value) > _LISTED:
+        return f'{len(value)} values'  # all are in the JSON
+    return '-' if value is None else f'{value:.6g}' if isinstance(value, float) else f'{value}'
+
+
+def _plain(value: object) -> object:
+    """Return what JSON can hold: dates, decimals and the like as text."""
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return value if value is None or isinstance(value, str | int | float) else str(value)
+
+
+SHIP_FILE = 'ship.yaml'
+
+
+def add_poster(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    add(parser, 'store', '--report', '--json')
+
+
+def run_poster(options: argparse.Namespace) -> int:
+    """
+    Stopping without engine, from the store of `shipdrag fleet`: time and way from speed to speed
+    with bands of 90 %, of all runs of each ship. One page to print, beside the wheelhouse poster
+    of IMO Resolution A.601(15), Appendix 2.
+
+    Options
+    -------
+    --report FILE.html
+        write the page with its pictures to one HTML file
+
+    Examples
+    --------
+    shipdrag poster store --report poster.html
+    shipdrag poster store --json poster.json
+    """
+    need('pyarrow')
+    from shipdrag_ros.fleet.store import read_coastdowns, ship_texts
+    from shipdrag_ros.trend.poster import poster, table, write_poster
+
+    output = Output(options.json)
+    rows = read_coastdowns(options.store).to_pylist()
+    texts = ship_texts(options.store)
+    posters = []
+    for name in dict.fromkeys(row['ship'] for row in rows):
+        text = texts.get(name, {}).get(SHIP_FILE)
+        if text is None:
+            output.say(f'{name}: no table, as the store keeps no ship file of her for n_r.')
+            continue
+        ship = Ship.from_yaml(text, subject=f'{name}: {SHIP_FILE}')
+        found = poster(ship, [row for row in rows if row['ship'] == name])
+        posters.append(found)
+        output.heading(name)
+        if found.steps:
+            output.table(table(found))
+        else:
+            output.say(f'None of {len(found.runs)} coastdowns has a curve over a step of speed.')
+    if not rows:
+        output.say('The store holds no coastdown: no table.')
+    if options.report is not None:
+        write_poster(options.report, posters)
+        output.log(f'page in {options.report}')
+    output.json(
+        {
+            'ships': [
+                {
+                    'name': each.ship.name,
+                    'coastdowns': len(each.runs),
+                    'steps': [
+                        {
+                            'from_m_s': step.from_m_s,
+                            'to_m_s': step.to_m_s,
+                            'runs': step.runs,
+                            'time_s': step.time_s._asdict(),
+                            'distance_m': step.way_m._asdict(),
+                        }
+                        for step in each.steps
+                    ],
+                }
+                for each in posters
+            ]
+        }
+    )
+    return 0

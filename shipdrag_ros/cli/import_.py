@@ -31,11 +31,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from shipdrag_ros import cli
 from shipdrag_ros.cli.arguments import add, checked
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.sources import formats
+from shipdrag_ros.sources import format, formats
 from shipdrag_ros.sources.format import Format, Job, Option
 from shipdrag_ros.sources.log import new_bag
 from shipdrag_ros.sources.reading import format_of, read_joined
@@ -53,26 +54,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, '--ship')
     parser.add_argument('--format', choices=[each.name for each in known])
     add(parser, '--json')
-    added: set[str] = set()
+    added, shared = set[str](), cli.helps(format.__doc__, {})
     for each in known:
-        group = parser.add_argument_group(f'{each.kind} ({each.name})', each.about)
+        about = cli.sections(each.about).get('')
+        group = parser.add_argument_group(f'{each.kind} ({each.name})', about)
         for option in each.options:
             if option.flag not in added:
-                _add_option(group, option)
+                _add_option(group, option, shared | cli.helps(each.about, {}))
                 added.add(option.flag)
     parser.set_defaults(misused=parser.error)
 
 
-def _add_option(group: argparse._ArgumentGroup, option: Option) -> None:
+def _add_option(group: argparse._ArgumentGroup, option: Option, helps: cli.Helps) -> None:
+    about = option.help or helps.get(option.flag, ([], None))[1]
     if not option.metavar:
-        group.add_argument(option.flag, action='store_const', const=True, help=option.help)
+        group.add_argument(option.flag, action='store_const', const=True, help=about)
         return
     group.add_argument(
         option.flag,
         action='append' if option.many else 'store',
         type=checked(option.read),
         metavar=option.metavar,
-        help=option.help,
+        help=about,
     )
 
 

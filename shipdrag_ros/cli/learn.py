@@ -1,46 +1,163 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Look for one form that explains what several coastdowns of one ship share and the library has
-no name for: a force by speed, time, heading, date or depth, or an error of the log by speed
-or time. It is written as a term with units, which --effects takes, where the evidence of all
-runs is for it, beside something smooth without a formula, and each half of the runs shows it.
-Else nothing is written, and it is said what is known and which run would decide.
-
-Options
--------
-BAG_OR_STORE
-    bag, or a store of `shipdrag fleet`, of which all bags are taken; {PART}
---ship FILE
-    ship file with a baseline (default: the one attached to the first bag, or kept in the store)
---out FILE
-    file of the effect, where one is learnt; an existing one is not overwritten
---report FILE.html
-    write the result with its pictures to one HTML file
---name NAME
-    what the effect is called, small letters, digits and _ (default: that of the file)
-
-Examples
---------
-shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html
-shipdrag learn clean_1.mcap clean_2.mcap --ship ship.yaml -o new.yaml --json learnt.json
-"""
+"""What is learnt of a ship from several runs: a baseline, an effect, files of effects."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.cli.arguments import add, unused_file
+import numpy as np
+
+from shipdrag_ros.cli.arguments import add, new_file, unused_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import WindowedBag, add_bags, open_windowed
-from shipdrag_ros.errors import FleetError
+from shipdrag_ros.display import Table
+from shipdrag_ros.errors import DiagnosisError, EffectFileError, FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import LearntTerm, Ship
+from shipdrag_ros.ship.expression import unit_text
 from shipdrag_ros.ship.term import check_name
+from shipdrag_ros.simulation.effects import LIBRARY, terms
+
+if TYPE_CHECKING:
+    from shipdrag_ros.diagnosis.learn_baseline import LearntBaseline
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_baseline(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    add_bags(parser)
+    parser.add_argument('--ship', required=True, type=Path)
+    parser.add_argument('-o', '--out', required=True, type=new_file('.yaml'))
+    add(parser, '--remap', '--json')
+
+
+def run_baseline(options: argparse.Namespace) -> int:
+    """
+    Learn the baseline of a ship from clean runs: clean hull, calm deep water, no wind. Writes the
+    ship file with the baseline that they show, in the form that it has, and how well it is known
+    for a further run: what the runs leave open, and by how much they differ from each other. Five
+    runs show that well; with one or two the stated relative_sd is kept. Without a baseline in the
+    ship file, r(v) of the runs is written as a table.
+
+    Options
+    -------
+    BAG
+        MCAP or rosbag2; {PART}
+    --ship FILE
+        ship file (YAML); the baseline in it is taken for what was known before
+    --out FILE
+        ship file to write, with the learnt baseline
+
+    Examples
+    --------
+    shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml
+    shipdrag baseline clean_1.mcap --ship ship.yaml -o first.yaml --json baseline.json
+    """
+    # what follows takes half a second to import
+    from shipdrag_ros.diagnosis.learn_baseline import learn_baseline
+    from shipdrag_ros.library.diagnosing import coasts_of
+    from shipdrag_ros.library.replaying import refuse_overlaps
+
+    output = Output(options.json)
+    if options.out.resolve() == options.ship.resolve():
+        raise DiagnosisError(
+            f'{str(options.out)!r} is the ship file itself, with what was known before; '
+            'write to another file'
+        )
+    runs = open_windowed(options.bags, remap=options.remap, output=output)
+    refuse_overlaps(runs)
+    with stages(output) as progress:
+        coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)
+    found = learn_baseline(coasts, ship, parameters)
+    options.out.write_text(found.ship.to_yaml(), encoding='utf-8')
+    _show_baseline(output, found)
+    output.log(f'ship file with the learnt baseline in {options.out}')
+    output.json(baseline_document(found, options.out))
+    return 0
+
+
+def baseline_document(found: LearntBaseline, out: Path) -> dict[str, Any]:
+    """
+    Return the document of a learnt baseline.
+    """
+    from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
+
+    enough = len(found.runs) >= ENOUGH
+    scatter = found.scatter, found.scatter_low, found.scatter_high
+    return {
+        'runs': [
+            {
+                'name': each.name,
+                'factor': {'value': 1.0 + each.factor.value, 'sd': each.factor.sd},
+                'chi2_per_sample': each.chi2_per_row,
+            }
+            for each in found.runs
+        ],
+        'factors': {
+            name: {'value': value, 'sd': sd}
+            for name, value, sd in zip(
+                found.names, found.factors, np.sqrt(np.diag(found.covariance)), strict=True
+            )
+        },
+        'covariance': found.covariance,
+        'scatter': dict(zip(('value', 'low', 'high'), scatter if enough else [None] * 3)),
+        'relative_sd': {
+            'before': None
+            if found.stated_sd is None
+            else dict(zip(found.names, found.stated_sd, strict=True)),
+            'after': dict(zip(found.names, found.relative_sd, strict=True)),
+            'correlation': found.correlation,
+        },
+        'speed_m_s': found.speed_m_s,
+        'warnings': found.warnings,
+        'output': str(out),
+    }
+
+
+def _show_baseline(output: Output, found: LearntBaseline) -> None:
+    from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
+
+    low, high = found.speed_m_s
+    output.say(
+        f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
+        f'{low:.2f} to {high:.2f} m/s.'
+    )
+    output.heading('Learnt baseline over the one before')
+    stated = found.stated_sd
+    rows = []
+    for i, name in enumerate(found.names):
+        before = '-' if stated is None else f'{stated[i]:.1%}'
+        sd = float(np.sqrt(found.covariance[i, i]))
+        after = f'{found.relative_sd[i]:.1%}'
+        rows.append((name, f'{found.factors[i]:.3f}', f'{sd:.3f}', before, after))
+    columns = ('', 'factor', 'sd', 'relative_sd before', 'after')
+    output.table(Table(columns, tuple(rows)))
+    if len(found.runs) >= ENOUGH:
+        output.say(
+            f'Runs scatter by {found.scatter:.1%} of their resistance '
+            f'({found.scatter_low:.1%} to {found.scatter_high:.1%}).'
+        )
+    if len(found.runs) > 1:
+        output.heading('Each run beside the others')
+        beside = tuple(
+            (
+                one.name,
+                f'{one.factor.value:+.1%}',
+                f'{one.factor.sd:.1%}',
+                f'{one.chi2_per_row:.2f}',
+            )
+            for one in found.runs
+        )
+        output.table(Table(('', 'resistance', 'sd', 'chi2 a sample'), beside))
+    for warning in found.warnings:
+        output.say(f'WARNING: {warning}')
+
+
+def add_learn(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
@@ -51,9 +168,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, '--report', '--remap', '--json')
 
 
-def run(options: argparse.Namespace) -> int:
+def run_learn(options: argparse.Namespace) -> int:
     """
-    Learn, and write what was learnt.
+    Look for one form that explains what several coastdowns of one ship share and the library has
+    no name for: a force by speed, time, heading, date or depth, or an error of the log by speed
+    or time. It is written as a term with units, which --effects takes, where the evidence of all
+    runs is for it, beside something smooth without a formula, and each half of the runs shows it.
+    Else nothing is written, and it is said what is known and which run would decide.
+
+    Options
+    -------
+    BAG_OR_STORE
+        bag, or a store of `shipdrag fleet`, of which all bags are taken; {PART}
+    --ship FILE
+        ship file with a baseline (default: the one attached to the first bag, or kept in the
+        store)
+    --out FILE
+        file of the effect, where one is learnt; an existing one is not overwritten
+    --report FILE.html
+        write the result with its pictures to one HTML file
+    --name NAME
+        what the effect is called, small letters, digits and _ (default: that of the file)
+
+    Examples
+    --------
+    shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html
+    shipdrag learn clean_1.mcap clean_2.mcap --ship ship.yaml -o new.yaml --json learnt.json
     """
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
@@ -133,3 +273,70 @@ def _place(store: Path, bag: Path) -> Path:
         f'{str(bag)!r} of the store {str(store)!r} is neither below this folder nor beside the '
         f'store; change to the folder that holds {bag.parts[0]!r}, or give the bags themselves'
     )
+
+
+def add_effect(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    verbs = parser.add_subparsers(
+        title='what to do', metavar='WHAT', dest='what', required=True, help='check or list'
+    )
+    check = verbs.add_parser('check', help='may a file be used, and if not, why')
+    check.add_argument('files', nargs='+', type=Path, metavar='FILE')
+    add(check, '--json')
+    every = verbs.add_parser('list', help='the effects of the library, and those learnt')
+    add(every, '--effects', '--json')
+
+
+def run_effect(options: argparse.Namespace) -> int:
+    """
+    A learnt effect is data: a formula with units, which is read and never run. `check` refuses
+    wrong units, names that are not known, poles inside the valid range and all that is no
+    formula; `list` shows the effects of the library and of the folders given.
+
+    Options
+    -------
+    FILE
+        learnt effect (YAML)
+
+    Examples
+    --------
+    shipdrag effect check effects/weed.yaml
+    shipdrag effect list --effects effects
+    """
+    output = Output(options.json)
+    return _check(options.files, output) if options.what == 'check' else _list(output)
+
+
+def _check(files: list[Path], output: Output) -> int:
+    document = []
+    refused: list[str] = []
+    for path in files:
+        try:
+            term = LearntTerm.load(path)
+        except EffectFileError as error:
+            refused += [f'{path}: {problem}' for problem in error.problems]
+            continue
+        unit = unit_text(term.units[0])
+        output.say(f'{path}: {term.name} can be used: {term.term.expression} [{unit}]')
+        document.append({'file': str(path), 'name': term.name, 'channel': term.term.channel})
+    output.json({'effects': document, 'refused': refused})
+    if refused:
+        raise EffectFileError('learnt effects', refused)
+    return 0
+
+
+def _list(output: Output) -> int:
+    rows, document = [], []
+    for effect in LIBRARY.values():
+        where = 'learnt' if terms([effect.name]) else 'library'
+        sizes = ', '.join(f'{q.name} [{q.unit or "-"}]' for q in effect.parameters)
+        rows.append((effect.name, effect.scope.value, sizes, where))
+        names = [q.name for q in effect.parameters]
+        document.append(
+            {'name': effect.name, 'scope': effect.scope.value, 'parameters': names, 'from': where}
+        )
+    output.table(Table(('effect', 'scope', 'parameters', 'from'), tuple(rows)))
+    output.json({'effects': document})
+    return 0

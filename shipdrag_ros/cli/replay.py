@@ -70,8 +70,7 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     if options.out is not None:
         need(*REPORT_MODULES)
-        options.out.mkdir(parents=True, exist_ok=True)
-    results = replayed(options, output, options.window)
+    results = replayed(options, output, options.window, out=options.out)
     ranking = rank(results) if options.compare else None
 
     for result in results:
@@ -101,6 +100,7 @@ def replayed(
     window: Sequence[float] | None = None,
     *,
     parts: bool = False,
+    out: Path | None = None,
 ) -> list[RunResult]:
     """
     Replay the bags with the ship, the parameters and the stop that were given.
@@ -115,10 +115,14 @@ def replayed(
         Of the bags without a window of their own.
     parts
         Whether a window is a part of the bag in which coastdowns are looked for.
+    out
+        A folder that is made as soon as all that was given is read.
     """
     ship = None if options.ship is None else Ship.load(options.ship)
     parameters = None if options.parameters is None else Parameters.load(options.parameters)
     runs = open_windowed(options.bags, remap=options.remap, window=window, output=output)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
     if parts:
         runs = [WindowedRun(run.part(*own) if own else run, None) for run, own in runs]
     return [

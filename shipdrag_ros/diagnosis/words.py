@@ -20,7 +20,7 @@ from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
+from shipdrag_ros.ship.sections import NO_CLEAN_HULL
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import find
 

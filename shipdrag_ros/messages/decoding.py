@@ -2,9 +2,10 @@
 """
 CDR bytes to blocks, the same for one live message and for a bag's thousands.
 
-The bytes are read by `gather`, message by message; what is computed from the
-numbers is computed on float64 arrays, so that a message alone and the same
-message in a batch agree to the last bit.
+Most messages of a topic have the same lengths and texts. Where the numbers lie is found in
+the first of them, and the others that lie alike are read at once; what is computed from the
+numbers is computed on float64 arrays, so that a message alone and the same message in a batch
+agree to the last bit.
 """
 
 from __future__ import annotations
@@ -14,17 +15,16 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.gather import BODY, COLUMNS, TIME_BYTES, GatherResult, gather, steps
 from shipdrag_ros.messages.topics import Source
-from shipdrag_ros.messages.types import PADDING_BYTES, MalformedMessage
+from shipdrag_ros.messages.types import MalformedMessage, MessageLayout
 from shipdrag_ros.samples import (
     FURTHER,
     PITCHES,
@@ -38,6 +38,7 @@ from shipdrag_ros.samples import (
 )
 
 PLACES = len(SHAFTS)
+COLUMNS = 4  # two values and two variances
 _CHANNELS = (*SHAFTS, *PITCHES, Channel.RUDDER)
 """Of each slot: of the shafts, of the pitches, and of the rudder."""
 _RUDDER = len(_CHANNELS) - 1
@@ -47,168 +48,86 @@ _SIDE = re.compile(
 )
 _WINDOW, _MOST = 64, 4096  # messages compared with the first; twice as many where all are alike
 _MOST_BYTES = 1 << 20  # of messages compared at once
-_KEPT, _KEPT_BYTES = 64, 4096  # layouts, by the size of their messages, none of a longer one
+_KEPT, _KEPT_BYTES = 256, 4096  # plans, by the size of their messages, none of a longer one
+
+_Place = tuple[np.dtype[Any], int]
+"""Form of a number, and where it lies in its message."""
 
 
-Further = tuple[NDArray[np.intp], int, Float64]
-"""Joints beyond the first of their messages: places of these, one channel, and the values."""
-
-
-class MessageRows(NamedTuple):
+class _Plan(NamedTuple):
     """
-    What is read of n messages, to be filled.
+    How messages that lie alike are read.
+
+    Attributes
+    ----------
+    fixed, content : (k,)
+        Bytes that are the same in all, and what they are.
+    stamp
+        Of seconds and nanoseconds; none of a type that holds no time.
+    samples
+        Channel of each, and its numbers by column.
+    surplus
+        Joints without a slot.
     """
 
-    code: UInt8
-    stamp_ns: Int64
-    value: Float64
-    found: UInt8
-
-
-class _JointLayout(NamedTuple):
-    """Channel and place of each value, joints without a slot, and bytes that may not differ."""
-
-    channels: list[Channel]
-    places: list[int]
-    surplus: int
     fixed: NDArray[np.intp]
     content: UInt8
+    stamp: list[_Place]
+    samples: list[tuple[Channel, dict[int, _Place]]]
+    surplus: int = 0
 
 
-def read_joints(
-    data: UInt8,
-    start: Int64,
-    end: Int64,
-    place: NDArray[np.intp],
-    channel: Channel,
-    rows: MessageRows,
-    more: list[Further],
-) -> int:
-    """
-    Read the joints of some messages.
-
-    Parameters
-    ----------
-    data : (b,) uint8
-        Holds the messages.
-    start, end : (n,) int64
-        Where each message begins and ends.
-    place : (k,) intp
-        Which messages are read.
-    channel
-        Of the rudder, or of any shaft.
-    rows
-        Filled with the first joint of each.
-    more
-        Lengthened by the others.
-
-    Returns
-    -------
-    int
-        How many joints had no place left.
-    """
-    surplus, left, width = 0, place, _WINDOW
-    while len(left):
-        first = left[0]
-        content = data[start[first] : end[first]]
-        layout = _layout_of(content, rudder=channel is Channel.RUDDER)
-        if layout is None:
-            rows.found[first] = GatherResult.MALFORMED
-            left = left[1:]
-            continue
-        near = left[: max(min(width, _MOST_BYTES // len(content)), 1)]
-        alike = end[near] - start[near] == len(content)
-        messages = data[start[near[alike]][:, np.newaxis] + np.arange(len(content))]
-        same = (messages[:, layout.fixed] == layout.content).all(axis=1)
-        alike[alike] = same
-        taken, messages = near[alike], messages[same]
-        _fill(rows, taken, messages, layout, more)
-        surplus += layout.surplus * len(taken)
-        left = np.concatenate((near[~alike], left[len(near) :]))
-        width = min(2 * width, _MOST) if alike.all() else _WINDOW
-    return surplus
+_known: dict[tuple[Source, int], _Plan] = {}
 
 
-def _fill(
-    rows: MessageRows,
-    taken: NDArray[np.intp],
-    messages: UInt8,
-    layout: _JointLayout,
-    more: list[Further],
-) -> None:
-    """Read messages of one layout, (n, bytes of each)."""
-    order = '>' if messages[0, 1] == 0 else '<'
-    rows.found[taken] = GatherResult.READ if layout.channels else GatherResult.NO_JOINT
-    seconds, nanoseconds = (
-        np.ascontiguousarray(messages[:, at : at + 4]).view(f'{order}{kind}')[:, 0]
-        for at, kind in ((BODY, 'i4'), (BODY + 4, 'u4'))
-    )
-    rows.stamp_ns[taken] = seconds.astype(np.int64) * SECOND_NS + nanoseconds
-    for number, (channel, at) in enumerate(zip(layout.channels, layout.places, strict=True)):
-        values = np.ascontiguousarray(messages[:, at : at + 8]).view(f'{order}f8')[:, 0]
-        if number:
-            more.append((taken, channel, values.astype(np.float64)))
-            continue
-        rows.code[taken] = channel
-        rows.value[taken, 0], rows.value[taken, 1] = values, 0.0
-        rows.value[taken, 2:COLUMNS] = np.nan
-
-
-_known: dict[tuple[int, bool], _JointLayout] = {}
-
-
-def _layout_of(content: UInt8, *, rudder: bool) -> _JointLayout | None:
-    """Return where the values of a message lie, found now if it is not as the last of its size."""
-    key = len(content), rudder
+def _plan_of(source: Source, content: UInt8) -> _Plan | None:
+    """Return the plan of a message, made now if it lies not as the last of its size."""
+    key = source, len(content)
     known = _known.get(key)
     if known is None or (content[known.fixed] != known.content).any():
-        known = _layout(content, rudder=rudder)
+        known = _plan(_readings()[source], content)
         kept = len(content) <= _KEPT_BYTES and (key in _known or len(_known) < _KEPT)
         if known is not None and kept:
             _known[key] = known
     return known
 
 
-def _layout(content: UInt8, *, rudder: bool) -> _JointLayout | None:
-    """Find where the values of a message lie; None of what is no JointState."""
-    try:
-        sent = types.deserialize(types.JOINT_STATE, content.tobytes())
-    except MalformedMessage:
-        return None
-    joints, surplus = _slots(sent.name, rudder=rudder)
-    at = _behind(TIME_BYTES, sent.header.frame_id)
-    at = _aligned(at, 4) + 4
-    for name in sent.name:
-        at = _behind(at, name)
-    varies = np.zeros(len(content), np.bool_)
-    varies[BODY : BODY + TIME_BYTES] = True
-    firsts = []
-    for values in (sent.position, sent.velocity, sent.effort):
-        at = _aligned(at, 4) + 4
-        at = _aligned(at, 8) if len(values) else at
-        firsts.append(BODY + at)
-        at += 8 * len(values)
-        varies[firsts[-1] : BODY + at] = True
-    if not 0 <= len(content) - (BODY + at) <= PADDING_BYTES:
-        return None
-    found = [
-        (_CHANNELS[slot], firsts[moves] + 8 * joint)
-        for slot, joint in sorted(joints.items())
-        for moves in [slot < PLACES]  # the rate of a shaft, the angle of the others
-        if joint < len(sent.velocity if moves else sent.position)
-    ]
-    fixed = np.flatnonzero(~varies)
-    places = [place for _, place in found]
-    return _JointLayout([each for each, _ in found], places, surplus, fixed, content[fixed])
+def _plan(reading: _Reading, content: UInt8) -> _Plan | None:
+    """Find where the numbers of a message lie; None of what is malformed."""
+    for type_name, fields in reading.ways:
+        try:
+            layout = types.layout_of(type_name, content.tobytes())
+        except MalformedMessage:
+            continue
+        stamp = [f'header.stamp.{part}' for part in ('sec', 'nanosec') if reading.stamped]
+        samples, surplus = [(reading.channel, fields)], 0
+        if not fields:
+            samples, surplus = _joints(layout, rudder=reading.channel is Channel.RUDDER)
+        return _Plan(
+            layout.fixed,
+            content[layout.fixed],
+            [layout.number(path) for path in stamp],
+            [
+                (channel, {k: layout.number(path) for k, path in enumerate(paths) if path})
+                for channel, paths in samples
+            ],
+            surplus,
+        )
+    return None
 
 
-def _behind(at: int, text: str) -> int:
-    """Return where a string ends that begins at a place, or at the next that is aligned."""
-    return _aligned(at, 4) + 4 + len(text.encode()) + 1
-
-
-def _aligned(at: int, size: int) -> int:
-    return -(-at // size) * size
+def _joints(
+    layout: MessageLayout, *, rudder: bool
+) -> tuple[list[tuple[Channel, Sequence[str]]], int]:
+    """Return channel and value of the joints that have a slot, and how many have none left."""
+    slots, surplus = _slots(layout.texts.get('name', []), rudder=rudder)
+    found: list[tuple[Channel, Sequence[str]]] = []
+    for slot, joint in sorted(slots.items()):
+        # the rate of a shaft, the angle of the others
+        array = 'velocity' if slot < PLACES else 'position'
+        if joint < layout.arrays[array][2]:
+            found.append((_CHANNELS[slot], [f'{array}[{joint}]']))
+    return found, surplus
 
 
 def _slots(names: list[str], *, rudder: bool) -> tuple[dict[int, int], int]:
@@ -339,6 +258,15 @@ class DecodedBatch(NamedTuple):
     unreadable: tuple[Counter[Unreadable], ...]
 
 
+class _Samples(NamedTuple):
+    """Samples of one channel: which message each came from, its stamp, values and variances."""
+
+    message: NDArray[np.intp]
+    channel: UInt8
+    stamp_ns: Int64
+    table: Float64
+
+
 def decode_batch(
     sources: Sequence[Source],
     number: NDArray[np.uint16],
@@ -363,66 +291,66 @@ def decode_batch(
     receive_ns : (n,) int64
         Time of arrival of each [ns].
     """
-    n = len(start)
-    code, found = np.empty(n, np.uint8), np.full(n, GatherResult.NOTHING, np.uint8)
-    readings = [_readings()[source] for source in sources]
-    width = max((reading.width for reading in readings), default=COLUMNS)
-    stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
+    nothing = np.empty(0, np.int64)
+    found = [_Samples(nothing, np.empty(0, np.uint8), nothing, np.empty((0, COLUMNS)))]
     unreadable = []
-    more: list[Further] = []
-    for i, reading in enumerate(readings):
-        place = np.flatnonzero(number == i)
-        if not reading.steps:
-            into = MessageRows(code, stamp_ns, rows, found)
-            surplus = read_joints(data, start, end, place, reading.channel, into, more)
-            unreadable.append(_count(found[place], surplus))
-            continue
-        code[place] = reading.channel
-        if not reading.stamped:
-            stamp_ns[place] = receive_ns[place]
-        for by in reading.steps:
-            unread = gather(data, start, end, place, by, stamp_ns, rows, found)
-            if reading.columns is not None:
-                computed = reading.columns(rows[place, COLUMNS : reading.width])
-                rows[place, :COLUMNS] = computed
-            if not unread:
-                break
-            place = place[found[place] != GatherResult.READ]
-        unreadable.append(_count(found[place]) if unread else Counter())
-    kept = np.flatnonzero(found == GatherResult.READ)
-    if more:
-        kept, code, rows = _with_more(kept, code, rows, more)
-        stamp_ns, receive_ns = stamp_ns[kept], receive_ns[kept]
-    elif len(kept) < n:
-        code, stamp_ns, rows, receive_ns = code[kept], stamp_ns[kept], rows[kept], receive_ns[kept]
-    block = Block(code, stamp_ns, receive_ns, rows[:, :2], rows[:, 2:COLUMNS])
+    for i, source in enumerate(sources):
+        counts: Counter[Unreadable] = Counter()
+        left, width = np.flatnonzero(number == i), _WINDOW
+        while len(left):
+            first = left[0]
+            plan = _plan_of(source, data[start[first] : end[first]])
+            if plan is None:
+                counts[Unreadable.MALFORMED] += 1
+                left = left[1:]
+                continue
+            near = left[: max(min(width, _MOST_BYTES // len(plan.fixed)), 1)]
+            alike = end[near] - start[near] == end[first] - start[first]
+            fixed = data[start[near[alike]][:, np.newaxis] + plan.fixed]
+            alike[alike] = (fixed == plan.content).all(axis=1)
+            taken = near[alike]
+            found += _read(_readings()[source], plan, data, start[taken], taken, receive_ns)
+            counts[Unreadable.NO_JOINT] += 0 if plan.samples else len(taken)
+            counts[Unreadable.SURPLUS_JOINT] += plan.surplus * len(taken)
+            left = np.concatenate((near[~alike], left[len(near) :]))
+            width = min(2 * width, _MOST) if alike.all() else _WINDOW
+        unreadable.append(Counter({each: counts[each] for each in Unreadable if counts[each]}))
+    message, code, stamp_ns, table = map(np.concatenate, zip(*found, strict=True))
+    order = np.argsort(message, kind='stable')
+    kept, table = message[order], table[order]
+    block = Block(code[order], stamp_ns[order], receive_ns[kept], table[:, :2], table[:, 2:])
     return DecodedBatch(block, kept, tuple(unreadable))
 
 
-def _with_more(
-    kept: NDArray[np.intp], code: UInt8, rows: Float64, more: Sequence[Further]
-) -> tuple[NDArray[np.intp], UInt8, Float64]:
-    """Put further joints behind the first one of their message."""
-    message = np.concatenate([kept, *(messages for messages, _, _ in more)])
-    order = np.argsort(message, kind='stable')
-    message = message[order]
-    code, rows = code[message], rows[message]
-    further = np.flatnonzero(order >= len(kept))
-    which = order[further] - len(kept)
-    codes = [np.full(len(messages), channel, np.uint8) for messages, channel, _ in more]
-    code[further] = np.concatenate(codes)[which]
-    rows[further, 0] = np.concatenate([values for _, _, values in more])[which]
-    return message, code, rows
+def _read(
+    reading: _Reading,
+    plan: _Plan,
+    data: UInt8,
+    start: Int64,
+    message: NDArray[np.intp],
+    receive_ns: Int64,
+) -> Iterator[_Samples]:
+    """Yield the samples of messages that lie alike, those of a channel together."""
 
+    def numbers(form: np.dtype[Any], at: int) -> NDArray[Any]:
+        places = start[:, np.newaxis] + np.arange(at, at + form.itemsize)
+        found: NDArray[Any] = data[places].view(form)[:, 0]
+        return found
 
-def _count(found: UInt8, surplus: int = 0) -> Counter[Unreadable]:
-    """Count what gave no sample."""
-    results, times = np.unique(found[found != GatherResult.READ], return_counts=True)
-    reasons = [Unreadable[GatherResult(each).name] for each in results]
-    counts = Counter(dict(zip(reasons, times.tolist(), strict=True)))
-    if surplus:
-        counts[Unreadable.SURPLUS_JOINT] = surplus
-    return counts
+    stamp_ns = receive_ns[message]
+    if plan.stamp:
+        seconds, nanoseconds = (numbers(*place) for place in plan.stamp)
+        stamp_ns = seconds.astype(np.int64) * SECOND_NS + nanoseconds
+    for channel, places in plan.samples:
+        table = np.full((len(message), reading.width), np.nan)
+        table[:, :2] = 0.0
+        for column, place in places.items():
+            with np.errstate(invalid='ignore'):  # a NaN of float32 that signals
+                table[:, column] = numbers(*place)
+        table = table if reading.columns is None else reading.columns(table)
+        variance = table[:, 2:]
+        variance[~((variance > 0.0) & (variance < np.inf))] = np.nan
+        yield _Samples(message, np.full(len(message), channel, np.uint8), stamp_ns, table)
 
 
 Converted = Callable[[Float64], Float64]
@@ -435,30 +363,32 @@ class _Reading:
 
     Attributes
     ----------
-    steps
-        Through the type as it is, then through the type as it was; none through
-        JointState, which `read_joints` reads.
+    channel
+        Of joints, which their names tell apart, that of the first.
+    ways
+        The type as it is, then as it was, and the field of each column; none of joints.
     columns
-        Values and variances of the extra fields; None where they are as sent.
-    width
-        Number of values, variances and extra fields.
-    stamped
-        Whether the type holds a time; what has none counts from its arrival.
+        Makes values and variances of these; None where they are as sent.
     """
 
     channel: Channel
-    steps: tuple[Int64, ...]
+    ways: tuple[tuple[str, Sequence[str]], ...]
     columns: Converted | None
-    width: int
-    stamped: bool
+
+    @cached_property
+    def width(self) -> int:
+        """Number of columns."""
+        return COLUMNS if self.columns is None else len(self.ways[0][1])
+
+    @cached_property
+    def stamped(self) -> bool:
+        """Whether the type holds a time; what has none counts from its arrival."""
+        return types.is_stamped(self.ways[0][0])
 
 
 def _table(*columns: Float64 | float) -> Float64:
-    """Put two values and two variances side by side; what says nothing is NaN."""
-    table = np.stack(np.broadcast_arrays(*columns), axis=1)
-    variance = table[:, 2:]
-    variance[~((variance > 0.0) & (variance < np.inf))] = np.nan
-    return table
+    """Put two values and two variances side by side."""
+    return np.stack(np.broadcast_arrays(*columns), axis=1)
 
 
 def _fix(extra: Float64) -> Float64:
@@ -540,15 +470,10 @@ def _reading(
     older: str | None = None,
 ) -> tuple[Source, _Reading]:
     """Pair a source with its two values and two variances; `columns` makes them of the fields."""
-    if columns is not None:
-        fields = (*[''] * COLUMNS, *fields)
-    ways = [steps(type_name, fields)] if fields else []  # joints are read otherwise
+    ways: list[tuple[str, Sequence[str]]] = [(type_name, fields)]
     if older is not None:
-        ways.append(steps(older, [field for field in fields if field != 'variance']))
-    width, stamped = max(len(fields), COLUMNS), types.is_stamped(type_name)
-    return Source(channel.input, type_name), _Reading(
-        channel, tuple(ways), columns, width, stamped
-    )
+        ways.append((older, [field for field in fields if field != 'variance']))
+    return Source(channel.input, type_name), _Reading(channel, tuple(ways), columns)
 
 
 @cache
@@ -559,6 +484,14 @@ def _readings() -> Mapping[Source, _Reading]:
             if reading.channel is channel.kind and channel.input in FURTHER:
                 found[Source(channel.input, source.type)] = replace(reading, channel=channel)
     return found
+
+
+def fields_of(channel: Channel, type_name: str) -> dict[str, int]:
+    """
+    Return the fields that hold values and variances of a channel, with the column of each.
+    """
+    ((_, fields), *_) = _readings()[Source(channel.input, type_name)].ways
+    return {field: column for column, field in enumerate(fields[:COLUMNS]) if field}
 
 
 def _each_reading() -> Iterator[tuple[Source, _Reading]]:

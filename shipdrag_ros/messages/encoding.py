@@ -10,7 +10,6 @@ once, and numbers and times are filled in.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from math import cos, inf, nan, sin
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.messages import types
+from shipdrag_ros.messages.decoding import fields_of
 from shipdrag_ros.samples import (
     FURTHER,
     PITCHES,
@@ -35,14 +35,7 @@ from shipdrag_ros.samples import (
 
 FieldNumbers = int | Callable[[Float64], Float64]
 """A column of (n, 4) values and variances, 0 where not known, or the (n,) numbers made of them."""
-_X, _Y, _VARIANCE_X, _VARIANCE_Y = range(4)
-
-# stand for the numbers of a message until their places in it are known
-_MARKS: dict[str, tuple[str, tuple[float, ...]]] = {
-    'float64': ('<d', tuple(1e-200 * k for k in range(1, 5))),
-    'float32': ('<f', tuple(2.0**-k for k in range(60, 64))),
-    'uint8': ('<B', (0xA7,)),
-}
+_X, _VARIANCE_X = 0, 2
 
 
 class EncodedMessage(NamedTuple):
@@ -174,29 +167,21 @@ def _rows(channel: Channel, block: Block) -> NDArray[np.uint8]:
 def _template(channel: Channel) -> tuple[bytes, np.dtype[Any]]:
     """Return the bytes of a message of a channel, and where its time and numbers lie."""
     encoder = _ENCODERS[channel]
-    kinds = {leaf.path: leaf.kind for leaf in types.leaves(encoder.type)}
-    marks = {kind: iter(each) for kind, (_, each) in _MARKS.items()}
-    marked = {path: next(marks[_kind(kinds, path)]) for path in encoder.numbers}
     constants = {'header': types.header(0, encoder.frame), **encoder.constants}
-    payload = types.serialize(encoder.type, types.make(encoder.type, constants | marked))
-    first = types.ENCAPSULATION_BYTES
-    places = {'seconds': ('<i4', first), 'nanoseconds': ('<u4', first + 4)}
-    for path, mark in marked.items():
-        form, _ = _MARKS[_kind(kinds, path)]
-        places[path] = form, payload.index(struct.pack(form, mark))
+    payload = types.serialize(encoder.type, types.make(encoder.type, constants))
+    number = types.layout_of(encoder.type, payload).number
+    paths = {path: path for path in encoder.numbers}
+    paths |= {'seconds': 'header.stamp.sec', 'nanoseconds': 'header.stamp.nanosec'}
+    forms, offsets = zip(*map(number, paths.values()), strict=True)
     layout = np.dtype(
         {
-            'names': list(places),
-            'formats': [form for form, _ in places.values()],
-            'offsets': [place for _, place in places.values()],
+            'names': list(paths),
+            'formats': list(forms),
+            'offsets': list(offsets),
             'itemsize': len(payload),
         }
     )
     return payload, layout
-
-
-def _kind(kinds: Mapping[str, str], path: str) -> str:
-    return kinds[path.partition('[')[0]]
 
 
 def _kind_of_covariance(given: Float64) -> Float64:
@@ -242,37 +227,25 @@ def _of_joint(name: str, *, moves: bool) -> _Encoder:
     return _Encoder(types.JOINT_STATE, '', {moving: _X}, joint)
 
 
-_SPEED = _Encoder(
-    types.TWIST_WITH_COVARIANCE,
-    'base_link',
-    {'twist.twist.linear.x': _X, 'twist.covariance[0]': _VARIANCE_X},
-)
+def _as_read(
+    channel: Channel, type_name: str, constants: Mapping[str, Any] = MappingProxyType({})
+) -> _Encoder:
+    """Return how samples become messages of which `decode` reads every field as it is."""
+    frame = 'map' if channel is Channel.POSITION else 'base_link'
+    return _Encoder(type_name, frame, fields_of(channel, type_name), constants)
+
+
+_SPEED = _as_read(Channel.SPEED_THROUGH_WATER, types.TWIST_WITH_COVARIANCE)
+_FIX = _as_read(Channel.POSITION_GEODETIC, types.NAV_SAT_FIX, {'altitude': nan})
 _ENCODERS: dict[Channel, _Encoder] = {
     Channel.SPEED_THROUGH_WATER: _SPEED,
     Channel.SPEED_OVER_GROUND: _SPEED,
-    Channel.POSITION: _Encoder(
-        types.POSE_WITH_COVARIANCE,
-        'map',
-        {
-            'pose.pose.position.x': _X,
-            'pose.pose.position.y': _Y,
-            'pose.covariance[0]': _VARIANCE_X,
-            'pose.covariance[7]': _VARIANCE_Y,
-        },
-        {'pose.pose.orientation.w': 1.0},
+    Channel.POSITION: _as_read(
+        Channel.POSITION, types.POSE_WITH_COVARIANCE, {'pose.pose.orientation.w': 1.0}
     ),
-    Channel.POSITION_GEODETIC: _Encoder(
-        types.NAV_SAT_FIX,
-        'base_link',
-        {
-            'latitude': _X,
-            'longitude': _Y,
-            # in east, north, up
-            'position_covariance[4]': _VARIANCE_X,
-            'position_covariance[0]': _VARIANCE_Y,
-            'position_covariance_type': _kind_of_covariance,
-        },
-        {'altitude': nan},  # and 0: STATUS_FIX, SERVICE_UNKNOWN
+    # and 0: STATUS_FIX, SERVICE_UNKNOWN
+    Channel.POSITION_GEODETIC: _FIX._replace(
+        numbers={**_FIX.numbers, 'position_covariance_type': _kind_of_covariance}
     ),
     Channel.HEADING: _Encoder(
         types.QUATERNION,
@@ -282,14 +255,8 @@ _ENCODERS: dict[Channel, _Encoder] = {
     **{each: _of_joint(each.name.lower(), moves=True) for each in SHAFTS},
     **{each: _of_joint(each.name.lower(), moves=False) for each in PITCHES},
     Channel.RUDDER: _of_joint('rudder', moves=False),
-    Channel.WIND_APPARENT: _Encoder(
-        types.TWIST, 'base_link', {'twist.linear.x': _X, 'twist.linear.y': _Y}
-    ),
-    Channel.DEPTH: _Encoder(
-        types.RANGE,
-        'base_link',
-        {'range': _X, 'variance': _VARIANCE_X},
-        {'max_range': inf},  # and 0: ULTRASOUND
-    ),
+    Channel.WIND_APPARENT: _as_read(Channel.WIND_APPARENT, types.TWIST),
+    # and 0: ULTRASOUND
+    Channel.DEPTH: _as_read(Channel.DEPTH, types.RANGE, {'max_range': inf}),
 }
 _ENCODERS |= {each: _ENCODERS[each.kind] for each in Channel if each.input in FURTHER}

@@ -12,9 +12,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 from functools import cache, reduce
+from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 
@@ -46,13 +48,17 @@ VELOCITY = 'geometry_msgs/msg/VelocityStamped'
 ENCAPSULATION_BYTES = 4
 _BIG_ENDIAN = b'\x00\x00'
 _LITTLE_ENDIAN = b'\x00\x01'
+_ORDERS = {_BIG_ENDIAN: '>', _LITTLE_ENDIAN: '<'}
 # Fast DDS counts an alignment to 8 behind each empty sequence of doubles and then writes none, so
 # that up to 15 bytes follow a JointState; rosbags' own check would refuse what rclpy sends
 PADDING_BYTES = 15
+_LENGTH, _CHARACTER = np.dtype('u4'), np.dtype('u1')
 
 _TIME = struct.Struct('iI')  # builtin_interfaces/Time: the first that a header holds
 
 RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
+_FURTHER = {RANGE_BEFORE_IRON: 'RangeBeforeIron.msg', DVL: 'Dvl.msg'}
+"""Not of ROS 2 Jazzy itself; what a bag holds is read without its package."""
 
 
 @cache
@@ -61,27 +67,9 @@ def _store() -> Typestore:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
-    store.register(
-        get_types_from_msg(
-            'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
-            'float32 min_range\nfloat32 max_range\nfloat32 range\n',
-            RANGE_BEFORE_IRON,
-        )
-    )
-    # not of ROS itself; what a bag holds is read without its package
-    store.register(
-        get_types_from_msg(
-            'uint8 DVL_MODE_BOTTOM=1\nuint8 DVL_MODE_WATER=2\n'
-            'uint8 DVL_TYPE_PISTON=0\nuint8 DVL_TYPE_PHASED_ARRAY=1\n'
-            'std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\n'
-            'geometry_msgs/Vector3 velocity\nfloat64[9] velocity_covar\n'
-            'float64 altitude\nfloat64 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n'
-            'float32 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\n'
-            'geometry_msgs/Vector3[4] beam_unit_vec\nfloat64[4] range\nfloat32[4] range_covar\n'
-            'float32[4] beam_quality\nfloat32[4] beam_velocity\nfloat32[4] beam_velocity_covar\n',
-            DVL,
-        )
-    )
+    for name, file in _FURTHER.items():
+        text = (resources.files('shipdrag_ros') / 'data' / file).read_text(encoding='utf-8')
+        store.register(get_types_from_msg(text, name))
     return store
 
 
@@ -225,6 +213,92 @@ def leaves(type_name: str, path: str = '') -> Iterator[Leaf]:
             case _:  # the element, a number or text, and how many
                 (_, (kind, _)), length = about
                 yield Leaf(path + name, kind, length if node is Nodetype.ARRAY else None)
+
+
+class MessageLayout(NamedTuple):
+    """
+    Where the parts of a message lie in its bytes.
+
+    Attributes
+    ----------
+    arrays
+        Form for numpy, first byte and count of numbers, by path.
+    texts
+        By path.
+    fixed : (k,) intp
+        Bytes of lengths and texts: a message of the same size with the same ones lies alike.
+    """
+
+    arrays: dict[str, tuple[np.dtype[Any], int, int]]
+    texts: dict[str, list[str]]
+    fixed: NDArray[np.intp]
+
+    def number(self, path: str) -> tuple[np.dtype[Any], int]:
+        """
+        Return form and place of a number, `twist.linear.x` or `covariance[7]` for instance.
+        """
+        name, bracket, which = path.partition('[')
+        form, first, count = self.arrays[name]
+        index = int(which.removesuffix(']')) if bracket else 0
+        if index >= count:
+            raise KeyError(path)
+        return form, first + form.itemsize * index
+
+
+@cache
+def _leaves(type_name: str) -> tuple[Leaf, ...]:
+    return tuple(leaves(type_name))
+
+
+def layout_of(type_name: str, payload: bytes) -> MessageLayout:
+    """
+    Find where the parts of a message lie in CDR bytes of either byte order.
+
+    Raises
+    ------
+    MalformedMessage
+        If the bytes are not such a message.
+    """
+    order = _ORDERS.get(payload[:2], '')
+    if not order or len(payload) < ENCAPSULATION_BYTES:
+        raise MalformedMessage(f'unknown encapsulation {payload[:2]!r}')
+    body, at = payload[ENCAPSULATION_BYTES:], 0
+    arrays: dict[str, tuple[np.dtype[Any], int, int]] = {}
+    texts: dict[str, list[str]] = {}
+    fixed = np.zeros(len(payload), np.bool_)
+    fixed[: len(_BIG_ENDIAN)] = True
+
+    def taken(count: int, form: np.dtype[Any], *, fixes: bool = False) -> int:
+        """Return where so many numbers or characters lie, behind what was taken before."""
+        nonlocal at
+        first = -(-at // form.itemsize) * form.itemsize if count else at
+        at = first + form.itemsize * count
+        if at > len(body):
+            raise MalformedMessage(f'not a {type_name}: it ends too early')
+        fixed[ENCAPSULATION_BYTES + first : ENCAPSULATION_BYTES + at] = fixes
+        return first
+
+    def length() -> int:
+        first = taken(1, _LENGTH, fixes=True)
+        return int.from_bytes(body[first:at], 'big' if order == '>' else 'little')
+
+    for path, kind, many in _leaves(type_name):
+        count = length() if many is None else many
+        if kind != 'string':
+            form = np.dtype(f'{order}{np.dtype(kind).str[1:]}')
+            arrays[path] = form, ENCAPSULATION_BYTES + taken(count, form), count
+            continue
+        for _ in range(count):
+            text = body[taken(length(), _CHARACTER, fixes=True) : at]
+            try:
+                if text[-1:] != b'\0':
+                    raise ValueError('a text without an end')
+                texts.setdefault(path, []).append(text[:-1].decode())
+            except ValueError as error:
+                raise MalformedMessage(f'not a {type_name}: {error}') from error
+    if len(body) - at > PADDING_BYTES:
+        raise MalformedMessage(f'not a {type_name}: {len(body) - at} bytes too long')
+    return MessageLayout(arrays, texts, np.flatnonzero(fixed))
 
 
 def definition(type_name: str) -> str:

@@ -35,7 +35,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages.topics import READY_S
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
+from shipdrag_ros.ship.sections import NO_CLEAN_HULL
 from shipdrag_ros.simulation.effects import carrying
 
 COMPILER = 'compiling'

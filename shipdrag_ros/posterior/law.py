@@ -19,7 +19,7 @@ from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
-from shipdrag_ros.ship.baseline import TableBaseline
+from shipdrag_ros.ship.sections import TableBaseline
 from shipdrag_ros.simulation.hydrodynamics import (
     USUAL_FORM_FACTOR,
     drag_n,

@@ -28,6 +28,7 @@ from shipdrag_ros.fields import (
     section,
     show,
     text,
+    unexpected,
 )
 from shipdrag_ros.parameter import Prior, Shape, log_normal, normal
 from shipdrag_ros.samples import Float64
@@ -182,8 +183,7 @@ def _prior() -> Kind:
 
     def read(value: object, path: str, problems: Problems) -> object:
         if not (isinstance(value, list) and len(value) == 3 and value[0] in (*PRIORS,)):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         row = two.read(value[1:], path, problems)
         if row is INVALID:
             return INVALID

@@ -12,7 +12,7 @@ import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -119,7 +119,7 @@ class Formula:
             raise FormulaError(
                 f'{", ".join(unknown)} is not known; known are {", ".join(sorted(names))}'
             )
-        return _Walk(algebra, names).of(self.tree)
+        return _walk(self.tree, algebra, names)
 
 
 def _tree(text: str) -> ast.expr:
@@ -161,38 +161,32 @@ def _check(node: ast.expr, depth: int) -> set[str]:
     )
 
 
-@dataclass(frozen=True)
-class _Walk(Generic[T]):
-    """One walk over a tree that was checked."""
-
-    algebra: Algebra[T]
-    names: Mapping[str, T]
-
-    def of(self, node: ast.expr) -> T:
-        algebra = self.algebra
-        if isinstance(node, ast.Constant):
-            assert isinstance(node.value, int | float)
-            return algebra.number(float(node.value))
-        if isinstance(node, ast.Name):
-            return self.names[node.id]
-        if isinstance(node, ast.UnaryOp):
-            value = self.of(node.operand)
-            if isinstance(node.op, ast.UAdd):
-                return value
-            return algebra.binary('*', algebra.number(-1.0), value)
-        if isinstance(node, ast.Call):
-            assert isinstance(node.func, ast.Name)
-            return algebra.call(node.func.id, [self.of(value) for value in node.args])
-        assert isinstance(node, ast.BinOp)
-        left = self.of(node.left)
-        if not isinstance(node.op, ast.Pow):
-            return algebra.binary(_SIGNS[type(node.op)], left, self.of(node.right))
-        exponent = _literal(node.right)
-        if exponent is None:
-            return algebra.power_of(left, self.of(node.right))
-        if abs(exponent) > _STEEPEST:
-            raise FormulaError(f'has the exponent {exponent:g}, at most {_STEEPEST:g} is allowed')
-        return algebra.power(left, exponent)
+def _walk(node: ast.expr, algebra: Algebra[T], names: Mapping[str, T]) -> T:
+    """Return a part of a tree that was checked in some algebra."""
+    if isinstance(node, ast.Name):
+        return names[node.id]
+    if isinstance(node, ast.Constant):
+        assert isinstance(node.value, int | float)
+        return algebra.number(float(node.value))
+    if isinstance(node, ast.UnaryOp):
+        value = _walk(node.operand, algebra, names)
+        if isinstance(node.op, ast.UAdd):
+            return value
+        return algebra.binary('*', algebra.number(-1.0), value)
+    if isinstance(node, ast.Call):
+        assert isinstance(node.func, ast.Name)
+        return algebra.call(node.func.id, [_walk(each, algebra, names) for each in node.args])
+    assert isinstance(node, ast.BinOp)
+    left = _walk(node.left, algebra, names)
+    exponent = _literal(node.right) if isinstance(node.op, ast.Pow) else None
+    if exponent is None:
+        right = _walk(node.right, algebra, names)
+        if isinstance(node.op, ast.Pow):
+            return algebra.power_of(left, right)
+        return algebra.binary(_SIGNS[type(node.op)], left, right)
+    if abs(exponent) > _STEEPEST:
+        raise FormulaError(f'has the exponent {exponent:g}, at most {_STEEPEST:g} is allowed')
+    return algebra.power(left, exponent)
 
 
 def _literal(node: ast.expr) -> float | None:

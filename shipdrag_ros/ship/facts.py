@@ -9,12 +9,14 @@ effect, the effect declares.
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.fields import INVALID, Kind, Problems, number, show
+from shipdrag_ros.fields import INVALID, Kind, Problems, number, show, unexpected
 
 RATE = 0.02  # how often a fact that is stated is wrong, unless given
 LEAST_RATE, MOST_RATE = 1e-4, 0.5
@@ -125,6 +127,10 @@ class Fact:
         return round(day.timestamp() * 1e9)
 
 
+class _WrongFact(Exception):
+    """What is wrong with a fact, a sentence each."""
+
+
 def parse_fact(text: str) -> Fact:
     """
     Read `NAME[=VALUE][,rate=RATE]`.
@@ -149,11 +155,10 @@ def parse_fact(text: str) -> Fact:
     >>> parse_fact('shaft=locked,rate=0.05')
     Fact(name='shaft', value='locked', rate=0.05)
     """
-    problems: Problems = []
-    found = _of_text(text, '', problems)
-    if found is None:
-        raise DiagnosisError(f'fact {text!r}: {"; ".join(problems)}')
-    return found
+    try:
+        return _of_text(text, '')
+    except _WrongFact as wrong:
+        raise DiagnosisError(f'fact {text!r}: {"; ".join(wrong.args)}') from None
 
 
 def usage() -> str:
@@ -189,57 +194,56 @@ def fact_list() -> Kind:
     expectation = f'a list, or names with values: {usage()}'
 
     def read(value: object, path: str, problems: Problems) -> object:
-        if isinstance(value, dict):
-            given = [_of_pair(name, item, path, problems) for name, item in value.items()]
-        elif isinstance(value, list):
-            given = [_of_item(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
-        else:
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
-        facts = [fact for fact in given if fact is not None]
-        names = [fact.name for fact in facts]
-        for name in dict.fromkeys(names):
-            if names.count(name) > 1:
-                problems.append(f'{path}: {name} is given {names.count(name)} times, keep one')
-        return tuple(facts) if len(facts) == len(given) == len(set(names)) else INVALID
+        before = len(problems)
+        if not isinstance(value, dict | list):
+            return unexpected(value, path, problems, expectation)
+        facts = []
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            try:
+                if isinstance(value, dict):
+                    facts.append(_of_pair(key, item, path))
+                else:
+                    facts.append(_of_item(item, f'{path}[{key}]'))
+            except _WrongFact as wrong:
+                problems.extend(wrong.args)
+        for name, count in Counter(fact.name for fact in facts).items():
+            if count > 1:
+                problems.append(f'{path}: {name} is given {count} times, keep one')
+        return INVALID if len(problems) > before else tuple(facts)
 
     return Kind(read, expectation)
 
 
-def _of_item(item: object, path: str, problems: Problems) -> Fact | None:
+def _of_item(item: object, path: str) -> Fact:
     """Read an item of a list: a text, `NAME: VALUE`, or name, value and rate."""
     if isinstance(item, str):
-        return _of_text(item, f'{path}: ', problems)
+        return _of_text(item, f'{path}: ')
     if isinstance(item, dict) and 'name' in item:
         rest = {key: value for key, value in item.items() if key != 'name'}
-        return _of_pair(item['name'], rest, path, problems)
+        return _of_pair(item['name'], rest, path)
     if isinstance(item, dict) and len(item) == 1:
         ((name, value),) = item.items()
-        return _of_pair(name, value, path, problems)
-    problems.append(f'{path}: {show(item)}, expected one of {usage()}')
-    return None
+        return _of_pair(name, value, path)
+    raise _WrongFact(f'{path}: {show(item)}, expected one of {usage()}')
 
 
-def _of_pair(name: object, item: object, path: str, problems: Problems) -> Fact | None:
+def _of_pair(name: object, item: object, path: str) -> Fact:
     """Read what stands behind a name: true, a value, or `{value: , rate: }`."""
     place = f'{path}.{name}'
     rate: object = RATE
     if isinstance(item, dict):
         unknown = [key for key in item if key not in ('value', 'rate')]
         if unknown:
-            problems.append(f'{place}.{unknown[0]}: unknown key; known are value, rate')
-            return None
+            raise _WrongFact(f'{place}.{unknown[0]}: unknown key; known are value, rate')
         rate, item = item.get('rate', RATE), item.get('value', True)
     if item is False or item is None:
-        problems.append(f'{place}: {show(item)}; leave out what is not known to be so')
-        return None
+        raise _WrongFact(f'{place}: {show(item)}; leave out what is not known to be so')
     if isinstance(item, str) and ',' in item:
-        return _of_text(f'{name}={item}', f'{place}: ', problems)
-    value = '' if item is True else str(item)
-    return _checked(str(name), value, rate, f'{place}: ', problems)
+        return _of_text(f'{name}={item}', f'{place}: ')
+    return _checked(str(name), '' if item is True else str(item), rate, f'{place}: ')
 
 
-def _of_text(text: str, place: str, problems: Problems) -> Fact | None:
+def _of_text(text: str, place: str) -> Fact:
     """Read `NAME[=VALUE][,rate=RATE]`."""
     stated, *others = text.split(',')
     name, equals, value = (part.strip() for part in stated.partition('='))
@@ -247,33 +251,28 @@ def _of_text(text: str, place: str, problems: Problems) -> Fact | None:
     for other in others:
         key, _, word = (part.strip() for part in other.partition('='))
         if key != 'rate':
-            problems.append(f'{place}{key!r} is not known; write NAME[=VALUE][,rate=RATE]')
-            return None
-        try:
+            raise _WrongFact(f'{place}{key!r} is not known; write NAME[=VALUE][,rate=RATE]')
+        rate = word
+        with suppress(ValueError):
             rate = float(word)
-        except ValueError:
-            rate = word
     if equals and not value:
         value = ' '  # none of what is expected
-    return _checked(name, value, rate, place, problems)
+    return _checked(name, value, rate, place)
 
 
-def _checked(name: str, value: str, rate: object, place: str, problems: Problems) -> Fact | None:
-    before = len(problems)
+def _checked(name: str, value: str, rate: object, place: str) -> Fact:
     if name not in KNOWN:
         near = difflib.get_close_matches(name, KNOWN, n=1)
         hint = f'did you mean {near[0]}? ' if near else ''
-        problems.append(f'{place}{name!r} is no known fact; {hint}known are {usage()}')
-        return None
-    wrong = KNOWN[name].refuses(value)
-    if wrong:
-        problems.append(f'{place}{name} {wrong}')
-    if isinstance(rate, str) or _RATE.read(rate, 'rate', []) is INVALID:
-        problems.append(
+        raise _WrongFact(f'{place}{name!r} is no known fact; {hint}known are {usage()}')
+    refused = KNOWN[name].refuses(value)
+    wrong = [f'{place}{name} {refused}'] if refused else []
+    if not isinstance(rate, int | float) or _RATE.read(rate, 'rate', []) is INVALID:
+        wrong.append(
             f'{place}rate is {rate!r}, expected {LEAST_RATE:g}..{MOST_RATE:g}, the share of such '
             'facts that are wrong'
         )
-    if len(problems) > before:
-        return None
+    if wrong:
+        raise _WrongFact(*wrong)
     assert isinstance(rate, int | float)
     return Fact(name, value, float(rate))

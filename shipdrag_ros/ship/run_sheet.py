@@ -10,9 +10,8 @@ import numpy as np
 
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, section, text_of
-from shipdrag_ros.ship.consistency import inconsistencies
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.model import Ship
+from shipdrag_ros.ship.model import Ship, inconsistencies
 
 NAME = 'run.yaml'
 _FRESH, _SEA = 999.0, 1026.0  # kg/m^3 at 15 degrees

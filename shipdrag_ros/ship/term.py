@@ -37,9 +37,9 @@ from shipdrag_ros.fields import (
     plain,
     read_keys,
     section,
-    show,
     text,
     text_of,
+    unexpected,
 )
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.declared import (
@@ -430,8 +430,7 @@ def learnt_terms() -> Kind:
     def read(value: object, path: str, problems: Problems) -> object:
         before = len(problems)
         if not isinstance(value, list):
-            problems.append(f'{path}: {show(value)}, expected {expectation}')
-            return INVALID
+            return unexpected(value, path, problems, expectation)
         found = read_terms({f'{path}[{i}].': item for i, item in enumerate(value)}, problems)
         return INVALID if len(problems) > before else found
 

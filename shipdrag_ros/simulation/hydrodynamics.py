@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.ship.baseline import ittc57
-from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
+from shipdrag_ros.ship.model import usual_wetted_surface_m2
+from shipdrag_ros.ship.sections import ittc57
 
 ROPES = (0.01, 0.04)  # C0 of towed ropes in practice
 USUAL_FORM_FACTOR = 0.2  # where the baseline is a table

@@ -1,5 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a format of log files declares: how it is recognised, read and shown, and its options."""
+"""
+What a format of log files declares: how it is recognised, read and shown, and its options.
+
+Options
+-------
+--date YYYY-MM-DD
+    date (UTC) of the first time, for a log that has only times of day; of NMEA 0183 also for
+    one that is whole cycles of the GPS week (1024 weeks) early
+--gear RATIO
+    revolutions of the engine for one of the shaft: takes the shaft from the engine, of which
+    alone NMEA 2000 and Signal K hold; 1 without a gear
+--rate HZ
+    without times: rows of a table, or frames of NMEA 2000, a second [Hz]; above 0 [Hz]
+--transducer M
+    depth of the echo sounder below the surface, where the log does not state it [m]
+"""
 
 from __future__ import annotations
 
@@ -76,7 +91,8 @@ class Option:
     flag
         `--date` for instance.
     metavar, help
-        As argparse shows them; without a metavar it is a switch.
+        As argparse shows them; without a metavar it is a switch. Without a help it is that which
+        the docstring of the format has under `Options`.
     read
         Text to value; a ValueError or an ImportDataError says why not.
     many
@@ -85,7 +101,7 @@ class Option:
 
     flag: str
     metavar: str
-    help: str
+    help: str = ''
     read: Callable[[str], Any] = str
     many: bool = False
 
@@ -128,32 +144,10 @@ def _number(text: str, expected: str, fits: Callable[[float], bool]) -> float:
     return value
 
 
-DATE = Option(
-    '--date',
-    'YYYY-MM-DD',
-    'date (UTC) of the first time, for a log that has only times of day; of NMEA 0183 also for '
-    'one that is whole cycles of the GPS week (1024 weeks) early',
-    _date,
-)
-GEAR = Option(
-    '--gear',
-    'RATIO',
-    'revolutions of the engine for one of the shaft: takes the shaft from the engine, of which '
-    'alone NMEA 2000 and Signal K hold; 1 without a gear',
-    positive,
-)
-RATE = Option(
-    '--rate',
-    'HZ',
-    'without times: rows of a table, or frames of NMEA 2000, a second [Hz]; above 0 [Hz]',
-    positive,
-)
-TRANSDUCER = Option(
-    '--transducer',
-    'M',
-    'depth of the echo sounder below the surface, where the log does not state it [m]',
-    _depth_m,
-)
+DATE = Option('--date', 'YYYY-MM-DD', read=_date)
+GEAR = Option('--gear', 'RATIO', read=positive)
+RATE = Option('--rate', 'HZ', read=positive)
+TRANSDUCER = Option('--transducer', 'M', read=_depth_m)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import main, verbs
-from shipdrag_ros.cli.completion import SHELLS, script
+from shipdrag_ros.cli.installation import SHELLS, script
 
 LIMIT_S = 200
 PROGRAM = [sys.executable, '-m', 'shipdrag_ros.cli']

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.cli import demo, doctor, main
-from shipdrag_ros.cli.doctor import findings
+from shipdrag_ros.cli import demo, installation, main
+from shipdrag_ros.cli.installation import findings
 from shipdrag_ros.cli.output import CheckState
 
 
-def by_name(out: Path) -> dict[str, doctor.CheckResult]:
+def by_name(out: Path) -> dict[str, installation.CheckResult]:
     return {each.what: each for each in findings(out)}
 
 
@@ -41,18 +41,18 @@ def test_a_port_in_use_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         taken.bind(('127.0.0.1', 0))
         taken.listen()
         port = taken.getsockname()[1]
-        monkeypatch.setattr(doctor, '_PAGE_PORT', port)
+        monkeypatch.setattr(installation, '_PAGE_PORT', port)
         assert by_name(tmp_path)[f'port {port}'].state is CheckState.LOOK
 
 
 def test_a_missing_package_is_told_with_what_does_not_work(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(doctor, '_OPTIONAL', {'no_such_package': 'the impossible'})
+    monkeypatch.setattr(installation, '_OPTIONAL', {'no_such_package': 'the impossible'})
     found = by_name(tmp_path)['no_such_package']
     assert (found.state, found.found) == (
         CheckState.LOOK,
         'missing; does not work: the impossible',
     )
-    monkeypatch.setattr(doctor, '_NEEDED', ('numpy', 'no.such.package'))
+    monkeypatch.setattr(installation, '_NEEDED', ('numpy', 'no.such.package'))
     assert by_name(tmp_path)['packages'].state is CheckState.BROKEN
     assert main(['doctor', '--out', str(tmp_path)]) == 1
 

@@ -238,3 +238,13 @@ def test_what_stands_beside_a_bag_holds_for_its_replay(coastdown_bag, tmp_path, 
     assert {'bag': str(bag), 'warning': f'{sheet} holds for this run'} in found['warnings']
     (of_run,) = found['coastdowns']
     assert (alone['reference']['wind'], of_run['reference']['wind']) == ('unknown', 'stated')
+
+
+@pytest.mark.parametrize('wrong', [['--ship', 'none.yaml'], ['--parameters', 'none.yaml']])
+def test_no_folder_is_made_where_a_file_cannot_be_read(
+    coastdown_bag: Path, tmp_path: Path, wrong: list[str]
+) -> None:
+    out = tmp_path / 'report'
+    assert main(['replay', str(coastdown_bag), '--out', str(out), *wrong]) == 1
+    assert main(['replay', str(tmp_path / 'none.mcap'), '--out', str(out)]) == 1
+    assert not out.exists()

@@ -9,7 +9,7 @@ import pytest
 
 import shipdrag_ros as sd
 from shipdrag_ros.diagnosis import words
-from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
+from shipdrag_ros.ship.sections import NO_CLEAN_HULL
 
 SHIP = sd.Ship.example()
 

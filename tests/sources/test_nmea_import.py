@@ -25,7 +25,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
 from shipdrag_ros.sources.format import Job
-from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
+from shipdrag_ros.sources.formats.nmea import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
 
 from .conftest import into_bag
@@ -647,9 +647,9 @@ def test_a_compressed_log_and_a_cut_one() -> None:
 
 def test_a_long_log_is_not_attached(monkeypatch: pytest.MonkeyPatch) -> None:
     log = lines(rmc(0), rmc(1))
-    monkeypatch.setattr('shipdrag_ros.sources.formats.nmea.importer.LOG_LIMIT_BYTES', len(log) - 1)
+    monkeypatch.setattr('shipdrag_ros.sources.formats.nmea.LOG_LIMIT_BYTES', len(log) - 1)
     assert not run(log)[0].log_attached
-    monkeypatch.setattr('shipdrag_ros.sources.formats.nmea.importer.LOG_LIMIT_BYTES', len(log))
+    monkeypatch.setattr('shipdrag_ros.sources.formats.nmea.LOG_LIMIT_BYTES', len(log))
     assert run(log)[0].log_attached
 
 

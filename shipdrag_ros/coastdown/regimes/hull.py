@@ -12,7 +12,7 @@ from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.ship.baseline import ittc57
+from shipdrag_ros.ship.sections import ittc57
 
 # Taylor's wetted-surface coefficient of ordinary hulls; C_T = 1.25 C_F + 0.0004
 _TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4

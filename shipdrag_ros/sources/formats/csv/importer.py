@@ -4,6 +4,30 @@ Tables separated by comma, semicolon, tab, bar or blanks, with titles above, uni
 header, decimal commas, dates, coordinates as 4530.20N. Columns are known by their usual names
 (STW SOG HDG Lat Lon RPM AWS AWA ...) where their unit is stated or can be worked out; other
 columns are listed and not used. With --map these columns alone are taken.
+
+Options
+-------
+--map INPUT=COLUMN[:unit]
+    column (name, or number from 1) of an input; more than once for more inputs. position and
+    wind_apparent take two, and a unit given once holds for both: position=x,y:km is
+    position=x:km,y:km. A position in deg is latitude and longitude: position=lat,lon:deg, as
+    one without a unit whose columns have such names. speed_over_ground takes two where they
+    are its components. Units: speeds m/s kn km/h ft/s mph, lengths m km ft nmi, angles rad
+    deg, of a heading also compass (deg clockwise from north), shaft rad/s rpm rev/s, pitch
+    ratio %% rad deg (default: the first of each); wind_apparent=AWS:kn,AWA:deg is speed and
+    angle. shaft and pitch take up to four, one a shaft: shaft=port,starboard:rpm. A further
+    log, speed or position: speed_through_water_2=COLUMN:kn, and so on to _3
+--time COLUMN[:unit]
+    column of the time: a date, or a count since 1970 or from the start of the test; units s ms
+    us ns (default: s); DATE,TIME for a date and a time of day
+--speed-unit UNIT
+    unit of the speeds whose columns state none: m/s kn km/h ft/s mph
+--date-order ORDER
+    order of day and month in dates that leave it open: dmy, mdy or ymd
+--zone ZONE
+    time zone of dates that state none: +02:00 or Europe/Rome (default: UTC)
+--where COLUMN=VALUE
+    take only rows with this text in the column; more than once for more conditions
 """
 
 # What cannot be read in a cell is counted by reason with its first lines; what can be read is
@@ -362,54 +386,13 @@ FORMAT = Format(
     score=_score,
     read=_open,
     options=(
-        Option(
-            '--map',
-            'INPUT=COLUMN[:unit]',
-            'column (name, or number from 1) of an input; more than once for more inputs. '
-            'position and wind_apparent take two, and a unit given once holds for both: '
-            'position=x,y:km is position=x:km,y:km. A position in deg is latitude and longitude: '
-            'position=lat,lon:deg, as one without a unit whose columns have such names. '
-            'speed_over_ground takes two where they are its components. '
-            'Units: speeds m/s kn km/h ft/s mph, lengths m km ft nmi, angles rad deg, of a '
-            'heading also compass (deg clockwise from north), shaft rad/s rpm rev/s, pitch ratio '
-            '%% rad deg (default: the first of each); wind_apparent=AWS:kn,AWA:deg is speed and '
-            'angle. shaft and pitch take up to four, one a shaft: shaft=port,starboard:rpm. '
-            'A further log, speed or position: speed_through_water_2=COLUMN:kn, and so on to _3',
-            many=True,
-        ),
-        Option(
-            '--time',
-            'COLUMN[:unit]',
-            'column of the time: a date, or a count since 1970 or from the start of the test; '
-            'units s ms us ns (default: s); DATE,TIME for a date and a time of day',
-            parse_time,
-        ),
+        Option('--map', 'INPUT=COLUMN[:unit]', many=True),
+        Option('--time', 'COLUMN[:unit]', read=parse_time),
         RATE,
-        Option(
-            '--speed-unit',
-            'UNIT',
-            'unit of the speeds whose columns state none: m/s kn km/h ft/s mph',
-            _one_of(tuple(SPEED_UNITS)),
-        ),
-        Option(
-            '--date-order',
-            'ORDER',
-            'order of day and month in dates that leave it open: dmy, mdy or ymd',
-            _one_of(ORDERS),
-        ),
-        Option(
-            '--zone',
-            'ZONE',
-            'time zone of dates that state none: +02:00 or Europe/Rome (default: UTC)',
-            zone_of,
-        ),
-        Option(
-            '--where',
-            'COLUMN=VALUE',
-            'take only rows with this text in the column; more than once for more conditions',
-            _where,
-            many=True,
-        ),
+        Option('--speed-unit', 'UNIT', read=_one_of(tuple(SPEED_UNITS))),
+        Option('--date-order', 'ORDER', read=_one_of(ORDERS)),
+        Option('--zone', 'ZONE', read=zone_of),
+        Option('--where', 'COLUMN=VALUE', read=_where, many=True),
     ),
     chosen_by='map',
     by_head=False,

@@ -1,21 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-Look at the installation: Python, packages, ROS 2, where compiled code is kept, the port of
-the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 something is broken.
-
-Options
--------
---out DIR
-    where recordings would go (default: this folder)
---run
-    also sail a simulated ship past the node over ROS topics, replay what it records and compare
-    with the truth: PASS, or what failed
-
-Examples
---------
-shipdrag doctor
-shipdrag doctor --out records --json
-"""
+"""The installation: what of it works, and its completion in a shell."""
 
 from __future__ import annotations
 
@@ -29,7 +13,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from shipdrag_ros import __version__
+import shtab
+
+from shipdrag_ros import __version__, cli
 from shipdrag_ros.cli.arguments import add
 from shipdrag_ros.cli.output import CheckResult, CheckState, Output
 from shipdrag_ros.display import Table
@@ -61,7 +47,7 @@ _OPTIONAL = {  # module: what does not work without it
 _FINE, _LOOK, _BROKEN = CheckState
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_doctor(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
@@ -70,9 +56,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(parser, '--json')
 
 
-def run(options: argparse.Namespace) -> int:
+def run_doctor(options: argparse.Namespace) -> int:
     """
-    Look, and say what to do.
+    Look at the installation: Python, packages, ROS 2, where compiled code is kept, the port of
+    the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 something is broken.
+
+    Options
+    -------
+    --out DIR
+        where recordings would go (default: this folder)
+    --run
+        also sail a simulated ship past the node over ROS topics, replay what it records and
+        compare with the truth: PASS, or what failed
+
+    Examples
+    --------
+    shipdrag doctor
+    shipdrag doctor --out records --json
     """
     output = Output(options.json)
     found = list(findings(options.out))
@@ -202,3 +202,59 @@ def _clock() -> CheckResult:
     if not _SYNCHRONISED.exists():
         return CheckResult('clock', _LOOK, 'systemd has not set it yet', 'timedatectl status')
     return CheckResult('clock', _FINE, 'set by systemd-timesyncd')
+
+
+SHELLS = ('bash', 'zsh', 'fish')
+_FOLDER = ('DIR', 'STORE', 'DIR_OR_URL')
+_FILE = ('FILE', 'BAG', 'SOURCE')
+
+
+def add_completion(parser: argparse.ArgumentParser) -> None:
+    """
+    Add what the verb takes.
+    """
+    parser.add_argument('shell', choices=SHELLS)
+    parser.add_argument('-o', '--out', type=Path)
+
+
+def run_completion(options: argparse.Namespace) -> int:
+    """
+    Print the script that completes verbs, options and files. Where a shell looks for it: bash:
+    ~/.local/share/bash-completion/completions/shipdrag; zsh: a file _shipdrag in a folder of
+    $fpath; fish: ~/.config/fish/completions/shipdrag.fish.
+
+    Options
+    -------
+    shell
+        for which shell
+    --out FILE
+        write it there (default: to stdout)
+
+    Examples
+    --------
+    shipdrag completion bash -o shipdrag.bash
+    shipdrag completion fish
+    """
+    text = script(options.shell)
+    if options.out is None:
+        print(text)
+    else:
+        options.out.write_text(text + '\n', encoding='utf-8')
+        print(f'{options.out} completes shipdrag in {options.shell} once it is read')
+    return 0
+
+
+def script(shell: str) -> str:
+    """
+    Return the script for a shell, one of `SHELLS`.
+    """
+    whole = cli.parser(*(verb.name for verb in cli.verbs()))
+    verbs = next(each for each in whole._actions if isinstance(each, argparse._SubParsersAction))
+    for parser in (whole, *verbs.choices.values()):
+        for action in parser._actions:
+            metavar = str(action.metavar or '').partition('.')[0]
+            if metavar in _FOLDER:
+                action.complete = shtab.DIRECTORY
+            elif metavar in _FILE:
+                action.complete = shtab.FILE
+    return shtab.complete(whole, shell)
