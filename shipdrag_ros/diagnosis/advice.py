@@ -23,10 +23,8 @@ from itertools import combinations
 import numpy as np
 from scipy.special import softmax
 
-from shipdrag_ros.diagnosis.context import Context
-from shipdrag_ros.diagnosis.earlier import Carried
-from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
+from shipdrag_ros.diagnosis.known import Carried, Facts
+from shipdrag_ros.diagnosis.observation import Context, Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.estimation.run_down import TURNS, RunDown

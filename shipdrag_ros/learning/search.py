@@ -17,16 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.diagnose import (
-    effects_about,
-    observed,
-    of_one_day,
-    stated_in,
-)
-from shipdrag_ros.diagnosis.gaps import held_out, where
+from shipdrag_ros.diagnosis.diagnose import effects_about, observed, of_one_day, stated_in
 from shipdrag_ros.diagnosis.observation import Observation, day_of, lowest_m_s, ship_runs
 from shipdrag_ros.diagnosis.result import RunSize, Where
-from shipdrag_ros.diagnosis.verdict import ComparedRuns, runs_differ
+from shipdrag_ros.diagnosis.verdict import ComparedRuns, held_out, runs_differ, where
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.linear import inverse_of

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import pictures
+from shipdrag_ros.diagnosis import page as pictures
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.diagnose import waiting
 from shipdrag_ros.diagnosis.page import write_diagnosis
 from shipdrag_ros.diagnosis.result import (
     Advice,
@@ -21,7 +22,6 @@ from shipdrag_ros.diagnosis.result import (
     EffectEstimate,
     WeighedFact,
 )
-from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameter import Parameter
