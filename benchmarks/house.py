@@ -51,7 +51,12 @@ AIMS = {
     'lines of code, benchmarks': 10_000,
     'words, README and docs': 25_000,
 }
-PRINTED = {'Declared', '_number', '_grid'}  # rows of tables of priors, which pages show
+PRINTED = {
+    'Declared',
+    '_families',
+    '_number',
+    '_grid',
+}  # rows of tables of priors, which pages show
 PLAIN = {0, 1, 2, 0.5}
 WALK = """
 import json, sys

@@ -34,9 +34,7 @@ from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    Verdict,
     Weighed,
-    decide,
     names_one,
     probabilities,
 )
@@ -314,7 +312,7 @@ class DiagnosedRuns(ComparedRuns):
     """
 
     facts: Facts
-    earlier: Carried | None
+    earlier: Carried
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
@@ -378,19 +376,10 @@ def advice(
         measure = Measure(each.measure)
         if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
             ranked[each] = _reach(measure, candidates, case.inseparable)
-    for name, named in _facts(case).items():
-        ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
+    for name, named in case.facts.naming(case.found, case.inseparable).items():
+        if named >= _HARDLY:
+            ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
     return _by_cost(ranked)
-
-
-def _facts(case: DiagnosedRuns) -> dict[str, float]:
-    """Return the facts that would name something, and how probably."""
-
-    def decided(after: Mapping[Names, float]) -> bool:
-        return decide(after, case.inseparable).verdict is Verdict.NAMED
-
-    found = case.facts.naming(case.found, decided)
-    return {name: named for name, named in found.items() if named >= _HARDLY}
 
 
 def _by_cost(ranked: Mapping[Advice, float]) -> tuple[Advice, ...]:

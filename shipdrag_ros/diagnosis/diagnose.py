@@ -21,9 +21,11 @@ from shipdrag_ros.diagnosis.observation import CoastRun, Observation, ship_runs
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
+    Compared,
     DiagnosisResult,
     EffectEstimate,
     Gap,
+    RunTrace,
     SeenRun,
 )
 from shipdrag_ros.diagnosis.verdict import (
@@ -33,7 +35,6 @@ from shipdrag_ros.diagnosis.verdict import (
     judge,
     limits_of,
     runs_differ,
-    traces,
     where,
 )
 from shipdrag_ros.diagnosis.words import listed, names_text, of_the_earth, probability, sentence
@@ -52,9 +53,13 @@ from shipdrag_ros.inference.decision import (
     Verdict,
     smallest_set,
 )
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import Comparing
+from shipdrag_ros.posterior.compare import (
+    Comparing,
+    Fitted,
+    RunResidual,
+)
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
@@ -64,8 +69,6 @@ from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, terms
 
 _APART_M_S = 0.15  # slowly: six times what is usual of water
-
-
 Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
 """Runs, and what is to be said about them."""
 
@@ -212,7 +215,7 @@ def _answer(
         facts=case.facts.weighed(found, names),
         runs_differ=differ,
         runs=_seen_runs(seen),
-        earlier=() if case.earlier is None else case.earlier.judged(found),
+        earlier=case.earlier.judged(found),
         limits=limits_of(judged, comparing, case.inseparable),
     )
 
@@ -278,19 +281,14 @@ def compare(
         What earlier diagnoses say of the runs.
     """
 
-    def log_known(hypothesis: Explanation) -> float:
-        before = 0.0 if earlier is None else earlier.log_weight(hypothesis)
-        return facts.log_likelihood(hypothesis) + before
-
+    before = Carried(ship, 0, ()) if earlier is None else earlier
     effects = effects_about(seen)
-    return Comparing(
-        ship_runs(seen, ship),
-        ship,
-        effects,
-        log_known,
-        () if earlier is None else earlier.ways(effects),
-        effects,
-    )
+
+    def log_known(hypothesis: Explanation) -> float:
+        return facts.log_likelihood(hypothesis) + before.log_weight(hypothesis)
+
+    kept = before.ways(effects)
+    return Comparing(ship_runs(seen, ship), ship, effects, log_known, kept, effects)
 
 
 def effects_about(seen: Sequence[Observation]) -> list[Effect]:
@@ -482,14 +480,8 @@ def ratio_before_the_stop(seen: Observation) -> float:
 
 
 Diagnose = Callable[[], DiagnosisResult]
-
-
 _HELD = 'all of each glide is compared with the model, such parts with the rest'
-
-
 _APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
-
-
 _SOUND_PART = (
     'So it is not known whether anything is missing; give the sound part alone with '
     '--window START END'
@@ -604,3 +596,65 @@ def _force_besides(force: DiagnosisResult) -> str:
         return f'in the force besides: {sentence(force)}'
     likely = listed([each for each in force.candidates if each.names])
     return f'in the force besides, compared with all hulls of her length and volume: {likely}'
+
+
+def traces(case: ComparedRuns, before: Fitted, after: Fitted) -> tuple[RunTrace, ...]:
+    """
+    Return each run as it was measured and as two hypotheses have it.
+
+    Parameters
+    ----------
+    case
+    before, after
+    """
+    left = zip(case.comparing.residuals(before), case.comparing.residuals(after), strict=True)
+    return tuple(
+        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, case.comparing, j, *both, after)))
+        for j, (run, both) in enumerate(zip(case.seen, left, strict=True))
+    )
+
+
+def _compared(
+    run: Observation,
+    comparing: Comparing,
+    j: int,
+    before: RunResidual,
+    after: RunResidual,
+    fit: Fitted,
+) -> list[Compared]:
+    """Return each quantity that was measured in a run."""
+    table, rows = fit.linear[j], run.rows
+    sd = comparing.noise_sd(j, table)
+    n = len(rows.time_s)
+    found = [
+        Compared(
+            quantity,
+            rows.time_s[own] - run.lead_in_s,
+            table.speed_m_s[own],
+            rows.value[own],
+            rows.value[own] - before.along[own],
+            rows.value[own] - after.along[own],
+            sd[own],
+            before.whitened[:n][own],
+            after.whitened[:n][own],
+        )
+        for quantity, code in CODES.items()
+        if (own := rows.kind == code).any()
+    ]
+    port_s, a = run.context.port_s, len(run.context.port_s)
+    if a:
+        noise, places = np.linalg.inv(run.context.whitener[:a, :a]), run.context.value[:a]
+        found.append(
+            Compared(
+                'position_across',
+                port_s - run.lead_in_s,
+                np.interp(port_s, rows.time_s, table.speed_m_s),
+                places,
+                places - before.rest[:a],
+                places - after.rest[:a],
+                np.sqrt(np.sum(noise**2, axis=1)),
+                before.whitened[n : n + a],
+                after.whitened[n : n + a],
+            )
+        )
+    return found

@@ -265,17 +265,9 @@ class EarlierDiagnosis:
 
 
 _LARGEST = 1_000_000  # bytes of a file
-
-
 _MOST = 1000  # runs or candidates
-
-
 _LATEST_NS = 2**62
-
-
 _NOTHING, _UNKNOWN = 'none', 'unknown'
-
-
 _EXPECTED = 'give what `shipdrag diagnose` wrote as JSON with --earlier FILE'
 
 
@@ -368,24 +360,14 @@ def _read_effect(value: object, path: str, problems: Problems) -> Any:
 
 
 _many = partial(list_of, maximum=_MOST)
-
-
 _LINE, _NAME = Kind(_read_line, 'a line of text'), Kind(_read_name, 'the name of an effect')
-
-
 _SIZE = _object(value=number(-1e12, 1e12), sd=_or_null(number(0.0, 1e12)))
-
-
 _RUNS = _many(_object(bag=_LINE, time_ns=whole_number(0, _LATEST_NS, 'ns since the epoch')))
-
-
 _CANDIDATE = _object(
     probability=number(0.0, 1.0),
     names=_many(_LINE),
     effects=_many(Kind(_read_effect, 'name and parameters')),
 )
-
-
 _DOCUMENT = _object(
     runs=_RUNS,
     ship=_or_null(_object(name=_LINE, length_m=number(1e-3, 1e4), effects=_many(_NAME))),

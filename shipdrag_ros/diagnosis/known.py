@@ -17,46 +17,32 @@ Statistical Science 15, 46-60.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 from shipdrag_ros.diagnosis.document import EarlierDiagnosis
-from shipdrag_ros.diagnosis.result import (
-    CarriedEffect,
-    SeenRun,
-    WeighedEarlier,
-    WeighedFact,
-)
+from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier, WeighedFact
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import EarlierError
-from shipdrag_ros.inference.decision import UNKNOWN, Names, marginals, mixture
+from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, marginals, mixture
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import EffectWay, kept_way
 from shipdrag_ros.posterior.hypotheses import Explanation
+from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import effects_of, find
 
 _DRIVEN = priors.DRIVEN_SHAFT.mean
-
-
 # what the shaft does where no effect says otherwise, by what the baseline contains
 _SHAFT: Mapping[str, Mapping[str, float]] = {
     'free': {'free': 1.0 - _DRIVEN, 'driven': _DRIVEN},
     'locked': {'locked': 1.0},
 }
-
-
-class Missing(Protocol):
-    """What may be missing, as facts see it."""
-
-    def effects_in(self, run: int | None) -> list[Effect]:
-        """Return the effects that are missing in a run; None: in any."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +79,7 @@ class Facts:
     ship: Ship
     stated: tuple[StatedFact, ...] = ()
 
-    def log_likelihood(self, hypothesis: Missing) -> float:
+    def log_likelihood(self, hypothesis: Explanation) -> float:
         """
         Return the logarithm of the probability that these facts are stated.
 
@@ -148,9 +134,7 @@ class Facts:
         return tuple(found)
 
     def naming(
-        self,
-        posterior: ComparedHypotheses[Fitted],
-        decides: Callable[[Mapping[Names, float]], bool],
+        self, posterior: ComparedHypotheses[Fitted], inseparable: Sequence[frozenset[str]]
     ) -> dict[str, float]:
         """
         Return how probably something is named once a fact more is known.
@@ -159,8 +143,8 @@ class Facts:
         ----------
         posterior
             Of hypotheses, with the facts that are stated.
-        decides
-            Whether probabilities name something.
+        inseparable
+            Effects that no record separates.
 
         Returns
         -------
@@ -183,10 +167,10 @@ class Facts:
             ]
             if not kind.values:
                 so.append({names: 1.0 - each for names, each in so[0].items()})
-            found[name] = math.fsum(_decided(posterior.probability, each, decides) for each in so)
+            found[name] = math.fsum(_named(posterior, each, inseparable) for each in so)
         return found
 
-    def _so(self, stated: StatedFact, hypothesis: Missing) -> float:
+    def _so(self, stated: StatedFact, hypothesis: Explanation) -> float:
         """Return how probable it is that a fact is so under a hypothesis."""
         name = stated.fact.name
         effects = [effect for effect in hypothesis.effects_in(stated.run) if name in effect.facts]
@@ -262,22 +246,21 @@ def _likelihood(so: float, fact: Fact) -> float:
     return so * (1.0 - fact.rate) + (1.0 - so) * _stated_wrongly(fact)
 
 
-def _decided(
-    probability: Mapping[Names, float],
+def _named(
+    posterior: ComparedHypotheses[Fitted],
     so: Mapping[Names, float],
-    decides: Callable[[Mapping[Names, float]], bool],
+    inseparable: Sequence[frozenset[str]],
 ) -> float:
     """Return the probability of an answer, if something is named after it; else 0."""
-    joint = {names: so[names] * p for names, p in probability.items()}
+    joint = {names: so[names] * p for names, p in posterior.probability.items()}
     total = math.fsum(joint.values())
     if total <= 0.0:
         return 0.0
-    return total if decides({names: p / total for names, p in joint.items()}) else 0.0
+    after = decide({names: p / total for names, p in joint.items()}, inseparable)
+    return total if after.verdict is Verdict.NAMED else 0.0
 
 
-_SAME_NS = 60 * 10**9  # stops of one ship so near to each other are one
-
-
+_SAME_NS = 60 * SECOND_NS  # stops of one ship so near to each other are one
 _LENGTHS = 0.01  # relative, by which the lengths of one ship differ
 
 
@@ -344,14 +327,8 @@ def _refuse_twice(earlier: Sequence[EarlierDiagnosis], runs: Sequence[SeenRun]) 
 
 
 _HALF = priors.EARLIER_COUNTS.mean
-
-
 _WIDEST = 1.0  # sd of the logarithm of a size ...
-
-
 _WIDE = 2.0  # ... and a relative sd that is wider
-
-
 _LEAST = 0.01  # probability that is worth a word
 
 
@@ -564,7 +541,7 @@ def carried(
     runs: Sequence[SeenRun],
     facts: Facts,
     sought: Collection[str],
-) -> Carried | None:
+) -> Carried:
     """
     Hold earlier diagnoses against what is to be diagnosed.
 
@@ -581,18 +558,11 @@ def carried(
     sought
         Names of the effects that her ship file and the runs can show.
 
-    Returns
-    -------
-    Carried or None
-        None without an earlier diagnosis.
-
     Raises
     ------
     DiagnosisError
         If one is of another ship, of later runs, or holds a run that would count twice.
     """
-    if not earlier:
-        return None
     latest_first = sorted(earlier, key=lambda each: -each.last_ns)
     now_ns = min(run.time_ns for run in runs)
     check(latest_first, ship, runs)

@@ -40,32 +40,14 @@ from shipdrag_ros.simulation.effect import WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _Values = NDArray[np.float64] | NDArray[np.complex128]
-
-
 LEAST_LEGS = 8
-
-
 _LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer ones
-
-
 _SAMPLES = 6  # of the slower input in a leg; a leg is as long as that needs
-
-
 _SHARE = 0.5  # of the samples that a leg should hold, below which it has a dropout
-
-
 _YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
-
-
 _STRAIGHT = 0.994  # velocity over the speeds of both halves, where there is no heading: no shorter
-
-
 _NEAR_S = 10.0  # of a turn the flow at the log is not that of a straight course
-
-
 _ZEROS = 0.05  # of the readings of a leg, from where its mean is no speed
-
-
 _STOPPED = 0.25  # of the usual speed
 
 
@@ -500,23 +482,11 @@ class _LegCutter:
 ANY_SHIP = Ship(
     length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
 )
-
-
 _MOVES_M_S = 0.1  # slower is at rest, as positions show it
-
-
 _SCATTER_M_S = 0.08  # of the way over ground while the log reads 0, that no drift explains
-
-
 _APART = 3.0  # stretches in which a wheel sticks once: neighbours are no new evidence
-
-
 _LAPSES = (0.01, 0.05)  # readings that are otherwise than the speed says
-
-
 _WIDTHS = (0.02, 0.05, 0.1)  # of the speed at which a wheel begins to turn, relative
-
-
 _Z = np.linspace(-5.0, 5.0, 401)  # of that speed
 
 

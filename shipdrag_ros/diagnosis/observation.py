@@ -54,8 +54,6 @@ from shipdrag_ros.simulation.effect import DAY_S, Frame
 from shipdrag_ros.simulation.surge import turning
 
 _SLOWEST = 0.02  # of the speed at the stop, that a glide is followed to
-
-
 _SPEEDS = 200
 
 
@@ -127,17 +125,9 @@ def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
 
 
 _BIN_S = 60.0
-
-
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
-
-
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
-
-
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
-
-
 _SHORTEST_S = 0.1  # fall of a shaft
 
 

@@ -30,12 +30,7 @@ from shipdrag_ros.diagnosis.legs import (
     StandingLog,
     left_text,
 )
-from shipdrag_ros.diagnosis.result import (
-    LOG_TRACK,
-    DiagnosisResult,
-    Gap,
-    Where,
-)
+from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Gap, Where
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.words import of_the_earth
 from shipdrag_ros.errors import DiagnosisError
@@ -52,14 +47,8 @@ from shipdrag_ros.simulation.effect import Effect, Measure, Scope, WithoutBaseli
 from shipdrag_ros.simulation.effects import LIBRARY, inseparable
 
 _LOG = 'speed_through_water'
-
-
 _WIDE = 10.0  # prior widths of the effects while noise is learnt
-
-
 _SPLINES = 6  # over the speed, of an error without a name
-
-
 _NOISE = (
     priors.SAILING_LOG,
     priors.SAILING_LOG,
@@ -67,17 +56,9 @@ _NOISE = (
     priors.SAILING_LOG_TIME,
     priors.SAILING_WATER_TIME,
 )
-
-
 _SD_OF_LOG = np.array([each.sd for each in _NOISE])
-
-
 _EVALUATIONS = 400
-
-
 _LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
-
-
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
 
 
@@ -348,8 +329,6 @@ def _covariance(legs: Legs, sizes: Float64) -> Float64:
 
 
 _POSSIBLE = 0.01  # probability from which nothing is said against an effect
-
-
 _QUARTERS = ('east', 'north', 'west', 'south')
 
 

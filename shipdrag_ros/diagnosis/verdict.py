@@ -3,7 +3,7 @@
 From compared hypotheses to what is answered: sizes, limits, how runs differ, and the gaps.
 
 Whether that is `named`, `one_of`, `unknown` or `none` is decided by `inference.decision.decide`.
-How far model and data are apart, where, and what each run looks like, stands below.
+How far model and data are apart, and where, stands below.
 """
 
 from __future__ import annotations
@@ -20,13 +20,11 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     Candidate,
-    Compared,
     DiagnosisResult,
     EffectEstimate,
     Gap,
     Limit,
     RunSize,
-    RunTrace,
     Where,
 )
 from shipdrag_ros.inference.decision import (
@@ -45,7 +43,7 @@ from shipdrag_ros.inference.decision import (
     quantile,
 )
 from shipdrag_ros.inference.linear import solve_scaled
-from shipdrag_ros.inference.rows import CODES, LOG, POSITION
+from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import (
@@ -64,8 +62,6 @@ from shipdrag_ros.simulation.columns import RUN_DOWNS
 from shipdrag_ros.simulation.effects import find
 
 _BELOW = 0.95  # of a size, below its limit
-
-
 _RIVALS = 40  # likeliest effects of which it is found from what size on they are named
 
 
@@ -239,14 +235,8 @@ def limits_of(
 
 
 _LITTLE = 1e-6  # of a trace: as good as none of the effect
-
-
 _CELL = 0.5  # in z: Gaussians that far apart, and of that sd, whose sum is a prior
-
-
 _POINTS = np.arange(-3.25, 3.3, _CELL)
-
-
 _FEWEST = 5  # rows of a curve
 
 
@@ -421,14 +411,8 @@ def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
 
 
 _PARTS = 12  # of a coastdown, to say where a gap is
-
-
 _SHARE = 0.9  # of the excess, between the ends of where it is
-
-
 _EVEN_NATS = 3.0  # of evidence by which two channels are not separated
-
-
 _CHANNELS = {IN_LOG: 'log', IN_GROUND: 'radar'}
 
 
@@ -609,65 +593,3 @@ def _channel(found: ComparedHypotheses[Fitted]) -> str:
     if {IN_LOG, IN_GROUND} <= near:
         return 'log_radar'
     return _CHANNELS.get(place_of(best.hypothesis.smooth), FORCE)
-
-
-def traces(case: ComparedRuns, before: Fitted, after: Fitted) -> tuple[RunTrace, ...]:
-    """
-    Return each run as it was measured and as two hypotheses have it.
-
-    Parameters
-    ----------
-    case
-    before, after
-    """
-    left = zip(case.comparing.residuals(before), case.comparing.residuals(after), strict=True)
-    return tuple(
-        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, case.comparing, j, *both, after)))
-        for j, (run, both) in enumerate(zip(case.seen, left, strict=True))
-    )
-
-
-def _compared(
-    run: Observation,
-    comparing: Comparing,
-    j: int,
-    before: RunResidual,
-    after: RunResidual,
-    fit: Fitted,
-) -> list[Compared]:
-    """Return each quantity that was measured in a run."""
-    table, rows = fit.linear[j], run.rows
-    sd = comparing.noise_sd(j, table)
-    n = len(rows.time_s)
-    found = [
-        Compared(
-            quantity,
-            rows.time_s[own] - run.lead_in_s,
-            table.speed_m_s[own],
-            rows.value[own],
-            rows.value[own] - before.along[own],
-            rows.value[own] - after.along[own],
-            sd[own],
-            before.whitened[:n][own],
-            after.whitened[:n][own],
-        )
-        for quantity, code in CODES.items()
-        if (own := rows.kind == code).any()
-    ]
-    port_s, a = run.context.port_s, len(run.context.port_s)
-    if a:
-        noise, places = np.linalg.inv(run.context.whitener[:a, :a]), run.context.value[:a]
-        found.append(
-            Compared(
-                'position_across',
-                port_s - run.lead_in_s,
-                np.interp(port_s, rows.time_s, table.speed_m_s),
-                places,
-                places - before.rest[:a],
-                places - after.rest[:a],
-                np.sqrt(np.sum(noise**2, axis=1)),
-                before.whitened[n : n + a],
-                after.whitened[n : n + a],
-            )
-        )
-    return found

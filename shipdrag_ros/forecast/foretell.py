@@ -42,11 +42,7 @@ from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.scenario import Scenario
 
 _POINTS = 25  # of the curve, evenly in ln u
-
-
 _ALIKE_RANGE = (0.03, 3.0)  # of ln u, over which errors of the estimate may be alike
-
-
 _ROUNDING = 1e-4
 
 
@@ -114,7 +110,7 @@ def deceleration(known: KnownCurve, ship: Ship, speed_m_s: Float64) -> Decelerat
     u = np.concatenate([np.exp(x), speed_m_s])
     hull = parts_n(ship, u).sum(axis=0) / (1.0 + ship.n_r(u))
     (share, of_form), (width, of_width), (rougher, of_rougher) = (
-        np.array(each).T for each in (priors.FORMS, priors.WIDTHS, priors.ROUGHER)
+        np.array(each.of).T for each in (priors.FORMS, priors.WIDTHS, priors.ROUGHER)
     )
     base = measured[-1] + np.log(np.outer(hull / hull[_POINTS - 1], 1.0 - share) + share)
     off = measured[:, None] - base[:_POINTS]
@@ -170,14 +166,8 @@ FRACTIONS = (0.9, 0.75, 0.5, 0.25)
 
 
 _NODES = 64  # of the glide, evenly in ln u
-
-
 _BEYOND = 0.5  # of the lowest speed that is spoken of, until which is foretold
-
-
 _ROUNDS = 12  # in which the delay by a run-down settles
-
-
 _WIDEST = 10.0  # of the logarithm of a figure, on either side
 
 
@@ -414,8 +404,6 @@ def _bands(median: Float64, size: Float64, scaled: Float64, added: Float64) -> F
 
 
 _OF_FILE = 60  # points of the curve of a ship file
-
-
 _LOWEST = 0.05  # of the highest speed of a baseline
 
 

@@ -31,14 +31,8 @@ Weighed = tuple[Names, float]
 
 
 NONE: Names = ()
-
-
 UNKNOWN: Names = ('unknown',)  # something without a name
-
-
 CERTAIN = 0.9  # a wrong name costs nine times a missing one
-
-
 LISTED = 0.99  # of all probability, in the candidates
 
 
@@ -243,8 +237,6 @@ def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:
 
 
 LineNumbers = NDArray[np.intp]
-
-
 _UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
 
 

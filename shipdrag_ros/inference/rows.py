@@ -41,17 +41,9 @@ class Input(IntEnum):
 
 # the same as plain integers, for compiled code
 LOG = int(Input.SPEED_THROUGH_WATER)
-
-
 OVER_GROUND = int(Input.SPEED_OVER_GROUND)
-
-
 POSITION = int(Input.POSITION)
-
-
 KIND_COUNT = len(Input)
-
-
 CODES = {input_.key: int(input_) for input_ in Input} | {
     name: int(Input[kind.upper()]) + KIND_COUNT * (int(name[-1]) - 1)
     for name, kind in FURTHER.items()
@@ -121,14 +113,8 @@ OUTLIER = 5.0
 # speed through still water and distance over ground, then the sources; behind them the errors of
 # further instruments, two a number
 _U, _X, _GUST, _WATER, _LOG, _PLACE = range(6)
-
-
 _OWN = 2
-
-
 _STATES = 6 + _OWN * 2
-
-
 _LONGEST_STEP_S = 30.0  # of the prediction through a gap, in which the damping is even
 
 
@@ -184,17 +170,9 @@ class Noise(NamedTuple):
 
 # what a step does, in this order; then decay and added variance of each source
 _U_BY_U, _U_BY_GUST, _X_BY_U, _X_BY_GUST, _X_BY_WATER, _UU, _UX, _XX, _UG, _XG, _DECAYS = range(11)
-
-
 _STEP = _DECAYS + 2 * (_STATES - _GUST)
-
-
 _NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss and Legendre, on 0 .. 1
-
-
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-
-
 _APART = 1e-4  # of decay rates times the step: closer ones are taken as so far apart
 
 
@@ -414,14 +392,8 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
 # Parameters of a setting, all logarithms: size and time of gust, water, log, place; factors of
 # the white sd of each input; hold of the engine.
 SOURCES = 4
-
-
 WHITE_OF = 2 * SOURCES
-
-
 HOLD = WHITE_OF + KIND_COUNT
-
-
 SIZE = HOLD + 1
 
 

@@ -19,8 +19,6 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.trend.ship_trend import ShipTrend, are_priced
 
 _SPREAD = '; ± is two standard deviations'
-
-
 _CLEAN = {
     'ship file': 'the clean hull of the ship file',
     'first months': 'the mean of the first months',

@@ -38,8 +38,6 @@ from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
 YEAR_NS = round(365.25 * 86400.0 * 1e9)
-
-
 CABLE, RUDDER = Fact('no_towed_cable'), Fact('helm_amidships')
 
 
@@ -123,17 +121,9 @@ def test_a_fact_that_the_data_contradict_is_said() -> None:
 
 
 DAY_NS = 86400 * 10**9
-
-
 NOW_NS = START_NS + 1000 * DAY_NS
-
-
 RUNS = (SeenRun('now', NOW_NS),)
-
-
 NO_SD = Parameter(0.35, math.nan)
-
-
 SIZES = {
     'fouling': {'friction_factor': Parameter(0.35, 0.04)},
     'log_scale': {'factor': Parameter(-0.1, 0.01)},
@@ -369,8 +359,6 @@ def test_an_error_of_an_instrument_that_is_not_read_now_is_no_contradiction() ->
 
 
 FOULED = {'name': 'fouling', 'parameters': {'friction_factor': {'value': 0.3, 'sd': 0.04}}}
-
-
 DOCUMENT: dict[str, Any] = {
     'candidates': [
         {'names': ['unknown'], 'probability': 0.1, 'effects': []},

@@ -19,11 +19,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 
 PARAMETERS = Parameters()
-
-
 METRES_A_DEGREE = 111_195.0
-
-
 SEEDS = 8
 
 

@@ -35,11 +35,7 @@ from shipdrag_ros.parameter import Prior, Shape, half_normal, log_normal, normal
 from shipdrag_ros.samples import Float64
 
 A, B, BOTH = ('a',), ('b',), ('a', 'b')
-
-
 LOGS = st.floats(-40.0, 40.0)
-
-
 WAYS = st.lists(
     st.tuples(st.sampled_from([NONE, UNKNOWN, A, B, BOTH]), LOGS),
     min_size=1,
