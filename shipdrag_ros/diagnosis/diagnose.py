@@ -168,7 +168,14 @@ def diagnose(
     except (DiagnosisError, SimulationError) as error:
         if not questions:
             raise
-        found = _nothing_compared(seen, baseline, (*notes, f'if the unit is right: {error}'))
+        found = DiagnosisResult(  # no hypothesis can be compared with these runs
+            verdict=Verdict.ONE_OF,
+            before=Gap(None, None, math.nan),
+            baseline=baseline,
+            notes=(*notes, f'if the unit is right: {error}'),
+            coastdowns_used=len(seen),
+            runs=_seen_runs(seen),
+        )
     return waiting(found, '; '.join(questions))
 
 
@@ -217,20 +224,6 @@ def _answer(
         runs=_seen_runs(seen),
         earlier=case.earlier.judged(found),
         limits=limits_of(judged, comparing, case.inseparable),
-    )
-
-
-def _nothing_compared(
-    seen: Sequence[Observation], baseline: str, notes: tuple[str, ...]
-) -> DiagnosisResult:
-    """Return the diagnosis of runs that no hypothesis can be compared with."""
-    return DiagnosisResult(
-        verdict=Verdict.ONE_OF,
-        before=Gap(None, None, math.nan),
-        baseline=baseline,
-        notes=notes,
-        coastdowns_used=len(seen),
-        runs=_seen_runs(seen),
     )
 
 

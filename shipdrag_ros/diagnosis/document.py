@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass
 from functools import partial
 from os import PathLike
@@ -309,8 +309,8 @@ def _refuse(word: str) -> NoReturn:
     raise ValueError(f'{word} is no number')
 
 
-def _object(**kinds: Kind) -> Kind:
-    """Expect names with values; those of another version are passed over."""
+def _object(make: Callable[..., Any] = dict, /, **kinds: Kind) -> Kind:
+    """Expect names with values, of which is made what is read; others are passed over."""
     keys = {name: Key(kind, 'of the result', MISSING) for name, kind in kinds.items()}
     expectation = 'names with values'
 
@@ -321,14 +321,16 @@ def _object(**kinds: Kind) -> Kind:
         before = len(problems)
         given = {name: value[name] for name in keys if name in value}
         found = read_keys(keys, given, path, problems)
-        return INVALID if len(problems) > before else found
+        return INVALID if len(problems) > before else make(**found)
 
     return Kind(read, expectation)
 
 
-def _or_null(kind: Kind) -> Kind:
+def _or_null(kind: Kind, instead: Any) -> Kind:
+    """Expect a kind, or null for what is not known."""
+
     def read(value: object, path: str, problems: Problems) -> Any:
-        return None if value is None else kind.read(value, path, problems)
+        return instead if value is None else kind.read(value, path, problems)
 
     return Kind(read, kind.expectation)
 
@@ -361,8 +363,14 @@ def _read_effect(value: object, path: str, problems: Problems) -> Any:
 
 _many = partial(list_of, maximum=_MOST)
 _LINE, _NAME = Kind(_read_line, 'a line of text'), Kind(_read_name, 'the name of an effect')
-_SIZE = _object(value=number(-1e12, 1e12), sd=_or_null(number(0.0, 1e12)))
-_RUNS = _many(_object(bag=_LINE, time_ns=whole_number(0, _LATEST_NS, 'ns since the epoch')))
+_SIZE = _object(Parameter, value=number(-1e12, 1e12), sd=_or_null(number(0.0, 1e12), math.nan))
+_RUNS = _many(
+    _object(
+        lambda bag, time_ns: SeenRun(bag, time_ns),
+        bag=_LINE,
+        time_ns=whole_number(0, _LATEST_NS, 'ns since the epoch'),
+    )
+)
 _CANDIDATE = _object(
     probability=number(0.0, 1.0),
     names=_many(_LINE),
@@ -370,7 +378,10 @@ _CANDIDATE = _object(
 )
 _DOCUMENT = _object(
     runs=_RUNS,
-    ship=_or_null(_object(name=_LINE, length_m=number(1e-3, 1e4), effects=_many(_NAME))),
+    ship=_or_null(
+        _object(name=_LINE, length_m=number(1e-3, 1e4), effects=_many(_NAME)),
+        {'name': '', 'length_m': None, 'effects': ()},
+    ),
     earlier=_many(_object(runs=_RUNS, used=flag())),
     candidates=_many(_CANDIDATE),
 )
@@ -388,21 +399,16 @@ def _diagnosis(read: Any, name: str) -> EarlierDiagnosis:
         asked = f'{show(given["question"])}; diagnose its runs again'
         raise _wrong(name, f'question: its verdict waits for the answer: {asked}')
     of_force, ship = given.get('baseline') == 'stated', found['ship']
-    before = [run for each in found['earlier'] if each['used'] for run in each['runs']]
     return EarlierDiagnosis(
         name,
-        ship['name'] if ship else '',
-        ship['length_m'] if ship else None,
-        _seen(found['runs']),
-        _seen(before),
+        ship['name'],
+        ship['length_m'],
+        found['runs'],
+        tuple(run for each in found['earlier'] if each['used'] for run in each['runs']),
         _candidates(found['candidates'], name, all_sized=of_force),
         of_force,
-        ship['effects'] if ship else (),
+        ship['effects'],
     )
-
-
-def _seen(runs: Iterable[Mapping[str, Any]]) -> tuple[SeenRun, ...]:
-    return tuple(SeenRun(run['bag'], run['time_ns']) for run in runs)
 
 
 def _candidates(
@@ -411,14 +417,7 @@ def _candidates(
     found = []
     for i, each in enumerate(listed):
         names = each['names']
-        sizes = {
-            effect: {
-                # null: it could not be found
-                key: Parameter(size['value'], math.nan if size['sd'] is None else size['sd'])
-                for key, size in parameters.items()
-            }
-            for effect, parameters in each['effects']
-        }
+        sizes = dict(each['effects'])
         if names == (_UNKNOWN,):
             continue
         named = set() if names == (_NOTHING,) else set(names)

@@ -481,11 +481,6 @@ class Observation:
     notes: tuple[str, ...] = ()
 
     @property
-    def stop_sd_s(self) -> float:
-        """How well the time of the stop is known."""
-        return self.context.stop.sd_s
-
-    @property
     def stopped_ns(self) -> int:
         """Time of the stop [ns since the epoch]."""
         return self.context.stop.since_ns + round(self.context.stop.lead_in_s * 1e9)
@@ -694,7 +689,7 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
         scenario = replace(scenario, depth_m=run.context.depth_m)
     frame = Frame(run.ship, scenario, seen[0].heading_rad)
     steady = int(np.searchsorted(run.rows.time_s, run.lead_in_s))
-    stop = StopPrior(max(run.stop_sd_s, 1e-3), run.run_down_s, run.run_down_sd_s)
+    stop = StopPrior(max(run.context.stop.sd_s, 1e-3), run.run_down_s, run.run_down_sd_s)
     own = replace(run.ship, baseline=ship.baseline)  # as heavy as she was in this run
     model = RunModel.of(
         run.rows._replace(time_s=run.rows.time_s - run.lead_in_s),

@@ -239,19 +239,16 @@ def write_diagnosis(
 def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     """Show the verdict, what the ship needs, and what would decide."""
     sentence, *rest = found.summary()
+    answers = words.answers(found)
+    caption = (
+        'How probable each answer is. One long bar is a name; several of like length are '
+        'what these runs cannot separate.'
+    )
     needs = () if ship is None or found.question else in_service(found.estimates, ship)
     yield Section(
         lead=[sentence, *needs[:1]],
         text=rest,
-        pictures=[
-            picture(
-                probability_picture(answers),
-                'How probable each answer is. One long bar is a name; several of like length are '
-                'what these runs cannot separate.',
-            )
-            for answers in (words.answers(found),)
-            if answers
-        ],
+        pictures=[picture(probability_picture(answers), caption)] if answers else (),
     )
     if found.facts:
         caption = 'Facts of the log book; each may be wrong'

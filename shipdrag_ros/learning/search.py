@@ -357,7 +357,7 @@ class _Judged:
         form, case = self.case.forms[name], self.case
         values, covariance = _fitted(case.comparing, fit)
         sds = np.sqrt(np.diag(covariance))
-        names = list(form.term.parameters)
+        names, used = list(form.term.parameters), {run.name for run in case.seen}
         alone = [f for f in case.found.fitted if not f.hypothesis.names]
         evidence = {
             other: max(f.log_evidence for f in alone if f.names == other)
@@ -377,7 +377,7 @@ class _Judged:
             },
             covariance=tuple(tuple(float(f'{x:.6g}') for x in row) for row in covariance),
             evidence=TermEvidence(
-                tuple(_digest(run) for run in case.runs if run.name in _names(case)),
+                tuple(_digest(run) for run in case.runs if run.name in used),
                 round(float(fit.log_evidence - evidence[NONE]), 1),
                 round(float(fit.log_evidence - evidence[UNKNOWN]), 1),
                 halves_agree=True,
@@ -451,10 +451,6 @@ class _Judged:
                 'what goes by the time does not'
             )
         return 'a further run, from another speed and on another heading'
-
-
-def _names(case: _LearningCase) -> set[str]:
-    return {run.name for run in case.seen}
 
 
 def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:

@@ -83,7 +83,11 @@ def test_covers_the_truth() -> None:
         found = learnt(5, seed)
         away.append((found.factors - TRUE) / np.sqrt(np.diag(found.covariance)))
     assert int((np.abs(away) < 2.0).sum()) >= 11
-    assert 0.5 * SCATTER < np.median([learnt(5, seed).scatter for seed in range(8)]) < 2 * SCATTER
+    assert (
+        0.5 * SCATTER
+        < np.median([learnt(5, seed).shared.scatter for seed in range(8)])
+        < 2 * SCATTER
+    )
 
 
 def test_the_ship_file_holds_what_was_learnt() -> None:
