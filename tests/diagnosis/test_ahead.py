@@ -44,7 +44,8 @@ def test_sizes_said_before_are_those_found_after() -> None:
             found = after.limits[name].would_be_named
             assert found is not None, name
             assert 0.7 < least(ahead, name) / found < 1.8, name
-    assert ahead.sentence.startswith(f'A coastdown from {ahead.speed_m_s / M_S_PER_KNOT:.1f} knots, ')
+    knots = f'{ahead.speed_m_s / M_S_PER_KNOT:.1f} knots'
+    assert ahead.sentence.startswith(f'A coastdown from {knots}, ')
     assert 'would name, nine times in ten' in ahead.sentence
     assert 'if the hull is clean, rule out fouling above' in ahead.sentence
     assert ahead.sentence.endswith(f'(as of {utc(lead_of().end_ns)}).')
