@@ -358,10 +358,10 @@ def advice(
         (names, math.log(max(case.found.probability[names], 1e-300))) for names in case.rivals
     ]
     found: list[Advice] = []
-    tried = (*_RUNS, *_INSTRUMENTS)
+    tried, held = (*_RUNS, *_INSTRUMENTS), _measured(case.seen)
     for done, measure in enumerate(tried):
         progress('trying what would decide', done, len(tried))
-        if _measured(measure, case.seen):
+        if measure in held:
             continue
         settings, setting = _settings(measure, case)
         if settings and all(
@@ -374,7 +374,7 @@ def advice(
     ranked = {each: each.probability or 0.0 for each in promising}
     for each in declared(candidates):
         measure = Measure(each.measure)
-        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
+        if measure not in (*tried, *held):
             ranked[each] = _reach(measure, candidates, case.inseparable)
     for name, named in case.facts.naming(case.found, case.inseparable).items():
         if named >= _HARDLY:
@@ -449,32 +449,24 @@ def _reach(
     )
 
 
-def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
-    """Say whether the runs hold something already."""
-    first = seen[0]
-    match measure:
-        case Measure.RECIPROCAL_RUN:
-            return any(math.cos(run.heading_rad - first.heading_rad) < -0.5 for run in seen)
-        case Measure.ANOTHER_COURSE:
-            return any(math.cos(run.heading_rad - first.heading_rad) < 0.9 for run in seen)
-        case Measure.OTHER_SPEED:
-            return any(abs(run.speed_m_s / first.speed_m_s - 1.0) > 0.2 for run in seen)
-        case Measure.ANOTHER_RUN:
-            return len(seen) > 1
-        case Measure.WIND:
-            return all(len(run.context.at_wind) for run in seen)
-        case Measure.DEPTH:
-            return all(run.context.draught_m is not None for run in seen)
-        case Measure.HEADING:
-            return all(len(run.context.at_yaw) for run in seen)
-        case Measure.SHAFT:
-            return all(len(run.context.at_shaft) for run in seen)
-        case Measure.LOG:
-            return any((run.rows.kind == LOG).any() for run in seen)
-        case Measure.RADAR:
-            return any((run.rows.kind != LOG).any() for run in seen)
-        case _:
-            return False
+def _measured(seen: Sequence[Observation]) -> set[Measure]:
+    """Return what the runs hold already."""
+    first, contexts = seen[0], [run.context for run in seen]
+    turned = min(math.cos(run.heading_rad - first.heading_rad) for run in seen)
+    faster = max(abs(run.speed_m_s / first.speed_m_s - 1.0) for run in seen)
+    held = {
+        Measure.RECIPROCAL_RUN: turned < -0.5,
+        Measure.ANOTHER_COURSE: turned < 0.9,
+        Measure.OTHER_SPEED: faster > 0.2,
+        Measure.ANOTHER_RUN: len(seen) > 1,
+        Measure.WIND: all(len(each.at_wind) for each in contexts),
+        Measure.DEPTH: all(each.draught_m is not None for each in contexts),
+        Measure.HEADING: all(len(each.at_yaw) for each in contexts),
+        Measure.SHAFT: all(len(each.at_shaft) for each in contexts),
+        Measure.LOG: any((run.rows.kind == LOG).any() for run in seen),
+        Measure.RADAR: any((run.rows.kind != LOG).any() for run in seen),
+    }
+    return {measure for measure, is_held in held.items() if is_held}
 
 
 def _settings(
