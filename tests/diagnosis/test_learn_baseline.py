@@ -101,7 +101,7 @@ def test_the_ship_file_holds_what_was_learnt() -> None:
     np.testing.assert_allclose(
         base.wave_coefficient, wave * np.array(stated.wave_coefficient), rtol=1e-6
     )
-    assert base.run_scatter == pytest.approx(found.scatter, rel=1e-6)
+    assert base.run_scatter == pytest.approx(found.shared.scatter, rel=1e-6)
     assert base.relative_sd.friction < 0.5 * stated.relative_sd.friction
     assert base.relative_sd_of == 'retardation'
     assert '5 clean runs' in base.source
