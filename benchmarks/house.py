@@ -37,7 +37,8 @@ LINES, PARAMETERS = 60, 8
 # counted by themselves: the ways in and out, the studies and the ground floor
 OUTER = ('bags', 'cli', 'fleet', 'library', 'live', 'messages', 'nmea', 'node', 'report')
 OUTER += ('sources', 'studies', 'trend', '')
-PRINTED = {'Declared', '_number', '_grid', '_shares'}  # rows of tables of priors, which pages show
+# rows of tables of priors, which pages show
+PRINTED = {'Declared', '_families', '_number', '_grid', '_shares'}
 PLAIN = {0, 1, 2, 0.5}
 WALK = """
 import json, sys

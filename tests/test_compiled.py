@@ -275,7 +275,7 @@ def test_a_closure_is_refused() -> None:
 
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
-    whiten = 'from shipdrag_ros.inference.noise import whiten\n'
+    whiten = 'from shipdrag_ros.inference.rows import whiten\n'
     products = 'from shipdrag_ros.inference.linear import products_of\n'
     wrong = "products_of('wrong')\nproducts_of()\n"
     snippet.write_text(f"{whiten}{products}whiten(1, 2, 3, 'wrong')\n{wrong}")
@@ -291,7 +291,7 @@ def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) ->
 ESTIMATES = """
 import numpy as np
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.rows import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -322,7 +322,7 @@ whiten(Rows(time_s, kind, speed), table, noise)
 print(table.tobytes().hex())
 """
 # functions that call those of another file, and what they call
-CALLING, CALLED = 'inference.linear', 'inference.noise'
+CALLING, CALLED = 'inference.linear', 'inference.rows'
 
 
 @pytest.mark.timeout(900)

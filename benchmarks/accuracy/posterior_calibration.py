@@ -20,8 +20,7 @@ from benchmarks._asked import asked
 from benchmarks._tables import along
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.inference.learning import Seen, settings_at
-from shipdrag_ros.inference.noise import SIZE, Noise, noise_of, whiten
-from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import LOG, POSITION, SIZE, Noise, Rows, noise_of, whiten
 from shipdrag_ros.posterior.laplace import infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
 from shipdrag_ros.posterior.motion import damping_of, predict, shapes_at

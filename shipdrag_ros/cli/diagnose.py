@@ -75,8 +75,7 @@ def run(options: argparse.Namespace) -> int:
     """
     # what follows takes half a second to import
     from shipdrag_ros.diagnosis import with_effects
-    from shipdrag_ros.diagnosis.document import document
-    from shipdrag_ros.diagnosis.earlier import read_earlier
+    from shipdrag_ros.diagnosis.document import document, read_earlier
     from shipdrag_ros.inference.decision import Verdict
     from shipdrag_ros.library.diagnosing import diagnose_runs
     from shipdrag_ros.library.replaying import refuse_overlaps

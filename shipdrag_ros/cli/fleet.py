@@ -225,7 +225,7 @@ def run_trend(options: argparse.Namespace) -> int:
 
     trends, skipped = trends_of(output, options.store)
     for file in filter(None, (options.csv, options.parquet)):
-        from shipdrag_ros.trend.export import write_rows
+        from shipdrag_ros.trend.words import write_rows
 
         write_rows(file, trends)
         output.log(f'rows in {file}')
@@ -296,7 +296,7 @@ def _answer(output: Output, store: Path, query: str) -> None:
 
     from shipdrag_ros.fleet.store import read_bags, read_coastdowns
     from shipdrag_ros.library.trends import trends_of
-    from shipdrag_ros.trend.export import run_table, ship_table
+    from shipdrag_ros.trend.words import run_table, ship_table
 
     trends, _ = trends_of(output, store)
     tables = {

@@ -123,7 +123,6 @@ def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
     """
     Return the document of `--if-stopped-now`: a forecast of which nothing has followed.
     """
-    milestones = [_milestone(Passed(each, None, None)) for each in found.forecast.milestones]
     return {
         'if_stopped_now': {
             'bag': found.bag,
@@ -133,7 +132,7 @@ def document_of_stop(found: forecasts.IfStopped) -> dict[str, Any]:
             'hull': found.hull,
             'gliding': found.gliding,
             'over_ground': found.forecast.over_ground,
-            'speeds': milestones,
+            'speeds': [_milestone(each) for each in found.passed],
         }
     }
 

@@ -87,7 +87,7 @@ def baseline_document(found: LearntBaseline, out: Path) -> dict[str, Any]:
     from shipdrag_ros.diagnosis.learn_baseline import ENOUGH
 
     enough = len(found.runs) >= ENOUGH
-    scatter = found.scatter, found.scatter_low, found.scatter_high
+    scatter = found.shared.scatter, found.shared.scatter_low, found.shared.scatter_high
     return {
         'runs': [
             {
@@ -138,8 +138,8 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
     output.table(Table(columns, tuple(rows)))
     if len(found.runs) >= ENOUGH:
         output.say(
-            f'Runs scatter by {found.scatter:.1%} of their resistance '
-            f'({found.scatter_low:.1%} to {found.scatter_high:.1%}).'
+            f'Runs scatter by {found.shared.scatter:.1%} of their resistance '
+            f'({found.shared.scatter_low:.1%} to {found.shared.scatter_high:.1%}).'
         )
     if len(found.runs) > 1:
         output.heading('Each run beside the others')

@@ -23,10 +23,8 @@ from itertools import combinations
 import numpy as np
 from scipy.special import softmax
 
-from shipdrag_ros.diagnosis.context import Context
-from shipdrag_ros.diagnosis.earlier import Carried
-from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.observation import Observation, ship_runs, sight
+from shipdrag_ros.diagnosis.known import Carried, Facts
+from shipdrag_ros.diagnosis.observation import Context, Observation, ship_runs, sight
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.verdict import ComparedRuns
 from shipdrag_ros.estimation.run_down import TURNS, RunDown
@@ -36,9 +34,7 @@ from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Names,
-    Verdict,
     Weighed,
-    decide,
     names_one,
     probabilities,
 )
@@ -316,7 +312,7 @@ class DiagnosedRuns(ComparedRuns):
     """
 
     facts: Facts
-    earlier: Carried | None
+    earlier: Carried
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
@@ -362,10 +358,10 @@ def advice(
         (names, math.log(max(case.found.probability[names], 1e-300))) for names in case.rivals
     ]
     found: list[Advice] = []
-    tried = (*_RUNS, *_INSTRUMENTS)
+    tried, held = (*_RUNS, *_INSTRUMENTS), _measured(case.seen)
     for done, measure in enumerate(tried):
         progress('trying what would decide', done, len(tried))
-        if _measured(measure, case.seen):
+        if measure in held:
             continue
         settings, setting = _settings(measure, case)
         if settings and all(
@@ -378,21 +374,12 @@ def advice(
     ranked = {each: each.probability or 0.0 for each in promising}
     for each in declared(candidates):
         measure = Measure(each.measure)
-        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
+        if measure not in (*tried, *held):
             ranked[each] = _reach(measure, candidates, case.inseparable)
-    for name, named in _facts(case).items():
-        ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
+    for name, named in case.facts.naming(case.found, case.inseparable).items():
+        if named >= _HARDLY:
+            ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
     return _by_cost(ranked)
-
-
-def _facts(case: DiagnosedRuns) -> dict[str, float]:
-    """Return the facts that would name something, and how probably."""
-
-    def decided(after: Mapping[Names, float]) -> bool:
-        return decide(after, case.inseparable).verdict is Verdict.NAMED
-
-    found = case.facts.naming(case.found, decided)
-    return {name: named for name, named in found.items() if named >= _HARDLY}
 
 
 def _by_cost(ranked: Mapping[Advice, float]) -> tuple[Advice, ...]:
@@ -462,32 +449,24 @@ def _reach(
     )
 
 
-def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
-    """Say whether the runs hold something already."""
-    first = seen[0]
-    match measure:
-        case Measure.RECIPROCAL_RUN:
-            return any(math.cos(run.heading_rad - first.heading_rad) < -0.5 for run in seen)
-        case Measure.ANOTHER_COURSE:
-            return any(math.cos(run.heading_rad - first.heading_rad) < 0.9 for run in seen)
-        case Measure.OTHER_SPEED:
-            return any(abs(run.speed_m_s / first.speed_m_s - 1.0) > 0.2 for run in seen)
-        case Measure.ANOTHER_RUN:
-            return len(seen) > 1
-        case Measure.WIND:
-            return all(len(run.context.at_wind) for run in seen)
-        case Measure.DEPTH:
-            return all(run.context.draught_m is not None for run in seen)
-        case Measure.HEADING:
-            return all(len(run.context.at_yaw) for run in seen)
-        case Measure.SHAFT:
-            return all(len(run.context.at_shaft) for run in seen)
-        case Measure.LOG:
-            return any((run.rows.kind == LOG).any() for run in seen)
-        case Measure.RADAR:
-            return any((run.rows.kind != LOG).any() for run in seen)
-        case _:
-            return False
+def _measured(seen: Sequence[Observation]) -> set[Measure]:
+    """Return what the runs hold already."""
+    first, contexts = seen[0], [run.context for run in seen]
+    turned = min(math.cos(run.heading_rad - first.heading_rad) for run in seen)
+    faster = max(abs(run.speed_m_s / first.speed_m_s - 1.0) for run in seen)
+    held = {
+        Measure.RECIPROCAL_RUN: turned < -0.5,
+        Measure.ANOTHER_COURSE: turned < 0.9,
+        Measure.OTHER_SPEED: faster > 0.2,
+        Measure.ANOTHER_RUN: len(seen) > 1,
+        Measure.WIND: all(len(each.at_wind) for each in contexts),
+        Measure.DEPTH: all(each.draught_m is not None for each in contexts),
+        Measure.HEADING: all(len(each.at_yaw) for each in contexts),
+        Measure.SHAFT: all(len(each.at_shaft) for each in contexts),
+        Measure.LOG: any((run.rows.kind == LOG).any() for run in seen),
+        Measure.RADAR: any((run.rows.kind != LOG).any() for run in seen),
+    }
+    return {measure for measure, is_held in held.items() if is_held}
 
 
 def _settings(

@@ -18,7 +18,7 @@ from shipdrag_ros.diagnosis import words
 from shipdrag_ros.diagnosis.diagnose import diagnose
 from shipdrag_ros.diagnosis.observation import CoastRun
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.display import utc
+from shipdrag_ros.display import ship_speed, utc
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.record import weighted_white_sd
@@ -47,6 +47,8 @@ class CoastAhead(NamedTuple):
         When the steady record ended [ns since the epoch].
     speed_m_s
         Through water, from which it would begin.
+    mass_kg
+        Of the ship: speeds are in knots, those of a model in m/s.
     duration_s
         How long it would last.
     found
@@ -55,6 +57,7 @@ class CoastAhead(NamedTuple):
 
     as_of_ns: int
     speed_m_s: float
+    mass_kg: float
     duration_s: float
     found: DiagnosisResult
 
@@ -63,8 +66,8 @@ class CoastAhead(NamedTuple):
         """What it would show, in words."""
         shown = words.shown(self.found)
         begun = (
-            f'A coastdown from {self.speed_m_s:.3g} m/s, {self.duration_s / 60.0:.0f} min long, '
-            'would'
+            f'A coastdown from {ship_speed(self.speed_m_s, self.mass_kg)}, '
+            f'{self.duration_s / 60.0:.0f} min long, would'
         )
         named = f'name, nine times in ten{shown}' if shown else 'name no effect of any size'
         clean = ', '.join(
@@ -105,9 +108,9 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     hull = with_usual_shape(ship)
     low_m_s = float(hull.speed(parameters.froude_min))
     if not speed_m_s > low_m_s:
+        now, low = (ship_speed(each, hull.mass_kg) for each in (speed_m_s, low_m_s))
         raise DiagnosisError(
-            f'nothing would be read, as {speed_m_s:.3g} m/s is not above {low_m_s:.3g} m/s, which '
-            'is that of froude_min'
+            f'nothing would be read, as {now} is not above {low}, which is that of froude_min'
         )
     force = float(hull.resistance_n(speed_m_s)) / hull.mass_kg
     inertia = 1.0 + float(hull.n_r(speed_m_s))
@@ -142,7 +145,7 @@ def look_ahead(lead: Window, ship: Ship, parameters: Parameters) -> CoastAhead:
     run = CoastRun('a coastdown from here', replace(window, geodetic=lead.geodetic))
     as_simulated = replace(parameters, heading_convention='rep103')
     found = diagnose([run], ship, as_simulated, advise=False)
-    return CoastAhead(lead.end_ns, speed_m_s, (end_ns - begun_ns) / SECOND_NS, found)
+    return CoastAhead(lead.end_ns, speed_m_s, hull.mass_kg, (end_ns - begun_ns) / SECOND_NS, found)
 
 
 def _since_ns(lead: Window) -> int:

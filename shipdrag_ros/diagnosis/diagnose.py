@@ -1,42 +1,65 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From coastdowns to the effect that is missing in the model."""
+"""
+From coastdowns to the effect that is missing in the model.
+
+Answers about one ship are joined, and wait where a unit is asked about.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 
+import numpy as np
+
 from shipdrag_ros.diagnosis.advice import DiagnosedRuns, advice
-from shipdrag_ros.diagnosis.earlier import Carried, EarlierDiagnosis, carried
-from shipdrag_ros.diagnosis.facts import Facts, stated_facts
-from shipdrag_ros.diagnosis.gaps import gap_of, held_out, traces, where
+from shipdrag_ros.diagnosis.document import EarlierDiagnosis
+from shipdrag_ros.diagnosis.known import Carried, Facts, carried, stated_facts
 from shipdrag_ros.diagnosis.observation import CoastRun, Observation, ship_runs
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
+    Compared,
     DiagnosisResult,
     EffectEstimate,
     Gap,
+    RunTrace,
     SeenRun,
 )
 from shipdrag_ros.diagnosis.verdict import (
     ComparedRuns,
-    asked,
-    asked_of_speed,
+    gap_of,
+    held_out,
     judge,
     limits_of,
-    ratio_before_the_stop,
     runs_differ,
-    waiting,
+    where,
 )
-from shipdrag_ros.diagnosis.words import names_text, of_the_earth
-from shipdrag_ros.errors import DiagnosisError, EstimationError, SimulationError
-from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Verdict, smallest_set
-from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.diagnosis.words import listed, names_text, of_the_earth, probability, sentence
+from shipdrag_ros.display import mistaken_units, ship_speed
+from shipdrag_ros.errors import (
+    DiagnosisError,
+    EarlierError,
+    EstimationError,
+    ShipdragError,
+    SimulationError,
+)
+from shipdrag_ros.inference.decision import (
+    CERTAIN,
+    NONE,
+    UNKNOWN,
+    Verdict,
+    smallest_set,
+)
+from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.posterior.compare import Comparing
+from shipdrag_ros.posterior.compare import (
+    Comparing,
+    Fitted,
+    RunResidual,
+)
 from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
@@ -46,7 +69,6 @@ from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import carrying, effects_of, terms
 
 _APART_M_S = 0.15  # slowly: six times what is usual of water
-
 Observed = tuple[tuple[Observation, ...], tuple[str, ...]]
 """Runs, and what is to be said about them."""
 
@@ -146,7 +168,14 @@ def diagnose(
     except (DiagnosisError, SimulationError) as error:
         if not questions:
             raise
-        found = _nothing_compared(seen, baseline, (*notes, f'if the unit is right: {error}'))
+        found = DiagnosisResult(  # no hypothesis can be compared with these runs
+            verdict=Verdict.ONE_OF,
+            before=Gap(None, None, math.nan),
+            baseline=baseline,
+            notes=(*notes, f'if the unit is right: {error}'),
+            coastdowns_used=len(seen),
+            runs=_seen_runs(seen),
+        )
     return waiting(found, '; '.join(questions))
 
 
@@ -193,22 +222,8 @@ def _answer(
         facts=case.facts.weighed(found, names),
         runs_differ=differ,
         runs=_seen_runs(seen),
-        earlier=() if case.earlier is None else case.earlier.judged(found),
+        earlier=case.earlier.judged(found),
         limits=limits_of(judged, comparing, case.inseparable),
-    )
-
-
-def _nothing_compared(
-    seen: Sequence[Observation], baseline: str, notes: tuple[str, ...]
-) -> DiagnosisResult:
-    """Return the diagnosis of runs that no hypothesis can be compared with."""
-    return DiagnosisResult(
-        verdict=Verdict.ONE_OF,
-        before=Gap(None, None, math.nan),
-        baseline=baseline,
-        notes=notes,
-        coastdowns_used=len(seen),
-        runs=_seen_runs(seen),
     )
 
 
@@ -259,19 +274,14 @@ def compare(
         What earlier diagnoses say of the runs.
     """
 
-    def log_known(hypothesis: Explanation) -> float:
-        before = 0.0 if earlier is None else earlier.log_weight(hypothesis)
-        return facts.log_likelihood(hypothesis) + before
-
+    before = Carried(ship, 0, ()) if earlier is None else earlier
     effects = effects_about(seen)
-    return Comparing(
-        ship_runs(seen, ship),
-        ship,
-        effects,
-        log_known,
-        () if earlier is None else earlier.ways(effects),
-        effects,
-    )
+
+    def log_known(hypothesis: Explanation) -> float:
+        return facts.log_likelihood(hypothesis) + before.log_weight(hypothesis)
+
+    kept = before.ways(effects)
+    return Comparing(ship_runs(seen, ship), ship, effects, log_known, kept, effects)
 
 
 def effects_about(seen: Sequence[Observation]) -> list[Effect]:
@@ -369,3 +379,275 @@ def with_effects(ship: Ship, effects: Sequence[EffectEstimate]) -> Ship:
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
     ship = carrying(ship, terms([effect.name for effect in effects]))
     return replace(ship, effects=(*ship.effects, *added))
+
+
+_AGAIN = 'Import it again with its unit, as in --map speed_through_water=COLUMN:kn'
+
+
+def asked(ratio: float) -> str:
+    """
+    Ask about units where log over ground is a ratio of two; else return ''.
+
+    Parameters
+    ----------
+    ratio
+        Of the log over the speed over ground.
+
+    Returns
+    -------
+    str
+        For the reader.
+    """
+    units = mistaken_units(ratio)
+    if not units:
+        return ''
+    return (
+        f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
+        f'one of them wrong? {_AGAIN}; if it is right, say so with --fact {UNITS_CHECKED}'
+    )
+
+
+def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
+    """
+    Ask about the unit of a speed that no resistance is known for; else return ''.
+
+    Parameters
+    ----------
+    speed_m_s
+        Before the stop, as it was read.
+    ship
+        With a baseline.
+    """
+    low, high = ship.baseline_range_m_s
+    if low <= speed_m_s <= high:
+        return ''
+    read, least, most = (ship_speed(each, ship.mass_kg) for each in (speed_m_s, low, high))
+    return (
+        f'the speed before the stop was read as {speed_m_s:.3g} m/s ({read}), and resistance is '
+        f'known for {low:.3g} to {high:.3g} m/s ({least.partition(" ")[0]} to {most}): is the '
+        f'unit wrong? {_AGAIN}; if it is right, state a `baseline` that holds this speed'
+    )
+
+
+def waiting(found: DiagnosisResult, question: str) -> DiagnosisResult:
+    """
+    Return a diagnosis whose verdict waits for the answer to a question.
+
+    Parameters
+    ----------
+    found
+        As it is if the units are right.
+    question
+        A sentence; '' where there is none, and the diagnosis stands.
+    """
+    if not question:
+        return found
+    return replace(
+        found, verdict=Verdict.ONE_OF, effects=(), would_decide=(), where=None, question=question
+    )
+
+
+def ratio_before_the_stop(seen: Observation) -> float:
+    """
+    Return log over ground in the steady record; NaN without both.
+
+    Parameters
+    ----------
+    seen
+        A run.
+    """
+    rows = seen.rows
+    steady = rows.time_s < seen.lead_in_s
+    of_log = rows.value[steady & (rows.kind == LOG)]
+    ground = rows.value[steady & (rows.kind == OVER_GROUND)]
+    if not len(ground):
+        placed = steady & (rows.kind == POSITION)
+        half = int(placed.sum()) // 2  # far apart, where the noise of places is nothing
+        time_s, place = rows.time_s[placed], rows.value[placed]
+        ground = (
+            (place[-half:] - place[:half]) / (time_s[-half:] - time_s[:half]) if half else ground
+        )
+    if not len(of_log) or not len(ground) or not np.median(ground) > 0.0:
+        return float('nan')
+    return float(np.median(of_log) / np.median(ground))
+
+
+Diagnose = Callable[[], DiagnosisResult]
+_HELD = 'all of each glide is compared with the model, such parts with the rest'
+_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
+_SOUND_PART = (
+    'So it is not known whether anything is missing; give the sound part alone with '
+    '--window START END'
+)
+
+
+def with_whole_glides(
+    alone: Diagnose, whole: Diagnose | None, notes: Sequence[str], *, coastdowns: int
+) -> DiagnosisResult:
+    """
+    Diagnose with the parts that are no coastdown.
+
+    Parameters
+    ----------
+    alone
+        Diagnoses the coastdowns, or log and track where there is none.
+    whole
+        Diagnoses the glides with such parts; None where there are none that can be followed.
+    notes
+        What these parts are, a sentence each.
+    coastdowns
+        How many there are.
+
+    Returns
+    -------
+    DiagnosisResult
+        Of the whole; of the coastdowns where the whole cannot be followed, or has no name though
+        they have one.
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing can be diagnosed, or the whole cannot be and the rest shows nothing: what is
+        cut is no sign of nothing. If an earlier diagnosis cannot count.
+    EstimationError
+        If there is no such part, and no run has enough samples.
+    """
+    if whole is None:
+        return _noting(alone(), *notes)
+    held, why = None, ''
+    try:
+        held = replace(whole(), coastdowns_used=coastdowns)
+    except EarlierError:  # it counts for no part of a glide either
+        raise
+    except ShipdragError as error:  # a glide that is like none may not be followed
+        why = f'all of each glide could not be held against the model: {error}'
+    if held and not (held.verdict is Verdict.UNKNOWN and coastdowns):
+        return _noting(held, *notes, _HELD)
+    try:
+        found = alone()
+    except EarlierError:
+        raise
+    except (DiagnosisError, EstimationError) as error:
+        said = f'the coastdowns alone could not be diagnosed: {error}'
+        if held:
+            return _noting(held, *notes, _HELD, said)
+        raise DiagnosisError(f'{"; ".join((*notes, said, why))}. {_SOUND_PART}') from error
+    if held:
+        named = found.verdict is Verdict.NAMED
+        return _noting(found, *notes, _APART) if named else _noting(held, *notes, _HELD)
+    if found.candidates[0].names == NONE:  # what is cut from them is no sign of nothing
+        raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}')
+    return _noting(found, *notes, why)
+
+
+def _noting(found: DiagnosisResult, *notes: str) -> DiagnosisResult:
+    return replace(found, notes=(*found.notes, *notes))
+
+
+def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:
+    """
+    Join what coastdowns show of the force with what log and track show.
+
+    Parameters
+    ----------
+    force
+        Of coastdowns without a stated baseline.
+    log_track
+        Of the same records.
+
+    Returns
+    -------
+    Diagnosis
+        Where log and track disagree, that is the answer, and a note says what the force
+        shows besides: what turns the log wrong, or moves the water, leaves a force
+        behind that is none.
+    """
+    examined = tuple(dict.fromkeys((*force.examined, *log_track.examined)))
+    if log_track.verdict is Verdict.NONE:
+        agree = (
+            'log and track agree: nothing is wrong between them that these records could show '
+            f'(probability {probability(log_track.nothing)})'
+        )
+        return replace(_noting(force, agree, *log_track.notes), examined=examined)
+    besides = () if force.verdict is Verdict.NONE else (_force_besides(force),)
+    return replace(
+        log_track,
+        notes=(*besides, *log_track.notes, *force.notes),
+        would_decide=log_track.would_decide or force.would_decide,
+        baseline=force.baseline,
+        coastdowns_used=force.coastdowns_used,
+        no_coastdown='',
+        examined=examined,
+        traces=force.traces,
+        facts=force.facts,
+    )
+
+
+def _force_besides(force: DiagnosisResult) -> str:
+    """Say what the force shows besides."""
+    if force.verdict is Verdict.UNKNOWN:
+        return f'in the force besides: {sentence(force)}'
+    likely = listed([each for each in force.candidates if each.names])
+    return f'in the force besides, compared with all hulls of her length and volume: {likely}'
+
+
+def traces(case: ComparedRuns, before: Fitted, after: Fitted) -> tuple[RunTrace, ...]:
+    """
+    Return each run as it was measured and as two hypotheses have it.
+
+    Parameters
+    ----------
+    case
+    before, after
+    """
+    left = zip(case.comparing.residuals(before), case.comparing.residuals(after), strict=True)
+    return tuple(
+        RunTrace(run.name, run.lead_in_s, tuple(_compared(run, case.comparing, j, *both, after)))
+        for j, (run, both) in enumerate(zip(case.seen, left, strict=True))
+    )
+
+
+def _compared(
+    run: Observation,
+    comparing: Comparing,
+    j: int,
+    before: RunResidual,
+    after: RunResidual,
+    fit: Fitted,
+) -> list[Compared]:
+    """Return each quantity that was measured in a run."""
+    table, rows = fit.linear[j], run.rows
+    sd = comparing.noise_sd(j, table)
+    n = len(rows.time_s)
+    found = [
+        Compared(
+            quantity,
+            rows.time_s[own] - run.lead_in_s,
+            table.speed_m_s[own],
+            rows.value[own],
+            rows.value[own] - before.along[own],
+            rows.value[own] - after.along[own],
+            sd[own],
+            before.whitened[:n][own],
+            after.whitened[:n][own],
+        )
+        for quantity, code in CODES.items()
+        if (own := rows.kind == code).any()
+    ]
+    port_s, a = run.context.port_s, len(run.context.port_s)
+    if a:
+        noise, places = np.linalg.inv(run.context.whitener[:a, :a]), run.context.value[:a]
+        found.append(
+            Compared(
+                'position_across',
+                port_s - run.lead_in_s,
+                np.interp(port_s, rows.time_s, table.speed_m_s),
+                places,
+                places - before.rest[:a],
+                places - after.rest[:a],
+                np.sqrt(np.sum(noise**2, axis=1)),
+                before.whitened[n : n + a],
+                after.whitened[n : n + a],
+            )
+        )
+    return found

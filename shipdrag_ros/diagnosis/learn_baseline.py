@@ -384,9 +384,8 @@ class LearntBaseline:
         Learnt over stated, of each part.
     covariance : (k, k)
         Of the factors, without the scatter of single runs.
-    scatter, scatter_low, scatter_high
-        Standard deviation of the resistance from run to run, relative: median,
-        16 and 84 %.
+    shared
+        What the runs have in common, with the scatter of the resistance from run to run.
     relative_sd : (k,)
         As the learnt baseline states it, beside the scatter: a further run
         differs by both.
@@ -403,9 +402,7 @@ class LearntBaseline:
     names: tuple[str, ...]
     factors: Float64
     covariance: Float64
-    scatter: float
-    scatter_low: float
-    scatter_high: float
+    shared: Shared
     relative_sd: Float64
     stated_sd: Float64 | None
     speed_m_s: tuple[float, float]
@@ -480,9 +477,7 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
         names=problem.names,
         factors=1.0 + mean,
         covariance=covariance,
-        scatter=everything.scatter,
-        scatter_low=everything.scatter_low,
-        scatter_high=everything.scatter_high,
+        shared=everything,
         relative_sd=relative_sd,
         stated_sd=None if ship.baseline is None else stated,
         speed_m_s=problem.speed_m_s,

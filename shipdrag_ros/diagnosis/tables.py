@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import words as words
+from shipdrag_ros.diagnosis import words
 from shipdrag_ros.diagnosis.result import Compared, DiagnosisResult, EffectEstimate, RunTrace
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
-from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.simulation.effects import find
 
 
@@ -29,12 +28,8 @@ def parameters(effects: Sequence[EffectEstimate]) -> Table:
     """
     Show how large effects are; the names are those of `simulate --effect`.
     """
-    rows = [
-        (effect.name, *_parameter(quantity, effect))
-        for effect in effects
-        for quantity in find(effect.name).parameters
-    ]
-    return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
+    rows = tuple((effect.name, *row) for effect in effects for row in _parameters(effect))
+    return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), rows)
 
 
 def sizes(found: DiagnosisResult) -> Table:
@@ -43,18 +38,13 @@ def sizes(found: DiagnosisResult) -> Table:
     """
     if found.effects:
         return parameters(found.effects)
-    rows = [
-        (
-            words.names_text(each.names),
-            words.probability(each.probability),
-            *_parameter(quantity, effect),
-        )
+    rows = tuple(
+        (words.names_text(each.names), words.probability(each.probability), *row)
         for each in found.candidates
         for effect in each.effects
-        for quantity in find(effect.name).parameters
-    ]
-    heads = ('candidate', 'probability', 'parameter', 'value', 'sd', 'meaning')
-    return Table(heads, tuple(rows))
+        for row in _parameters(effect)
+    )
+    return Table(('candidate', 'probability', 'parameter', 'value', 'sd', 'meaning'), rows)
 
 
 def limits(found: DiagnosisResult) -> Table:
@@ -76,10 +66,14 @@ def limits(found: DiagnosisResult) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
-    """Return name, value, sd and meaning of a parameter."""
-    value, sd = _figures(quantity, effect.parameters[quantity.name])
-    return quantity.name, value, sd, quantity.meaning
+def _parameters(effect: EffectEstimate) -> Iterator[tuple[str, ...]]:
+    """Yield name, value, sd and meaning of each parameter; what was a choice has no sd."""
+    for quantity in find(effect.name).parameters:
+        found = effect.parameters[quantity.name]
+        value, sd = words.size(quantity, found), '-'
+        if found.sd != 0.0:
+            value, _, sd = plus_minus(found.value, found.sd).partition(' ± ')
+        yield quantity.name, value, sd, quantity.meaning
 
 
 def facts(found: DiagnosisResult) -> Table:
@@ -138,14 +132,6 @@ def noise(traces: Sequence[RunTrace]) -> Table:
     ]
     heads = ('', 'sd in steady sailing', 'at the end', 'left over before', 'left over after')
     return Table(heads, tuple(rows))
-
-
-def _figures(quantity: Parameter, found: Parameter) -> tuple[str, str]:
-    """Return value and sd, as the sd deserves; what was a choice has none."""
-    if found.sd == 0.0:
-        return words.size(quantity, found), '-'
-    value, _, sd = plus_minus(found.value, found.sd).partition(' ± ')
-    return value, sd
 
 
 def _noise(compared: Compared) -> tuple[str, ...]:

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-From compared hypotheses to what is answered: sizes, limits, how runs differ, answers joined.
+From compared hypotheses to what is answered: sizes, limits, how runs differ, and the gaps.
 
 Whether that is `named`, `one_of`, `unknown` or `none` is decided by `inference.decision.decide`.
+How far model and data are apart, and where, stands below.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
@@ -17,45 +18,50 @@ from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
+    FORCE,
     Candidate,
     DiagnosisResult,
     EffectEstimate,
+    Gap,
     Limit,
     RunSize,
+    Where,
 )
-from shipdrag_ros.diagnosis.words import listed, probability, sentence
-from shipdrag_ros.display import mistaken_units, ship_speed
-from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
 from shipdrag_ros.inference.decision import (
     NONE,
     UNKNOWN,
     Decision,
+    LineNumbers,
     Names,
+    Rival,
     Verdict,
+    chances_of_names,
     decide,
     marginals,
     mixture,
-)
-from shipdrag_ros.inference.limits import (
-    LineNumbers,
-    Rival,
-    chances_of_names,
     named_from,
     quantile,
 )
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.inference.linear import solve_scaled
+from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.posterior import priors
-from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fit, Fitted, WeighedFit
+from shipdrag_ros.posterior.compare import (
+    ComparedHypotheses,
+    Comparing,
+    Fit,
+    Fitted,
+    RunResidual,
+    WeighedFit,
+)
 from shipdrag_ros.posterior.effects import EffectWay
-from shipdrag_ros.posterior.hypotheses import IN_SPEED, Explanation
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG, IN_SPEED, Explanation, place_of
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.ship.facts import UNITS_CHECKED
 from shipdrag_ros.simulation.columns import RUN_DOWNS
+from shipdrag_ros.simulation.effects import find
 
-_SHARE = 0.95  # of a size, below its limit
-_AGAIN = 'Import it again with its unit, as in --map speed_through_water=COLUMN:kn'
+_BELOW = 0.95  # of a size, below its limit
 _RIVALS = 40  # likeliest effects of which it is found from what size on they are named
 
 
@@ -217,7 +223,7 @@ def limits_of(
         if effect.name in named or not sizes:
             continue
         grows = effect.size_power > 0.0
-        bound = quantile(sizes, _SHARE if grows else 1.0 - _SHARE)
+        bound = quantile(sizes, _BELOW if grows else 1.0 - _BELOW)
         limits[effect.name] = Limit(
             effect.parameters[0].name,
             'upper_95' if grows else 'lower_95',
@@ -226,214 +232,6 @@ def limits_of(
             percent_of_r(comparing, effect.name, bound),
         )
     return limits
-
-
-def asked(ratio: float) -> str:
-    """
-    Ask about units where log over ground is a ratio of two; else return ''.
-
-    Parameters
-    ----------
-    ratio
-        Of the log over the speed over ground.
-
-    Returns
-    -------
-    str
-        For the reader.
-    """
-    units = mistaken_units(ratio)
-    if not units:
-        return ''
-    return (
-        f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
-        f'one of them wrong? {_AGAIN}; if it is right, say so with --fact {UNITS_CHECKED}'
-    )
-
-
-def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
-    """
-    Ask about the unit of a speed that no resistance is known for; else return ''.
-
-    Parameters
-    ----------
-    speed_m_s
-        Before the stop, as it was read.
-    ship
-        With a baseline.
-    """
-    low, high = ship.baseline_range_m_s
-    if low <= speed_m_s <= high:
-        return ''
-    read, least, most = (ship_speed(each, ship.mass_kg) for each in (speed_m_s, low, high))
-    return (
-        f'the speed before the stop was read as {speed_m_s:.3g} m/s ({read}), and resistance is '
-        f'known for {low:.3g} to {high:.3g} m/s ({least.partition(" ")[0]} to {most}): is the '
-        f'unit wrong? {_AGAIN}; if it is right, state a `baseline` that holds this speed'
-    )
-
-
-def waiting(found: DiagnosisResult, question: str) -> DiagnosisResult:
-    """
-    Return a diagnosis whose verdict waits for the answer to a question.
-
-    Parameters
-    ----------
-    found
-        As it is if the units are right.
-    question
-        A sentence; '' where there is none, and the diagnosis stands.
-    """
-    if not question:
-        return found
-    return replace(
-        found, verdict=Verdict.ONE_OF, effects=(), would_decide=(), where=None, question=question
-    )
-
-
-def ratio_before_the_stop(seen: Observation) -> float:
-    """
-    Return log over ground in the steady record; NaN without both.
-
-    Parameters
-    ----------
-    seen
-        A run.
-    """
-    rows = seen.rows
-    steady = rows.time_s < seen.lead_in_s
-    of_log = rows.value[steady & (rows.kind == LOG)]
-    ground = rows.value[steady & (rows.kind == OVER_GROUND)]
-    if not len(ground):
-        placed = steady & (rows.kind == POSITION)
-        half = int(placed.sum()) // 2  # far apart, where the noise of places is nothing
-        time_s, place = rows.time_s[placed], rows.value[placed]
-        ground = (
-            (place[-half:] - place[:half]) / (time_s[-half:] - time_s[:half]) if half else ground
-        )
-    if not len(of_log) or not len(ground) or not np.median(ground) > 0.0:
-        return float('nan')
-    return float(np.median(of_log) / np.median(ground))
-
-
-Diagnose = Callable[[], DiagnosisResult]
-
-_HELD = 'all of each glide is compared with the model, such parts with the rest'
-_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
-_SOUND_PART = (
-    'So it is not known whether anything is missing; give the sound part alone with '
-    '--window START END'
-)
-
-
-def with_whole_glides(
-    alone: Diagnose, whole: Diagnose | None, notes: Sequence[str], *, coastdowns: int
-) -> DiagnosisResult:
-    """
-    Diagnose with the parts that are no coastdown.
-
-    Parameters
-    ----------
-    alone
-        Diagnoses the coastdowns, or log and track where there is none.
-    whole
-        Diagnoses the glides with such parts; None where there are none that can be followed.
-    notes
-        What these parts are, a sentence each.
-    coastdowns
-        How many there are.
-
-    Returns
-    -------
-    DiagnosisResult
-        Of the whole; of the coastdowns where the whole cannot be followed, or has no name though
-        they have one.
-
-    Raises
-    ------
-    DiagnosisError
-        If nothing can be diagnosed, or the whole cannot be and the rest shows nothing: what is
-        cut is no sign of nothing. If an earlier diagnosis cannot count.
-    EstimationError
-        If there is no such part, and no run has enough samples.
-    """
-    if whole is None:
-        return _noting(alone(), *notes)
-    held, why = None, ''
-    try:
-        held = replace(whole(), coastdowns_used=coastdowns)
-    except EarlierError:  # it counts for no part of a glide either
-        raise
-    except ShipdragError as error:  # a glide that is like none may not be followed
-        why = f'all of each glide could not be held against the model: {error}'
-    if held and not (held.verdict is Verdict.UNKNOWN and coastdowns):
-        return _noting(held, *notes, _HELD)
-    try:
-        found = alone()
-    except EarlierError:
-        raise
-    except (DiagnosisError, EstimationError) as error:
-        said = f'the coastdowns alone could not be diagnosed: {error}'
-        if held:
-            return _noting(held, *notes, _HELD, said)
-        raise DiagnosisError(f'{"; ".join((*notes, said, why))}. {_SOUND_PART}') from error
-    if held:
-        named = found.verdict is Verdict.NAMED
-        return _noting(found, *notes, _APART) if named else _noting(held, *notes, _HELD)
-    if found.candidates[0].names == NONE:  # what is cut from them is no sign of nothing
-        raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}')
-    return _noting(found, *notes, why)
-
-
-def _noting(found: DiagnosisResult, *notes: str) -> DiagnosisResult:
-    return replace(found, notes=(*found.notes, *notes))
-
-
-def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:
-    """
-    Join what coastdowns show of the force with what log and track show.
-
-    Parameters
-    ----------
-    force
-        Of coastdowns without a stated baseline.
-    log_track
-        Of the same records.
-
-    Returns
-    -------
-    Diagnosis
-        Where log and track disagree, that is the answer, and a note says what the force
-        shows besides: what turns the log wrong, or moves the water, leaves a force
-        behind that is none.
-    """
-    examined = tuple(dict.fromkeys((*force.examined, *log_track.examined)))
-    if log_track.verdict is Verdict.NONE:
-        agree = (
-            'log and track agree: nothing is wrong between them that these records could show '
-            f'(probability {probability(log_track.nothing)})'
-        )
-        return replace(_noting(force, agree, *log_track.notes), examined=examined)
-    besides = () if force.verdict is Verdict.NONE else (_besides(force),)
-    return replace(
-        log_track,
-        notes=(*besides, *log_track.notes, *force.notes),
-        would_decide=log_track.would_decide or force.would_decide,
-        baseline=force.baseline,
-        coastdowns_used=force.coastdowns_used,
-        no_coastdown='',
-        examined=examined,
-        traces=force.traces,
-        facts=force.facts,
-    )
-
-
-def _besides(force: DiagnosisResult) -> str:
-    """Say what the force shows besides."""
-    if force.verdict is Verdict.UNKNOWN:
-        return f'in the force besides: {sentence(force)}'
-    likely = listed([each for each in force.candidates if each.names])
-    return f'in the force besides, compared with all hulls of her length and volume: {likely}'
 
 
 _LITTLE = 1e-6  # of a trace: as good as none of the effect
@@ -610,3 +408,188 @@ def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
     apart = np.interp(-lines[0], -lines[1], loss[1]) / np.minimum(loss[0], -1e-9) - 1.0
     inside = (lines[0] >= lines[1].min()) & (lines[0] <= lines[1].max())
     return 100.0 * float(np.sqrt(np.mean(apart[inside] ** 2))) if inside.any() else math.nan
+
+
+_PARTS = 12  # of a coastdown, to say where a gap is
+_SHARE = 0.9  # of the excess, between the ends of where it is
+_EVEN_NATS = 3.0  # of evidence by which two channels are not separated
+_CHANNELS = {IN_LOG: 'log', IN_GROUND: 'radar'}
+
+
+def gap_of(seen: Sequence[Observation], residuals: Sequence[RunResidual]) -> Gap:
+    """
+    Return how far a hypothesis is from the runs.
+
+    Parameters
+    ----------
+    seen
+    residuals
+        One a run.
+
+    Returns
+    -------
+    Gap
+        RMS over the coastdowns; chi^2 over all rows.
+    """
+    speeds, places = [], []
+    for run, residual in zip(seen, residuals, strict=True):
+        kind, after = run.rows.kind, run.rows.time_s >= run.lead_in_s
+        speeds.append(residual.along[after & (kind == LOG)])
+        ahead = residual.along[after & (kind == POSITION)]
+        port_s = run.context.port_s
+        if len(port_s) and len(ahead):
+            when = run.rows.time_s[after & (kind == POSITION)]
+            to_port = np.interp(when, port_s, residual.rest[: len(port_s)])
+            places.append(np.hypot(ahead, to_port))
+    whole = np.concatenate([each.whitened for each in residuals])
+    return Gap(_rms(speeds), _rms(places), float(np.mean(whole**2)))
+
+
+def _rms(parts: Sequence[Float64]) -> float | None:
+    whole = np.concatenate([*parts, np.empty(0)])
+    return float(np.sqrt(np.mean(whole**2))) if len(whole) else None
+
+
+def held_out(seen: Sequence[Observation], comparing: Comparing, fit: Fitted) -> Gap | None:
+    """
+    Predict each run from the others, and show how far off that is.
+
+    Parameters
+    ----------
+    seen
+    comparing
+        Of these runs.
+    fit
+        Of all of them; its rows are taken as linear.
+
+    Returns
+    -------
+    Gap or None
+        None with one run, and where all have an effect of their own.
+
+    Notes
+    -----
+    chi^2 is by how much -2 ln of the posterior density grows with the run, so that what the
+    others do not show is allowed for. A run with an effect that is its own cannot be predicted.
+    """
+    own_effects = {way.run for way in fit.hypothesis.ways}
+    told = [j for j in range(len(seen)) if j not in own_effects]
+    if len(seen) < 2 or not told:
+        return None
+    _, mean, precision = comparing.prior_of(fit)
+    parts = comparing.equations(fit)
+    everything = np.sum(parts, axis=0)
+    least = _least(everything, mean, precision)[0]
+    chi2, residuals, rows = 0.0, [], 0
+    for j in told:
+        without, at = _least(everything - parts[j], mean, precision)
+        chi2 += least - without
+        table, sight = fit.linear[j], comparing.runs.runs[j]
+        at = at.copy()
+        own = comparing.runs.own[j]
+        at[own] = _given_shared(parts[j], at, own, mean, precision)
+        along = table.along[0] - at[table.place] @ table.along[1:]
+        white = table.rest[0] - at[table.place] @ table.rest[1:]
+        rest = np.linalg.solve(sight.whitener, white)
+        residuals.append(RunResidual(along, rest, np.concatenate([along, rest])))
+        rows += len(along) + len(rest)
+    gap = gap_of([seen[j] for j in told], residuals)
+    return replace(gap, chi2_per_sample=chi2 / rows)
+
+
+def _least(products: Float64, mean: Float64, precision: Float64) -> tuple[float, Float64]:
+    """Return the least -2 ln of the posterior density, and where it is (p,)."""
+    matrix = products[1:, 1:] + np.diag(precision)
+    right = products[1:, 0] + precision * mean
+    at = solve_scaled(matrix, right)
+    return float(products[0, 0] + precision @ mean**2 - right @ at), at
+
+
+def _given_shared(
+    products: Float64, at: Float64, own: Int64, mean: Float64, precision: Float64
+) -> Float64:
+    """Return what belongs to a run alone, all else being as the other runs show it."""
+    fixed = at.copy()
+    fixed[own] = 0.0
+    right = products[1 + own, 0] - products[1 + own, 1:] @ fixed + precision[own] * mean[own]
+    matrix = products[np.ix_(1 + own, 1 + own)] + np.diag(precision[own])
+    return np.linalg.solve(matrix, right)
+
+
+def where(
+    case: ComparedRuns,
+    before: Fitted,
+    after: Fitted,
+    named: Collection[str],
+    *,
+    of_force: bool,
+) -> Where:
+    """
+    Return in which channel, and when, model and data disagree.
+
+    Parameters
+    ----------
+    case
+    before
+        The ship as stated.
+    after
+        What explains the runs, whose speeds are said: a ship as stated may never be as slow.
+    named
+        Effects of the answer.
+    of_force
+        Whether it is known to be in the force.
+
+    Returns
+    -------
+    Where
+        The ends hold 90 % of the excess over noise.
+    """
+    channel = FORCE if of_force else _falsified(named) or _channel(case.found)
+    times, speeds = [], []
+    residuals = case.comparing.residuals(before)
+    for run, residual, table in zip(case.seen, residuals, after.linear, strict=True):
+        since = (run.rows.time_s - run.lead_in_s) / run.duration_s
+        part = np.clip((since * _PARTS).astype(int), 0, _PARTS - 1)
+        rows = np.flatnonzero(since >= 0.0)
+        excess = np.zeros(_PARTS)
+        np.add.at(excess, part[rows], residual.whitened[rows] ** 2 - 1.0)
+        share = np.cumsum(np.maximum(excess, 0.0))
+        if share[-1] <= 0.0:
+            continue
+        share /= share[-1]
+        first = int(np.searchsorted(share, 0.5 * (1.0 - _SHARE)))
+        last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
+        ends = np.array([first, last + 1]) / _PARTS
+        times.append(ends * run.duration_s)
+        speeds.append(np.interp(ends, since, table.speed_m_s))
+    if not times:
+        whole = max(run.duration_s for run in case.seen)
+        return Where(channel, (0.0, whole), (0.0, max(run.speed_m_s for run in case.seen)))
+    return Where(
+        channel,
+        (float(np.min(times)), float(np.max(times))),
+        (float(np.min(speeds)), float(np.max(speeds))),
+    )
+
+
+def _falsified(named: Collection[str]) -> str:
+    """Return the channel of instruments whose errors alone are named; else ''."""
+    read = [find(name).errs_in for name in named]
+    if not read or not all(read):
+        return ''
+    by_log = {'speed_through_water' in each for each in read}
+    return 'log_radar' if len(by_log) > 1 else 'log' if True in by_log else 'radar'
+
+
+def _channel(found: ComparedHypotheses[Fitted]) -> str:
+    """Return where something smooth explains most."""
+    smooth = [fit for fit in found.fitted if fit.names == UNKNOWN and not fit.hypothesis.names]
+    best = max(smooth, key=lambda fit: fit.log_evidence)
+    near = {
+        place_of(fit.hypothesis.smooth)
+        for fit in smooth
+        if fit.log_evidence > best.log_evidence - _EVEN_NATS
+    }
+    if {IN_LOG, IN_GROUND} <= near:
+        return 'log_radar'
+    return _CHANNELS.get(place_of(best.hypothesis.smooth), FORCE)

@@ -24,8 +24,8 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.diagnose import with_whole_glides
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.diagnosis.verdict import with_whole_glides
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window

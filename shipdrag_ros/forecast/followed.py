@@ -32,8 +32,8 @@ class Passed:
     """
 
     foretold: Milestone
-    was_s: float | None
-    was_m: float | None
+    was_s: float | None = None
+    was_m: float | None = None
 
 
 class Pair(NamedTuple):
@@ -190,7 +190,7 @@ class Followed:
         for each in forecast.milestones:
             at = self._passed_s(each.speed_m_s)
             if at is None:
-                found.append(Passed(each, None, None))
+                found.append(Passed(each))
                 continue
             way = float(np.interp(at, self.way_time_s, self.way_m)) - start
             found.append(Passed(each, at - made, way))

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-From an estimate to the rest of the glide: the posterior predictive, linearised about its median.
+From an estimate to the rest of the glide: the posterior predictive, linearised.
+
+The deceleration a at speeds that are not reached yet: ln a(u) = ln a_0(u) + d(ln u). a_0 is that
+of the ship file, or of a hull of her length and volume, with a share of a force that does not
+fall with the speed: craft that are no hull have more of it. d is a Gaussian process: an unknown
+level, an unknown exponent and a smooth rest. It is given what is known of r(v), and beyond that
+is the prior. Shares, widths of d and how much rougher a record is than its estimate says are
+families, weighed by their evidence.
 
 With the speed in place of the time, t(u) = integral du / a(u), and all that disturbs it is
 linear: an error e of ln a, or a gust of -e a, shifts the time at which she has a speed by the
@@ -14,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +29,10 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import priors
-from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Forecast, Z
 from shipdrag_ros.inference import priors as noise
 from shipdrag_ros.parameters import SPEEDS_M_S
+from shipdrag_ros.posterior.law import parts_n
 from shipdrag_ros.posterior.priors import LEFT_S, RUN_DOWN
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
@@ -33,8 +41,130 @@ from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.scenario import Scenario
 
+_POINTS = 25  # of the curve, evenly in ln u
+_ALIKE_RANGE = (0.03, 3.0)  # of ln u, over which errors of the estimate may be alike
+_ROUNDING = 1e-4
+
+
+class KnownCurve(NamedTuple):
+    """
+    r(v) as it is known, speeds ascending.
+
+    `alike` (m,) is over how much of ln u its errors are alike, `level_sd` that of r as a whole,
+    relative, beside `sigma_m_s2`.
+    """
+
+    speed_m_s: Float64
+    resistance_m_s2: Float64
+    sigma_m_s2: Float64
+    alike: Float64
+    level_sd: float = 0.0
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> KnownCurve:
+        """
+        Return what an estimate knows of all that slows her in the run.
+
+        Errors at two speeds are alike over sigma / sd of the slope.
+        An error of n_r cancels: r / (1 + n_r) was measured, and is foretold.
+        """
+        curve = estimate.whole.between(*estimate.froude_valid)
+        if len(curve) < _POINTS:
+            curve = estimate.whole
+        sd = curve.sigma_repeatable_m_s2
+        alike = sd / np.maximum(curve.slope_sigma * curve.froude, 1e-12)
+        return cls(curve.speed_m_s, curve.resistance_m_s2, sd, alike)
+
+
+class Deceleration(NamedTuple):
+    """
+    ln of the deceleration without thrust at some speeds (m,), and its covariance (m, m).
+
+    `roughness` is how many times larger the variance of gusts is than stated.
+    """
+
+    log_m_s2: Float64
+    covariance: Float64
+    roughness: float
+
+
+def deceleration(known: KnownCurve, ship: Ship, speed_m_s: Float64) -> Deceleration:
+    """
+    Return the law that a known curve and the prior give.
+
+    Parameters
+    ----------
+    known
+    ship
+        For n_r and the hull.
+    speed_m_s : (m,)
+        Above 0.
+
+    Notes
+    -----
+    Regression by Gaussian processes (Rasmussen, Williams 2006, ch. 2).
+    """
+    top = float(known.speed_m_s[-1])
+    x = np.linspace(np.log(known.speed_m_s[0]), np.log(top), _POINTS)
+    measured, error = _measured(known, ship, np.exp(x))
+    u = np.concatenate([np.exp(x), speed_m_s])
+    hull = parts_n(ship, u).sum(axis=0) / (1.0 + ship.n_r(u))
+    (share, of_form), (width, of_width), (rougher, of_rougher) = (
+        np.array(each.of).T for each in (priors.FORMS, priors.WIDTHS, priors.ROUGHER)
+    )
+    base = measured[-1] + np.log(np.outer(hull / hull[_POINTS - 1], 1.0 - share) + share)
+    off = measured[:, None] - base[:_POINTS]
+    prior = _prior(np.log(u / top), width)
+    # (width, roughness, ...): neither changes the mean of a form
+    error = rougher[:, None, None] ** 2 * error + known.level_sd**2 + _ROUNDING * np.eye(_POINTS)
+    of_curve = prior[:, None, :_POINTS, :_POINTS] + error
+    to_curve = prior[:, None, :_POINTS, _POINTS:]
+    gain = np.linalg.solve(of_curve, to_curve)
+    fit = np.linalg.solve(of_curve, np.broadcast_to(off, (*of_curve.shape[:3], len(share))))
+    log_root = np.log(np.diagonal(np.linalg.cholesky(of_curve), axis1=2, axis2=3)).sum(axis=2)
+    log = np.log(of_width[:, None, None] * of_rougher[:, None] * of_form) - log_root[..., None]
+    log -= 0.5 * (off * fit).sum(axis=2)
+    weight = np.exp(log - log.max())
+    weight /= weight.sum()
+    means = base[_POINTS:] + np.swapaxes(gain, 2, 3) @ off
+    mean = np.einsum('abf,abmf->m', weight, means)
+    apart = (means - mean[:, None]) * np.sqrt(weight)[:, :, None]
+    left = prior[:, None, _POINTS:, _POINTS:] - np.swapaxes(gain, 2, 3) @ to_curve
+    covariance = np.tensordot(weight.sum(axis=2), left, 2)
+    covariance += np.einsum('abmf,abnf->mn', apart, apart)
+    return Deceleration(mean, covariance, float(weight.sum(axis=(0, 2)) @ rougher**2))
+
+
+def _prior(x: Float64, width: Float64) -> Float64:
+    """Return the covariance of d from the top on, of each width."""
+    apart = x[:, None] - x
+    shape = priors.EXPONENT.sd**2 * np.outer(x, x)
+    shape += priors.SMOOTH.sd**2 * np.exp(-0.5 * (apart / priors.ALIKE.mean) ** 2)
+    return np.asarray(priors.LEVEL.sd**2 + width[:, None, None] ** 2 * shape)
+
+
+def _measured(known: KnownCurve, ship: Ship, u: Float64) -> tuple[Float64, Float64]:
+    """Return ln a of the curve and the covariance of its error."""
+
+    def at(values: Float64) -> Float64:
+        return np.interp(u, known.speed_m_s, values)
+
+    r = np.maximum(at(known.resistance_m_s2), 1e-3 * float(known.resistance_m_s2.max()))
+    alike = np.clip(at(known.alike), *_ALIKE_RANGE)
+    x, relative = np.log(u), at(known.sigma_m_s2) / r
+    squares = alike[:, None] ** 2 + alike**2
+    # Gibbs (1997): positive definite where the length changes
+    correlation = np.sqrt(2.0 * np.outer(alike, alike) / squares) * np.exp(
+        -((x[:, None] - x) ** 2) / squares
+    )
+    error = np.outer(relative, relative) * correlation
+    return np.log(r / (1.0 + ship.n_r(u))), error
+
+
 FRACTIONS = (0.9, 0.75, 0.5, 0.25)
 """Of the speed at the stop, that are always spoken of."""
+
+
 _NODES = 64  # of the glide, evenly in ln u
 _BEYOND = 0.5  # of the lowest speed that is spoken of, until which is foretold
 _ROUNDS = 12  # in which the delay by a run-down settles
@@ -273,7 +403,7 @@ def _bands(median: Float64, size: Float64, scaled: Float64, added: Float64) -> F
     return np.asarray(np.maximum.accumulate(bands, axis=0))
 
 
-_POINTS = 60
+_OF_FILE = 60  # points of the curve of a ship file
 _LOWEST = 0.05  # of the highest speed of a baseline
 
 
@@ -315,9 +445,9 @@ class HullNow:
                 'state `baseline` in the ship file, or make a coastdown'
             )
         low, high = ship.baseline_range_m_s
-        speed = np.linspace(max(low, _LOWEST * high), high, _POINTS)
+        speed = np.linspace(max(low, _LOWEST * high), high, _OF_FILE)
         newtons, sd = clean_hull(ship, speed)
-        mass, added = ship.mass_kg, np.zeros(_POINTS)
+        mass, added = ship.mass_kg, np.zeros(_OF_FILE)
         for effect in ship.effects:
             action = action_of(Frame(ship, Scenario(speed_m_s=high), 0.0), [effect])
             mass += action.mass_fraction * ship.mass_kg
@@ -331,7 +461,7 @@ class HullNow:
         # a file errs alike at all speeds
         level_sd = float(np.hypot(priors.ANOTHER_RUN.sd, np.mean(sd / (newtons + added))))
         return cls(
-            KnownCurve(speed, r, priors.FORM_OFF.sd * r, np.ones(_POINTS), level_sd), source
+            KnownCurve(speed, r, priors.FORM_OFF.sd * r, np.ones(_OF_FILE), level_sd), source
         )
 
 

@@ -8,6 +8,8 @@ Chosen on world A, cases 0 to 59, and on the measured records, as docs/forecast.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from shipdrag_ros.parameter import Declared, normal
 
 _WORLD = 'world A, records'
@@ -25,25 +27,33 @@ ANOTHER_RUN = Declared(
     'runs of one hull on one day',
 )
 FORM_OFF = Declared('-', 'form of r of a baseline, relative', normal(0.01), '', 'judgement')
-FORMS = ((0.0, 0.7), (0.03, 0.1), (0.1, 0.08), (0.3, 0.05), (0.6, 0.04), (0.9, 0.03))
-"""Shares of a constant force in the deceleration at the stop, and their probabilities."""
-WIDTHS = ((1.0, 0.85), (3.0, 0.12), (10.0, 0.03))
-"""The exponent and the smooth rest are so many times as wide, and the probabilities."""
-ROUGHER = ((1.0, 0.6), (2.0, 0.25), (4.0, 0.15))
-"""The error of the estimate, and gusts, are so many times as large, and the probabilities."""
 
 
-def _families(letter: str, meaning: str, of: tuple[tuple[float, float], ...]) -> Declared:
+class WeighedFamilies(NamedTuple):
+    """Values with their probabilities, and what is printed of them."""
+
+    of: tuple[tuple[float, float], ...]
+    declared: Declared
+
+
+def _families(letter: str, meaning: str, *of: tuple[float, float]) -> WeighedFamilies:
     said = ', '.join(f'{value:g} ({chance:g})' for value, chance in of)
     expected = sum(value * chance for value, chance in of)
     text = f'{meaning}, mean of families (with their probabilities): {said}'
-    return Declared(letter, text, round(expected, 3), '', _WORLD)
+    return WeighedFamilies(of, Declared(letter, text, round(expected, 3), '', _WORLD))
 
 
+FORMS = _families(
+    'f',
+    'share of a constant force in the deceleration at the stop',
+    *((0.0, 0.7), (0.03, 0.1), (0.1, 0.08), (0.3, 0.05), (0.6, 0.04), (0.9, 0.03)),
+)
+WIDTHS = _families('-', 'exponent and rest are wider by', (1.0, 0.85), (3.0, 0.12), (10.0, 0.03))
+ROUGHER = _families(
+    '-', 'errors of the estimate and gusts are larger by', (1.0, 0.6), (2.0, 0.25), (4.0, 0.15)
+)
 TABLE = (
-    _families('f', 'share of a constant force in the deceleration at the stop', FORMS),
-    _families('-', 'exponent and rest are wider by', WIDTHS),
-    _families('-', 'errors of the estimate and gusts are larger by', ROUGHER),
+    *(each.declared for each in (FORMS, WIDTHS, ROUGHER)),
     *(each for each in vars().copy().values() if isinstance(each, Declared)),
 )
 """What docs/results/priors.md prints; times of gusts, slow water and log: those of noise."""

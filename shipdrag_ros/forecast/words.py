@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
 
 from shipdrag_ros.display import LIGHT_KG, Table, ship_speed
 from shipdrag_ros.forecast.followed import Passed
@@ -12,7 +11,6 @@ from shipdrag_ros.forecast.result import Band, Milestone
 
 _MILE_M = 1852.0
 _NOT_SHOWN = 'not shown'
-_T = TypeVar('_T')
 
 
 def clock(seconds: float) -> str:
@@ -65,43 +63,37 @@ def _was(value: float | None, was_s: float | None, show: Callable[[float], str])
     return show(value) if was_s >= 0.0 else 'before'
 
 
-def cells(band: Band, show: Callable[[float], str]) -> tuple[str, str]:
+def cells(band: Band, show: Callable[[float], str]) -> tuple[str, ...]:
     """
     Return a median, and its band.
     """
     return show(band.median), f'{show(band.low)} to {show(band.high)}'
 
 
-def apart(milestones: Sequence[_T], speed: Callable[[_T], str]) -> list[_T]:
+def apart(compared: Sequence[Passed], mass_kg: float) -> list[Passed]:
     """
     Return milestones without those whose speed reads as that of one before.
     """
-    return list({speed(each): each for each in reversed(milestones)}.values())[::-1]
+    first: dict[str, Passed] = {}
+    for each in compared:
+        first.setdefault(ship_speed(each.foretold.speed_m_s, mass_kg), each)
+    return list(first.values())
 
 
-def apart_passed(compared: Sequence[Passed], mass_kg: float) -> list[Passed]:
+def table(compared: Sequence[Passed], mass_kg: float, *, followed: bool = True) -> Table:
     """
-    Return those beside what followed, `apart`.
-    """
-    return apart(compared, lambda each: ship_speed(each.foretold.speed_m_s, mass_kg))
-
-
-def table(compared: Sequence[Passed], mass_kg: float) -> Table:
-    """
-    Show milestones beside what followed, a line each.
+    Show milestones, a line each; beside what followed, or alone.
     """
 
     def far(metres: float) -> str:
         return way(metres, mass_kg)
 
-    rows = tuple(
-        (
-            ship_speed(each.foretold.speed_m_s, mass_kg),
-            *cells(each.foretold.time_s, clock),
-            _was(each.was_s, each.was_s, clock),
-            *cells(each.foretold.distance_m, far),
-            _was(each.was_m, each.was_s, far),
-        )
-        for each in apart_passed(compared, mass_kg)
-    )
-    return Table(('down to', 'in', '90 %', 'was', 'after', '90 %', 'was'), rows)
+    rows = []
+    for each in apart(compared, mass_kg):
+        time, distance = cells(each.foretold.time_s, clock), cells(each.foretold.distance_m, far)
+        if followed:
+            time += (_was(each.was_s, each.was_s, clock),)
+            distance += (_was(each.was_m, each.was_s, far),)
+        rows.append((ship_speed(each.foretold.speed_m_s, mass_kg), *time, *distance))
+    was = ('was',) if followed else ()
+    return Table(('down to', 'in', '90 %', *was, 'after', '90 %', *was), tuple(rows))

@@ -23,17 +23,21 @@ import numpy as np
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.inference import priors
 from shipdrag_ros.inference.linear import evidences, whitened_products
-from shipdrag_ros.inference.noise import (
+from shipdrag_ros.inference.rows import (
     HOLD,
+    KIND_COUNT,
+    LOG,
+    OVER_GROUND,
+    POSITION,
     SIZE,
     SOURCES,
     WHITE_OF,
     GaussMarkovNoise,
     Noise,
     NoisePosterior,
+    Rows,
     Settings,
 )
-from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 
 _SHORTEST_S, _LONGEST_S = 2.0, 3600.0

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.inference.noise import Noise, Settings, noise_of, whiten
-from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.inference.rows import Noise, Rows, Settings, noise_of, whiten
 from shipdrag_ros.samples import Float64, Int64
 
 _FOLLOWS = 1e-14  # of a scaled diagonal

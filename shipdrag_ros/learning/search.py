@@ -17,16 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.diagnosis import CoastRun
-from shipdrag_ros.diagnosis.diagnose import (
-    effects_about,
-    observed,
-    of_one_day,
-    stated_in,
-)
-from shipdrag_ros.diagnosis.gaps import held_out, where
+from shipdrag_ros.diagnosis.diagnose import effects_about, observed, of_one_day, stated_in
 from shipdrag_ros.diagnosis.observation import Observation, day_of, lowest_m_s, ship_runs
 from shipdrag_ros.diagnosis.result import RunSize, Where
-from shipdrag_ros.diagnosis.verdict import ComparedRuns, runs_differ
+from shipdrag_ros.diagnosis.verdict import ComparedRuns, held_out, runs_differ, where
 from shipdrag_ros.errors import DiagnosisError, EffectFileError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
 from shipdrag_ros.inference.linear import inverse_of
@@ -363,7 +357,7 @@ class _Judged:
         form, case = self.case.forms[name], self.case
         values, covariance = _fitted(case.comparing, fit)
         sds = np.sqrt(np.diag(covariance))
-        names = list(form.term.parameters)
+        names, used = list(form.term.parameters), {run.name for run in case.seen}
         alone = [f for f in case.found.fitted if not f.hypothesis.names]
         evidence = {
             other: max(f.log_evidence for f in alone if f.names == other)
@@ -383,7 +377,7 @@ class _Judged:
             },
             covariance=tuple(tuple(float(f'{x:.6g}') for x in row) for row in covariance),
             evidence=TermEvidence(
-                tuple(_digest(run) for run in case.runs if run.name in _names(case)),
+                tuple(_digest(run) for run in case.runs if run.name in used),
                 round(float(fit.log_evidence - evidence[NONE]), 1),
                 round(float(fit.log_evidence - evidence[UNKNOWN]), 1),
                 halves_agree=True,
@@ -457,10 +451,6 @@ class _Judged:
                 'what goes by the time does not'
             )
         return 'a further run, from another speed and on another heading'
-
-
-def _names(case: _LearningCase) -> set[str]:
-    return {run.name for run in case.seen}
 
 
 def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:

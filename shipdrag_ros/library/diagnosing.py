@@ -11,9 +11,9 @@ from typing import NamedTuple
 from shipdrag_ros.bags import Run, WindowedRun, WindowSpan
 from shipdrag_ros.coastdown.events import ENDED_BY, NOT_ALL, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
-from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
+from shipdrag_ros.diagnosis.diagnose import with_log_track, with_whole_glides
+from shipdrag_ros.diagnosis.document import EarlierDiagnosis
 from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarlier, WeighedFact
-from shipdrag_ros.diagnosis.verdict import with_log_track, with_whole_glides
 from shipdrag_ros.errors import DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate

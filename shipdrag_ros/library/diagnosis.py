@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from shipdrag_ros.bags import WindowedRun, WindowSpan
 from shipdrag_ros.diagnosis import tables, with_effects
 from shipdrag_ros.diagnosis import words as diagnosis_words
-from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, read_earlier
+from shipdrag_ros.diagnosis.document import EarlierDiagnosis, document, read_earlier
 from shipdrag_ros.diagnosis.result import Candidate, Compared, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
@@ -151,7 +150,7 @@ class Diagnosis(Shown):
         matplotlib.axes.Axes
             A good model stays inside the band of the noise.
         """
-        from shipdrag_ros.diagnosis.pictures import draw_difference
+        from shipdrag_ros.diagnosis.page import draw_difference
 
         compared = self._compared(run, quantity)
         scale = (1.0, 'm')
@@ -178,7 +177,7 @@ class Diagnosis(Shown):
             write_diagnosis(page, self.found, self.ship)
 
     def _compared(self, run: int, quantity: str | None) -> Compared:
-        from shipdrag_ros.diagnosis.pictures import ALONG
+        from shipdrag_ros.diagnosis.page import ALONG
 
         traces = self.found.traces
         if not 0 <= run < len(traces):

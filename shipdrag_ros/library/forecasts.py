@@ -202,7 +202,7 @@ def _line(each: GlideForecast) -> str:
     head = f'{words.clock(each.after_s)} after the stop of {utc(each.stop_ns)}'
     if each.checked is None:
         return f'{head}: no forecast: {each.why}.'
-    shown = words.apart_passed(each.checked.milestones, each.ship.mass_kg)
+    shown = words.apart(each.checked.milestones, each.ship.mass_kg)
     said = '; '.join(words.sentence(one.foretold, each.ship.mass_kg, one.was_s) for one in shown)
     inside = each.checked.inside
     judged = '' if inside is None else f' {inside:.0%} of what followed lies inside the bands.'
@@ -294,7 +294,7 @@ def _forecast(
     except EstimationError as error:
         return made(None, str(error))
     if followed is None:
-        milestones = tuple(Passed(each, None, None) for each in forecast.milestones)
+        milestones = tuple(map(Passed, forecast.milestones))
         return made(Checked(forecast, milestones, after_s, 0.0), unseen)
     return made(followed.beside(forecast, stop_ns), followed=followed)
 
@@ -341,29 +341,22 @@ class IfStopped(Shown):
     def _lines(self) -> Sequence[str]:
         mass = self.ship.mass_kg
         now = ship_speed(float(self.forecast.speed_m_s[0]), mass)
-        said = '; '.join(words.sentence(each, mass) for each in self._shown())
+        shown = words.apart(self.passed, mass)
+        said = '; '.join(words.sentence(each.foretold, mass) for each in shown)
         when = f'at {utc(self.forecast.made_ns)}'
         begun = f'Gliding already {when}' if self.gliding else f'If the engine were stopped {when}'
         return (f'{begun}, at {now} {self.measured}, by {self.hull}: {said}.',)
 
-    def _shown(self) -> Sequence[Milestone]:
-        mass = self.ship.mass_kg
-        return words.apart(self.forecast.milestones, lambda each: ship_speed(each.speed_m_s, mass))
+    @property
+    def passed(self) -> tuple[Passed, ...]:
+        """Each milestone, of which nothing has followed."""
+        return tuple(map(Passed, self.forecast.milestones))
 
     def table(self) -> Table:
         """
         Show when and how far on she would have each lower speed.
         """
-        mass = self.ship.mass_kg
-        rows = tuple(
-            (
-                ship_speed(each.speed_m_s, mass),
-                *words.cells(each.time_s, words.clock),
-                *words.cells(each.distance_m, lambda metres: words.way(metres, mass)),
-            )
-            for each in self._shown()
-        )
-        return Table(('down to', 'in', '90 %', 'after', '90 %'), rows)
+        return words.table(self.passed, self.ship.mass_kg, followed=False)
 
     def _title(self) -> str:
         return f'if stopped at {utc(self.forecast.made_ns)}'

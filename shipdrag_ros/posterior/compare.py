@@ -19,14 +19,9 @@ from scipy.special import log_ndtr
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference import decision
-from shipdrag_ros.inference.decision import (
-    NONE,
-    UNKNOWN,
-    Names,
-)
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, SizePosterior
 from shipdrag_ros.inference.learning import Seen, learn
 from shipdrag_ros.inference.learning import prior as prior_of
-from shipdrag_ros.inference.limits import SizePosterior
 from shipdrag_ros.inference.linear import (
     Families,
     evidences,
@@ -35,8 +30,7 @@ from shipdrag_ros.inference.linear import (
     solve_scaled,
     whitened_products,
 )
-from shipdrag_ros.inference.noise import NoisePosterior, Settings, noise_of, whiten
-from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.inference.rows import LOG, NoisePosterior, Settings, noise_of, whiten
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of

@@ -20,8 +20,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from shipdrag_ros.inference.linear import Families
-from shipdrag_ros.inference.noise import Noise
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Noise, Rows
 from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.effects import EffectWay, retardation_of

@@ -32,8 +32,7 @@ from shipdrag_ros.inference.linear import (
     solve,
     whitened_products,
 )
-from shipdrag_ros.inference.noise import Noise, NoisePosterior, Settings
-from shipdrag_ros.inference.rows import LOG, POSITION
+from shipdrag_ros.inference.rows import LOG, POSITION, Noise, NoisePosterior, Settings
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.motion import damping_of, predict
 from shipdrag_ros.posterior.problem import FamilySet, RunModel

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.inference.linear import Families
-from shipdrag_ros.inference.noise import WHITE, Noise
-from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION, WHITE, Noise, Rows
 from shipdrag_ros.parameter import TAILS
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HELD, HullLaw, Influence, InfluenceState, wave_with_friction

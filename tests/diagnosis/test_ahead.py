@@ -11,7 +11,7 @@ import pytest
 
 from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.diagnosis.ahead import CoastAhead, look_ahead
-from shipdrag_ros.display import utc
+from shipdrag_ros.display import M_S_PER_KNOT, utc
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -44,7 +44,8 @@ def test_sizes_said_before_are_those_found_after() -> None:
             found = after.limits[name].would_be_named
             assert found is not None, name
             assert 0.7 < least(ahead, name) / found < 1.8, name
-    assert ahead.sentence.startswith('A coastdown from 8 m/s, ')
+    knots = f'{ahead.speed_m_s / M_S_PER_KNOT:.1f} knots'
+    assert ahead.sentence.startswith(f'A coastdown from {knots}, ')
     assert 'would name, nine times in ten' in ahead.sentence
     assert 'if the hull is clean, rule out fouling above' in ahead.sentence
     assert ahead.sentence.endswith(f'(as of {utc(lead_of().end_ns)}).')

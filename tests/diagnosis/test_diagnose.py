@@ -12,7 +12,7 @@ import pytest
 from shipdrag_ros.diagnosis import CoastRun, diagnose, verdict, with_effects, words
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.diagnose import compare, observed
-from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.known import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError, SimulationError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.diagnose import compare
-from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.known import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation.record import RunRows, display_sd, weighted_white_sd
 from shipdrag_ros.estimation.run_down import RunDown

@@ -83,7 +83,11 @@ def test_covers_the_truth() -> None:
         found = learnt(5, seed)
         away.append((found.factors - TRUE) / np.sqrt(np.diag(found.covariance)))
     assert int((np.abs(away) < 2.0).sum()) >= 11
-    assert 0.5 * SCATTER < np.median([learnt(5, seed).scatter for seed in range(8)]) < 2 * SCATTER
+    assert (
+        0.5 * SCATTER
+        < np.median([learnt(5, seed).shared.scatter for seed in range(8)])
+        < 2 * SCATTER
+    )
 
 
 def test_the_ship_file_holds_what_was_learnt() -> None:
@@ -97,7 +101,7 @@ def test_the_ship_file_holds_what_was_learnt() -> None:
     np.testing.assert_allclose(
         base.wave_coefficient, wave * np.array(stated.wave_coefficient), rtol=1e-6
     )
-    assert base.run_scatter == pytest.approx(found.scatter, rel=1e-6)
+    assert base.run_scatter == pytest.approx(found.shared.scatter, rel=1e-6)
     assert base.relative_sd.friction < 0.5 * stated.relative_sd.friction
     assert base.relative_sd_of == 'retardation'
     assert '5 clean runs' in base.source

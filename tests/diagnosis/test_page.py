@@ -11,9 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import pictures
 from shipdrag_ros.diagnosis import words as diagnosis_words
-from shipdrag_ros.diagnosis.page import write_diagnosis
+from shipdrag_ros.diagnosis.diagnose import waiting
+from shipdrag_ros.diagnosis.page import (
+    motion_picture,
+    probability_picture,
+    residual_picture,
+    write_diagnosis,
+)
 from shipdrag_ros.diagnosis.result import (
     Advice,
     Candidate,
@@ -21,7 +26,6 @@ from shipdrag_ros.diagnosis.result import (
     EffectEstimate,
     WeighedFact,
 )
-from shipdrag_ros.diagnosis.verdict import waiting
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.parameter import Parameter
@@ -134,7 +138,8 @@ def test_while_the_verdict_waits_the_page_asks_and_gives_no_figure(found, writte
 def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:
     (trace,) = found.traces
     log, position, _ = trace.compared
-    drawn = pictures.motion_pictures(trace, after='with current', mass_kg=SHIP.mass_kg)
+    as_drawn = {'after': 'with current', 'mass_kg': SHIP.mass_kg}
+    drawn = [motion_picture(each, **as_drawn) for each in (log, position)]
     assert [len(figure.axes) for figure in drawn] == [2, 2]
     speed, place = (
         {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
@@ -150,16 +155,14 @@ def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:
     assert abs(np.interp(0.0, position.time_s[near], place['measured'])) < 20.0
     assert place['measured'][-1] - place['model as stated'][-1] > 1000.0
 
-    _, left, _ = pictures.residual_pictures(
-        found.traces, after='with current', mass_kg=SHIP.mass_kg
-    )
+    left = residual_picture([position], **as_drawn)
     by_time = {line.get_label(): np.asarray(line.get_ydata()) for line in left.axes[0].get_lines()}
     np.testing.assert_array_equal(by_time['model as stated'], position.white_before)
     np.testing.assert_array_equal(by_time['with current'], position.white_after)
     assert len(left.axes[1].get_lines()[0].get_ydata()) == (position.time_s >= 0.0).sum()
     assert left.axes[1].get_xlabel() == 'speed through water [knots]'
 
-    bars = pictures.probability_picture(diagnosis_words.answers(found)).axes[0]
+    bars = probability_picture(diagnosis_words.answers(found)).axes[0]
     widths = [bar.get_width() for bar in bars.patches]
     assert widths[0] == max(widths) == found.candidates[0].probability
     assert sum(widths) <= 1.0 + 1e-9

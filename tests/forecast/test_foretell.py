@@ -14,8 +14,7 @@ from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Followed, Passed, interval_score
-from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
-from shipdrag_ros.forecast.law import KnownCurve, deceleration
+from shipdrag_ros.forecast.foretell import HullNow, KnownCurve, deceleration, foretell, if_stopped
 from shipdrag_ros.forecast.result import Band, PathAhead
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters

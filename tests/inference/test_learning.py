@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.inference.learning import KEPT, Seen, learn, of_steady, prior
-from shipdrag_ros.inference.noise import NoisePosterior, noise_of, whiten
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.rows import (
+    LOG,
+    OVER_GROUND,
+    POSITION,
+    NoisePosterior,
+    Rows,
+    noise_of,
+    whiten,
+)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.scenario import GaussMarkov
 

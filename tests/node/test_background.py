@@ -163,7 +163,7 @@ def test_what_a_coastdown_would_show_is_said_in_steady_sailing(monkeypatch) -> N
         assert time.monotonic() < end
         time.sleep(0.05)
     diagnosing.close()
-    assert diagnosing.ahead.startswith('A coastdown from 8.2 m/s, ')
+    assert diagnosing.ahead.startswith('A coastdown from 15.9 knots, ')
     status = diagnosis_status(diagnosing.status, diagnosing.ahead)
     assert status.values[AHEAD] == diagnosing.ahead
     monkeypatch.setattr(sys, 'executable', '/bin/false')

@@ -12,8 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from shipdrag_ros.inference.linear import Families, of_family, products_of, whitened_products
-from shipdrag_ros.inference.noise import WHITE, Noise, Settings, whiten
-from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.rows import (
+    CODES,
+    KIND_COUNT,
+    LOG,
+    OVER_GROUND,
+    POSITION,
+    WHITE,
+    Noise,
+    Rows,
+    Settings,
+    whiten,
+)
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import NormalMixture, mix
 from shipdrag_ros.posterior.motion import predict

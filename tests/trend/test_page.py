@@ -15,8 +15,8 @@ import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.store import Store, read_coastdowns
-from shipdrag_ros.trend.export import COLUMNS
 from shipdrag_ros.trend.page import coastdown_page, page_name
+from shipdrag_ros.trend.words import COLUMNS
 from tests.page import Page
 
 NAME = 'Test <b>ship</b>'

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.fleet.store import HullEvent
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.trend import export, fleet_trends, words
+from shipdrag_ros.trend import fleet_trends, words
 from shipdrag_ros.trend.page import draw_added_resistance
 from tests.trend.conftest import CLEAN, DAY_NS, START_NS, row
 
@@ -119,7 +119,7 @@ def test_what_ranks_stands_first_with_its_error(priced):
         assert each.sd / each.value == pytest.approx(trend.now.sd / trend.now.value)
         # and in JSON and CSV
         assert trend.to_dict()['costs']['usd_per_year'] == {'value': each.value, 'sd': each.sd}
-    assert all(row['usd_per_year_sd'] > 0.0 for row in export.rows(trends))
+    assert all(row['usd_per_year_sd'] > 0.0 for row in words.rows(trends))
     # without the prices of one, power ranks them all
     trends = fleet_trends(seen, {'Slow': priced}, {})
     table = words.ranking(trends)

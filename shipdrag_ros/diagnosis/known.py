@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A diagnosis of a ship as it was found in earlier runs, to be given to the next one.
+What is known of runs before they are compared: the log book, and earlier diagnoses.
 
-What earlier diagnoses of a ship say of hypotheses about her today.
+A fact is evidence with an error rate: a hypothesis under which it is not so is
+as much less probable as such a fact is seldom stated wrongly. Which facts speak
+about an effect, the effect declares.
 
 An effect of hull or instruments that was there stays, unless it went unseen in the
 time between, was cleaned off, or the diagnosis was wrong; how long it lasts, the
@@ -14,125 +16,252 @@ Statistical Science 15, 46-60.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass
-from functools import cached_property, partial
-from os import PathLike
-from typing import Any, NoReturn
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
-from shipdrag_ros.diagnosis.document import document
-from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.result import CarriedEffect, DiagnosisResult, SeenRun, WeighedEarlier
-from shipdrag_ros.display import json_text, utc
-from shipdrag_ros.errors import DiagnosisError, EarlierError, SimulationError
-from shipdrag_ros.fields import (
-    INVALID,
-    Key,
-    Kind,
-    Problems,
-    flag,
-    list_of,
-    number,
-    read_keys,
-    read_small_text,
-    show,
-    whole_number,
-)
-from shipdrag_ros.inference.decision import UNKNOWN, marginals, mixture
+from shipdrag_ros.diagnosis.document import EarlierDiagnosis
+from shipdrag_ros.diagnosis.result import CarriedEffect, SeenRun, WeighedEarlier, WeighedFact
+from shipdrag_ros.display import utc
+from shipdrag_ros.errors import EarlierError
+from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, marginals, mixture
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
 from shipdrag_ros.posterior.effects import EffectWay, kept_way
 from shipdrag_ros.posterior.hypotheses import Explanation
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.ship import Fact, Ship
+from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import effects_of, find
 
-_SAME_NS = 60 * 10**9  # stops of one ship so near to each other are one
-_LENGTHS = 0.01  # relative, by which the lengths of one ship differ
+_DRIVEN = priors.DRIVEN_SHAFT.mean
+# what the shaft does where no effect says otherwise, by what the baseline contains
+_SHAFT: Mapping[str, Mapping[str, float]] = {
+    'free': {'free': 1.0 - _DRIVEN, 'driven': _DRIVEN},
+    'locked': {'locked': 1.0},
+}
 
 
 @dataclass(frozen=True)
-class EarlierCandidate:
+class StatedFact:
     """
-    What may have been missing.
+    A fact, and the run that it is stated of.
 
     Attributes
     ----------
-    probability
-    effects
-        Their sizes by the names of the parameters, by name; none: nothing was missing.
+    fact
+    run
+        Its place among the runs; None: all of them.
+    time_ns
+        Of the stop of that run, or of the first one [ns since the epoch].
     """
 
-    probability: float
-    effects: Mapping[str, Mapping[str, Parameter]]
+    fact: Fact
+    run: int | None
+    time_ns: int
 
 
 @dataclass(frozen=True)
-class EarlierDiagnosis:
+class Facts:
     """
-    What a diagnosis found in runs of before.
+    All facts that are stated.
 
     Attributes
     ----------
-    name
-        Of the file, for the user.
     ship
-        Her name; '' where it is not known.
-    length_m
-        Of the ship; None where it is not known.
-    runs
-        That it rests on.
-    before
-        Runs of the diagnoses that were given to it, which it holds already.
-    candidates
-        With a name, or nothing; what their probabilities leave to 1 says nothing.
-    of_force
-        Whether the force was held against a stated baseline, so that it speaks of the hull.
+        For the propeller in the baseline.
     stated
-        Effects that the ship file stated, so that they were not missing.
     """
 
-    name: str
-    ship: str
-    length_m: float | None
-    runs: tuple[SeenRun, ...]
-    before: tuple[SeenRun, ...]
-    candidates: tuple[EarlierCandidate, ...]
-    of_force: bool
-    stated: tuple[str, ...] = ()
+    ship: Ship
+    stated: tuple[StatedFact, ...] = ()
 
-    @classmethod
-    def of(cls, found: DiagnosisResult, ship: Ship | None, *, name: str) -> EarlierDiagnosis:
+    def log_likelihood(self, hypothesis: Explanation) -> float:
         """
-        Return what a result says of later runs.
+        Return the logarithm of the probability that these facts are stated.
 
         Parameters
         ----------
-        found
-            Of runs whose times are known.
-        ship
-            That they were of; None where none is known.
-        name
-            For the user.
+        hypothesis
+            About the runs that the facts are of.
 
-        Raises
-        ------
-        DiagnosisError
-            If its verdict waits for an answer, or no run is known.
+        Returns
+        -------
+        float
+            0 without facts.
         """
-        return _diagnosis(json.loads(json_text(document(found, ship))), name)
+        return math.fsum(
+            math.log(_likelihood(self._so(each, hypothesis), each.fact)) for each in self.stated
+        )
 
-    @property
-    def last_ns(self) -> int:
-        """When its last run was stopped [ns since the epoch]."""
-        return max((run.time_ns for run in self.runs), default=0)
+    def weighed(
+        self, posterior: ComparedHypotheses[Fitted], runs: Sequence[str]
+    ) -> tuple[WeighedFact, ...]:
+        """
+        Return how probable it is that each fact is wrong.
 
-    def probability(self, name: str) -> float:
-        """Return how probable it was that an effect was there."""
-        return math.fsum(each.probability for each in self.candidates if name in each.effects)
+        Parameters
+        ----------
+        posterior
+            Of hypotheses, the facts included.
+        runs
+            Names of the runs.
+
+        Returns
+        -------
+        tuple of WeighedFact
+            In the order in which they were stated.
+        """
+        found = []
+        for each in self.stated:
+            shares = {}
+            for names, probability in posterior.probability.items():
+                so = self._so(each, posterior.best[names].hypothesis)
+                wrong = (1.0 - so) * _stated_wrongly(each.fact)
+                shares[names] = probability * wrong / _likelihood(so, each.fact)
+            against = max(shares, key=lambda names: shares[names])
+            found.append(
+                WeighedFact(
+                    each.fact,
+                    '' if each.run is None else runs[each.run],
+                    math.fsum(shares.values()),
+                    () if against == UNKNOWN else against,
+                )
+            )
+        return tuple(found)
+
+    def naming(
+        self, posterior: ComparedHypotheses[Fitted], inseparable: Sequence[frozenset[str]]
+    ) -> dict[str, float]:
+        """
+        Return how probably something is named once a fact more is known.
+
+        Parameters
+        ----------
+        posterior
+            Of hypotheses, with the facts that are stated.
+        inseparable
+            Effects that no record separates.
+
+        Returns
+        -------
+        dict
+            By the name of each fact that is not stated yet and has no date; a fact that is
+            not so counts as what the effects say that it denies.
+        """
+        known = {each.fact.name for each in self.stated}
+        found = {}
+        for name, kind in KNOWN.items():
+            if name in known or kind.values == (DATE,):
+                continue
+            so = [
+                {
+                    names: self._so(StatedFact(Fact(name, value), None, 0), one.hypothesis)
+                    for names, one in posterior.best.items()
+                    if names in posterior.probability
+                }
+                for value in kind.values or ('',)
+            ]
+            if not kind.values:
+                so.append({names: 1.0 - each for names, each in so[0].items()})
+            found[name] = math.fsum(_named(posterior, each, inseparable) for each in so)
+        return found
+
+    def _so(self, stated: StatedFact, hypothesis: Explanation) -> float:
+        """Return how probable it is that a fact is so under a hypothesis."""
+        name = stated.fact.name
+        effects = [effect for effect in hypothesis.effects_in(stated.run) if name in effect.facts]
+        if effects:
+            return min(_goes_with(effect, stated) for effect in effects)
+        return self._usual(stated.fact)
+
+    def _usual(self, fact: Fact) -> float:
+        """Return how probable a fact is where no effect speaks about it."""
+        values = KNOWN[fact.name].values
+        if fact.value not in values:
+            return 1.0
+        propeller = self.ship.propeller
+        state = propeller.state_in_baseline if propeller else ''
+        if state not in _SHAFT:
+            return 1.0 / len(values)
+        return _SHAFT[state].get(fact.value, 0.0)
+
+
+def stated_facts(
+    ship: Ship,
+    runs: Sequence[tuple[Sequence[Fact], int]],
+    everywhere: Sequence[Fact] = (),
+) -> Facts:
+    """
+    Gather the facts of the ship file, of single runs and of the diagnosis.
+
+    Parameters
+    ----------
+    ship
+        Her file's facts are of all runs, but of those that say otherwise themselves.
+    runs
+        Facts of each, and the time of its stop [ns since the epoch].
+    everywhere
+        Of all runs, whatever files say.
+
+    Returns
+    -------
+    Facts
+    """
+    first_ns = runs[0][1] if runs else 0
+    above = {fact.name for fact in everywhere}
+    stated = [StatedFact(fact, None, first_ns) for fact in everywhere]
+    own = {fact.name for facts, _ in runs for fact in facts}
+    for fact in ship.facts:
+        if fact.name not in above | own:
+            stated.append(StatedFact(fact, None, first_ns))
+    for j, (facts, time_ns) in enumerate(runs):
+        of_ship = [fact for fact in ship.facts if fact.name in own]
+        for fact in overriding(of_ship, facts):
+            if fact.name not in above:
+                stated.append(StatedFact(fact, j, time_ns))
+    return Facts(ship, tuple(stated))
+
+
+def _goes_with(effect: Effect, stated: StatedFact) -> float:
+    """Return how probable a fact is where an effect is there that it speaks about."""
+    said, since_ns = effect.facts[stated.fact.name], stated.fact.time_ns
+    if since_ns is None:
+        return float(stated.fact.value in said.values and bool(said.values))
+    if stated.time_ns < since_ns:  # what was done later says nothing of the run
+        return 1.0
+    return -math.expm1(-(((stated.time_ns - since_ns) * 1e-9 / said.fades_s) ** 2))
+
+
+def _stated_wrongly(fact: Fact) -> float:
+    """Return how probable it is that it is stated although it is not so."""
+    return fact.rate / max(len(KNOWN[fact.name].values) - 1, 1)
+
+
+def _likelihood(so: float, fact: Fact) -> float:
+    """Return how probable it is that a fact is stated."""
+    return so * (1.0 - fact.rate) + (1.0 - so) * _stated_wrongly(fact)
+
+
+def _named(
+    posterior: ComparedHypotheses[Fitted],
+    so: Mapping[Names, float],
+    inseparable: Sequence[frozenset[str]],
+) -> float:
+    """Return the probability of an answer, if something is named after it; else 0."""
+    joint = {names: so[names] * p for names, p in posterior.probability.items()}
+    total = math.fsum(joint.values())
+    if total <= 0.0:
+        return 0.0
+    after = decide({names: p / total for names, p in joint.items()}, inseparable)
+    return total if after.verdict is Verdict.NAMED else 0.0
+
+
+_SAME_NS = 60 * SECOND_NS  # stops of one ship so near to each other are one
+_LENGTHS = 0.01  # relative, by which the lengths of one ship differ
 
 
 def check(latest_first: Sequence[EarlierDiagnosis], ship: Ship, runs: Sequence[SeenRun]) -> None:
@@ -195,175 +324,6 @@ def _refuse_twice(earlier: Sequence[EarlierDiagnosis], runs: Sequence[SeenRun]) 
                     f'counts {twice[0]} already; a run counts once, so leave one of them out'
                 )
         known += [(run, f'in {each.name}') for run in own]
-
-
-_LARGEST = 1_000_000  # bytes of a file
-_MOST = 1000  # runs or candidates
-_LATEST_NS = 2**62
-_NOTHING, _UNKNOWN = 'none', 'unknown'
-_EXPECTED = 'give what `shipdrag diagnose` wrote as JSON with --earlier FILE'
-
-
-def read_earlier(path: str | PathLike[str]) -> EarlierDiagnosis:
-    """
-    Read what a diagnosis found.
-
-    Parameters
-    ----------
-    path
-        JSON that `shipdrag diagnose` wrote.
-
-    Returns
-    -------
-    EarlierDiagnosis
-
-    Raises
-    ------
-    DiagnosisError
-        If it cannot be read, or is no such file; the message says what is wrong.
-    """
-    try:
-        text = read_small_text(path, most_bytes=_LARGEST)
-        given = json.loads(text, parse_constant=_refuse)
-    except OSError as error:
-        raise _wrong(path, error.strerror) from error
-    except RecursionError as error:
-        raise _wrong(path, 'nested too deeply') from error
-    except ValueError as error:
-        raise _wrong(path, f'not JSON: {error}') from error
-    return _diagnosis(given, str(path))
-
-
-def _wrong(name: str | PathLike[str], why: str | None) -> DiagnosisError:
-    return DiagnosisError(f'{name}: {why}; {_EXPECTED}')
-
-
-def _refuse(word: str) -> NoReturn:
-    raise ValueError(f'{word} is no number')
-
-
-def _object(**kinds: Kind) -> Kind:
-    """Expect names with values; those of another version are passed over."""
-    keys = {name: Key(kind, 'of the result', MISSING) for name, kind in kinds.items()}
-    expectation = 'names with values'
-
-    def read(value: object, path: str, problems: Problems) -> Any:
-        if not isinstance(value, dict):
-            problems.append(f'{path or "the document"}: {show(value)}, expected {expectation}')
-            return INVALID
-        before = len(problems)
-        given = {name: value[name] for name in keys if name in value}
-        found = read_keys(keys, given, path, problems)
-        return INVALID if len(problems) > before else found
-
-    return Kind(read, expectation)
-
-
-def _or_null(kind: Kind) -> Kind:
-    def read(value: object, path: str, problems: Problems) -> Any:
-        return None if value is None else kind.read(value, path, problems)
-
-    return Kind(read, kind.expectation)
-
-
-def _read_line(value: object, path: str, problems: Problems) -> Any:
-    if isinstance(value, str) and value.isprintable():
-        return value
-    problems.append(f'{path}: {show(value)}, expected a line of text')
-    return INVALID
-
-
-def _read_name(value: object, path: str, problems: Problems) -> Any:
-    try:
-        return find(str(value)).name
-    except SimulationError:
-        problems.append(f'{path}: {show(value)} is no effect that this version knows')
-        return INVALID
-
-
-def _read_effect(value: object, path: str, problems: Problems) -> Any:
-    """Return name and sizes; what is of its day says nothing today, and may lack them."""
-    found = _object(name=_NAME).read(value, path, problems)
-    if found is INVALID:
-        return INVALID
-    effect = find(found['name'])
-    sizes = {q.name: _SIZE for q in effect.parameters} if effect.lasts_s > 0.0 else {}
-    given = _object(parameters=_object(**sizes)).read(value, path, problems)
-    return INVALID if given is INVALID else (effect.name, given['parameters'])
-
-
-_many = partial(list_of, maximum=_MOST)
-_LINE, _NAME = Kind(_read_line, 'a line of text'), Kind(_read_name, 'the name of an effect')
-_SIZE = _object(value=number(-1e12, 1e12), sd=_or_null(number(0.0, 1e12)))
-_RUNS = _many(_object(bag=_LINE, time_ns=whole_number(0, _LATEST_NS, 'ns since the epoch')))
-_CANDIDATE = _object(
-    probability=number(0.0, 1.0),
-    names=_many(_LINE),
-    effects=_many(Kind(_read_effect, 'name and parameters')),
-)
-_DOCUMENT = _object(
-    runs=_RUNS,
-    ship=_or_null(_object(name=_LINE, length_m=number(1e-3, 1e4), effects=_many(_NAME))),
-    earlier=_many(_object(runs=_RUNS, used=flag())),
-    candidates=_many(_CANDIDATE),
-)
-
-
-def _diagnosis(read: Any, name: str) -> EarlierDiagnosis:
-    problems: Problems = []
-    given = {'ship': None, **read} if isinstance(read, dict) else read
-    found = _DOCUMENT.read(given, '', problems)
-    if problems:
-        raise _wrong(name, problems[0])
-    if not found['runs']:
-        raise _wrong(name, 'runs: empty, and when it was made is not known')
-    if given.get('question'):
-        asked = f'{show(given["question"])}; diagnose its runs again'
-        raise _wrong(name, f'question: its verdict waits for the answer: {asked}')
-    of_force, ship = given.get('baseline') == 'stated', found['ship']
-    before = [run for each in found['earlier'] if each['used'] for run in each['runs']]
-    return EarlierDiagnosis(
-        name,
-        ship['name'] if ship else '',
-        ship['length_m'] if ship else None,
-        _seen(found['runs']),
-        _seen(before),
-        _candidates(found['candidates'], name, all_sized=of_force),
-        of_force,
-        ship['effects'] if ship else (),
-    )
-
-
-def _seen(runs: Iterable[Mapping[str, Any]]) -> tuple[SeenRun, ...]:
-    return tuple(SeenRun(run['bag'], run['time_ns']) for run in runs)
-
-
-def _candidates(
-    listed: Sequence[Mapping[str, Any]], name: str, *, all_sized: bool
-) -> tuple[EarlierCandidate, ...]:
-    found = []
-    for i, each in enumerate(listed):
-        names = each['names']
-        sizes = {
-            effect: {
-                # null: it could not be found
-                key: Parameter(size['value'], math.nan if size['sd'] is None else size['sd'])
-                for key, size in parameters.items()
-            }
-            for effect, parameters in each['effects']
-        }
-        if names == (_UNKNOWN,):
-            continue
-        named = set() if names == (_NOTHING,) else set(names)
-        # without a baseline, an effect that could not be seen has no size
-        if not names or ((sizes or all_sized) and named != set(sizes)):
-            why = f'candidates[{i}]: the names are {show(list(names))}, and the effects others'
-            raise _wrong(name, why)
-        found.append(EarlierCandidate(each['probability'], sizes))
-    total = math.fsum(each.probability for each in found)
-    if not listed or total > 1.0 + 1e-6:
-        raise _wrong(name, f'candidates: {len(listed)} of probability {total:g} in all')
-    return tuple(found)
 
 
 _HALF = priors.EARLIER_COUNTS.mean
@@ -581,7 +541,7 @@ def carried(
     runs: Sequence[SeenRun],
     facts: Facts,
     sought: Collection[str],
-) -> Carried | None:
+) -> Carried:
     """
     Hold earlier diagnoses against what is to be diagnosed.
 
@@ -598,18 +558,11 @@ def carried(
     sought
         Names of the effects that her ship file and the runs can show.
 
-    Returns
-    -------
-    Carried or None
-        None without an earlier diagnosis.
-
     Raises
     ------
     DiagnosisError
         If one is of another ship, of later runs, or holds a run that would count twice.
     """
-    if not earlier:
-        return None
     latest_first = sorted(earlier, key=lambda each: -each.last_ns)
     now_ns = min(run.time_ns for run in runs)
     check(latest_first, ship, runs)
