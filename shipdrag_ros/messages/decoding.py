@@ -46,7 +46,7 @@ _KIND = re.compile('(shaft|pitch)', re.IGNORECASE | re.ASCII)
 _SIDE = re.compile(
     r'[^a-z]*(?:(port)|(starboard|stbd)|(centre|center)|\Z)(?![a-z])', re.IGNORECASE | re.ASCII
 )
-_WINDOW, _MOST = 64, 4096  # messages compared with the first; twice as many where all are alike
+_WINDOW, _MOST = 64, 4096  # messages compared with the first: after others, and at first
 _MOST_BYTES = 1 << 20  # of messages compared at once
 _KEPT, _KEPT_BYTES = 256, 4096  # plans, by the size of their messages, none of a longer one
 
@@ -296,7 +296,7 @@ def decode_batch(
     unreadable = []
     for i, source in enumerate(sources):
         counts: Counter[Unreadable] = Counter()
-        left, width = np.flatnonzero(number == i), _WINDOW
+        left, width = np.flatnonzero(number == i), _MOST
         while len(left):
             first = left[0]
             plan = _plan_of(source, data[start[first] : end[first]])
