@@ -147,6 +147,7 @@ def diagnose(
     ['log_scale']
     """
     baseline = 'fitted_here' if ship.baseline is None else 'stated'
+    known = usual_baseline(ship) if ship.baseline is None else ship
     seen, notes = observed(runs, ship, parameters, progress=progress)
     stated = stated_in(runs, seen, ship, facts)
     checked = {each.run for each in stated.stated if each.fact.name == UNITS_CHECKED}
@@ -154,7 +155,7 @@ def diagnose(
         f'{run.name}: {ask}'
         for j, run in enumerate(seen)
         if not checked & {None, j}
-        and (ask := asked(ratio_before_the_stop(run)) or asked_of_speed(run.speed_m_s, run.ship))
+        and (ask := asked(ratio_before_the_stop(run)) or asked_of_speed(run.speed_m_s, known))
     ]
     before = carried(
         earlier, ship, _seen_runs(seen), stated, [e.name for e in effects_about(seen)]
@@ -356,6 +357,13 @@ def observed(
         f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
         for run in seen
         if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
+    ]
+    low_m_s = 0.0 if ship.baseline is None else ship.baseline_range_m_s[0]
+    notes += [
+        f'{run.name}: below {low_m_s:.3g} m/s ({ship_speed(low_m_s, ship.mass_kg)}) the ship file '
+        'states no resistance; there it is taken to go with the square of the speed'
+        for run in seen
+        if (run.rows.value[run.rows.kind != POSITION] < low_m_s).any()
     ]
     return tuple(seen), tuple(notes)
 

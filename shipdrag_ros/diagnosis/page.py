@@ -219,7 +219,7 @@ def write_diagnosis(
     name = f' of {ship.name}' if ship is not None and ship.name else ''
     runs = ', '.join(trace.name for trace in found.traces)
     judged = [
-        *_today(ship, found.estimates),
+        *_today(found.in_runs or ship, found.estimates),
         *_sizes(found),
         *_limits(found),
         _motions(found, ship),
@@ -244,9 +244,8 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
         'How probable each answer is. One long bar is a name; several of like length are '
         'what these runs cannot separate.'
     )
-    needs = () if ship is None or found.question else in_service(found.estimates, ship)
     yield Section(
-        lead=[sentence, *needs[:1]],
+        lead=[sentence, *found.needs(ship)[:1]],
         text=rest,
         pictures=[picture(probability_picture(answers), caption)] if answers else (),
     )

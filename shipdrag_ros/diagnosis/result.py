@@ -362,6 +362,8 @@ class DiagnosisResult:
         Where none is used: that none was found and why, a sentence.
     estimates
         r(v) of the coastdowns as measured, where they were estimated.
+    in_runs
+        The ship as she was in all runs, with her mass then; None: as in her file.
     facts
         All that were stated, with what the data say of each.
     runs_differ
@@ -400,6 +402,7 @@ class DiagnosisResult:
     facts: tuple[WeighedFact, ...] = ()
     runs_differ: tuple[RunSize, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    in_runs: Ship | None = None
     runs: tuple[SeenRun, ...] = ()
     earlier: tuple[WeighedEarlier, ...] = ()
     question: str = ''
@@ -410,6 +413,14 @@ class DiagnosisResult:
         """The smallest set that holds 90 %, most probable first."""
         probability = {each.names: each.probability for each in self.candidates}
         return self.candidates[: len(smallest_set(probability, CERTAIN))]
+
+    def needs(self, ship: Ship | None) -> tuple[str, ...]:
+        """
+        Say what she needs at her usual speed; nothing of a ship that is not known.
+        """
+        if ship is None or self.question:
+            return ()
+        return in_service(self.estimates, self.in_runs or ship)
 
     def summary(self, ship: Ship | None = None) -> tuple[str, ...]:
         """
@@ -427,11 +438,10 @@ class DiagnosisResult:
         """
         from shipdrag_ros.diagnosis import words  # it shows what this module holds
 
-        needs = () if ship is None or self.question else in_service(self.estimates, ship)
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self.runs_differ))
         last = 'Sizes elsewhere are those of the last run.' if self.runs_differ else ''
-        lines = (*first, last, *needs, words.examined(self), where)
+        lines = (*first, last, *self.needs(ship), words.examined(self), where)
         more = (*words.facts(self), *words.earlier(self), *self.notes)
         return (*filter(None, lines), *more)
 

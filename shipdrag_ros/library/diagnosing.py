@@ -115,7 +115,7 @@ def diagnose_runs(
     unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
     found = replace(found, notes=(*found.notes, *seen.warnings, *unused))
     if seen.whole:
-        found = replace(found, no_coastdown=seen.no_coastdown, estimates=seen.estimates)
+        found = replace(seen.known(found), no_coastdown=seen.no_coastdown)
     return found, seen.ship
 
 
@@ -133,7 +133,7 @@ class _Together:
         if not seen.coasts:
             stated = (*seen.ship.facts, *self.facts)
             return self.unused(self.sailing(seen.ship, seen.no_coastdown, stated), stated)
-        return replace(self._of_force(seen), estimates=seen.estimates)
+        return seen.known(self._of_force(seen))
 
     def _of_force(self, seen: _Coastdowns) -> DiagnosisResult:
         """Diagnose coastdowns; without a baseline the logs and the ways over ground as well."""
@@ -247,7 +247,8 @@ class _Coastdowns:
 
     `whole` are all glides with the parts of them that are no coastdown, though no instrument
     shows why; empty where no such part can be followed. `notes` says what these are, `warnings`
-    what is wrong with the runs, and what was cut.
+    what is wrong with the runs, and what was cut, `in_runs` how she was in all of them, if that is
+    not as in her file.
     """
 
     coasts: list[CoastRun]
@@ -257,7 +258,12 @@ class _Coastdowns:
     parameters: Parameters
     without: tuple[str, ...]
     estimates: tuple[Estimate, ...]
+    in_runs: Ship | None
     warnings: tuple[str, ...]
+
+    def known(self, found: DiagnosisResult) -> DiagnosisResult:
+        """Return a diagnosis with what was estimated of the coastdowns."""
+        return replace(found, estimates=self.estimates, in_runs=self.in_runs)
 
     @property
     def no_coastdown(self) -> str:
@@ -277,6 +283,7 @@ def _found(
     seen: list[_OfRun] = []
     without: list[str] = []
     estimates: list[Estimate] = []
+    own: list[Ship | None] = []
     warnings: list[str] = []
     ship, parameters = given, None
     for each, window in runs:
@@ -284,7 +291,8 @@ def _found(
         stage(0, 0)
         ship = ship_of(each, ship)
         sheet, of_run = _sheet(listener, each, ship)
-        told = replace(ship, facts=overriding(ship.facts, sheet.facts, facts))
+        told = replace(of_run or ship, facts=overriding(ship.facts, sheet.facts, facts))
+        own.append(of_run)
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
         result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
         parameters = parameters or result.parameters
@@ -317,6 +325,7 @@ def _found(
         parameters,
         tuple(without),
         tuple(estimates),
+        own[0] if all(each == own[0] for each in own) else None,
         tuple(warnings),
     )
 

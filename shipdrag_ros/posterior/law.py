@@ -217,10 +217,26 @@ def wave_with_friction(ship: Ship) -> float:
 
 def usual_baseline(ship: Ship) -> Ship:
     """
-    Return a ship as she is, with the two parts of any hull where her file states no baseline.
+    Return a ship with a baseline down to rest.
+
+    Where her file states none, it has the two parts of any hull; below the lowest speed of one
+    that it states, r goes with the square of the speed, as the law of the hull has it.
     """
-    if ship.baseline is not None:
-        return ship
+    base, part = ship.baseline, np.linspace(0.0, 0.9, 10)
+    if isinstance(base, TableBaseline) and base.speed_m_s[0] > 0.0:
+        speed, force = base.speed_m_s, base.resistance_n
+        base = replace(
+            base,
+            speed_m_s=(*(part * speed[0]).tolist(), *speed),
+            resistance_n=(*(part**2 * force[0]).tolist(), *force),
+        )
+    elif isinstance(base, CoefficientBaseline) and base.wave_froude[0] > 0.0:
+        wave = base.wave_coefficient
+        base = replace(
+            base, wave_froude=(0.0, *base.wave_froude), wave_coefficient=(wave[0], *wave)
+        )
+    if base is not None:
+        return replace(ship, baseline=base)
     froude = np.linspace(0.0, _HIGHEST_FROUDE, 13)
     base = CoefficientBaseline(
         USUAL_FORM_FACTOR,

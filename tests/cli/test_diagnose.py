@@ -215,15 +215,20 @@ def test_facts_make_a_name_of_a_set_told_by_options_or_by_the_run_file_beside_a_
     assert 'Facts that were given' in said
     assert 'no cable, net or line was in the water' in said
     (lighter,) = told['effects']
+    power = re.search(r'resistance (\S+) ± ', said)
 
     sheet = fouled.with_name('run.mcap.run.yaml')
     sheet.write_text(f'facts: [{", ".join(KNOWN)}]\ndisplaced_volume_m3: 21000.0\n')
     try:
         told = found(tmp_path, str(fouled))
-        said = capsys.readouterr().err
+        out, said = capsys.readouterr()
     finally:
         sheet.unlink()
     assert f'{sheet} holds for this run' in said
+    heavier = re.search(r'resistance (\S+) ± ', out)
+    assert power
+    assert heavier
+    assert float(heavier[1]) == pytest.approx(21.0 / 20.2 * float(power[1]), rel=0.01)
     assert {each['bag'] for each in told['facts']} == {str(fouled)}
     # a ship that is 4 % heavier stops as much later: as much more resistance is missing
     (effect,) = told['effects']

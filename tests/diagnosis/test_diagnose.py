@@ -23,7 +23,7 @@ from shipdrag_ros.inference.rows import LOG, POSITION
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Fact, Ship, StatedEffect
+from shipdrag_ros.ship import CoefficientBaseline, Fact, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import LIBRARY, parse
 from tests.runs import CARGO as SHIP
@@ -66,6 +66,25 @@ def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
     assert not found.candidates
     with pytest.raises(SimulationError, match='the baseline is stated for'):
         diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=[Fact('units_checked')])
+
+
+@pytest.mark.parametrize('table', [True, False])
+def test_a_baseline_that_ends_above_the_run_goes_on_with_the_square(table: bool) -> None:
+    base = SHIP.baseline
+    assert isinstance(base, CoefficientBaseline)
+    low = 0.1 if table else base.wave_froude[1]
+    if table:
+        speed = SHIP.speed(np.linspace(low, 0.24, 9))
+        force = SHIP.resistance_n(speed)
+        known = TableBaseline(tuple(speed.tolist()), tuple(force.tolist()), 0.02)
+        ship = replace(SHIP, baseline=known)
+    else:
+        froude, wave = base.wave_froude[1:], base.wave_coefficient[1:]
+        ship = replace(SHIP, baseline=replace(base, wave_froude=froude, wave_coefficient=wave))
+    found = diagnose([run('log_scale=0.1')], ship, PARAMETERS)
+    assert [each.name for each in found.effects] == ['log_scale']
+    said = f'below {SHIP.speed(low):.3g} m/s'
+    assert any(said in note and 'square of the speed' in note for note in found.notes)
 
 
 def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
