@@ -578,8 +578,10 @@ def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> Diagno
         )
         return replace(_noting(force, agree, *log_track.notes), examined=examined)
     besides = () if force.verdict is Verdict.NONE else (_force_besides(force),)
+    named = {effect.name for effect in log_track.effects}
     return replace(
         log_track,
+        limits={name: each for name, each in force.limits.items() if name not in named},
         notes=(*besides, *log_track.notes, *force.notes),
         would_decide=log_track.would_decide or force.would_decide,
         baseline=force.baseline,

@@ -402,6 +402,7 @@ def test_a_ship_file_of_two_values_does_not_hide_a_current(tmp_path, ship_file, 
     assert found['baseline'] == 'fitted_here'
     assert found['coastdowns_used'] == 1
     assert found['examined'] == ['force', 'log_track']
+    assert {'fouling', 'towed_cable'} <= set(found['limits'])  # by the force
     # on one course a current and an offset of the log are the same
     assert found['verdict'] == 'one_of'
     alone = [each for each in found['candidates'] if len(each['effects']) == 1]
