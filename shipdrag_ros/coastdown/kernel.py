@@ -20,13 +20,13 @@ from shipdrag_ros.coastdown.bins import (
     RANK,
     SOURCES,
     Bins,
+    add,
+    close,
     line,
     mean_turning,
 )
-from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.memory import InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.memory import REFUSED, InputTally, Memory, Tuning, append
 from shipdrag_ros.coastdown.past import NEVER
-from shipdrag_ros.coastdown.ring import REFUSED, append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,

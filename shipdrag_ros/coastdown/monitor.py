@@ -33,11 +33,18 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, heading_doubt, mean_heading
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.memory import (
+    ALWAYS,
+    CAPACITY,
+    InputTally,
+    Memory,
+    Tuning,
+    make_room,
+    since,
+)
 from shipdrag_ros.coastdown.past import NEVER
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.regimes.watch import LATE_S, LEAD_S, Dated, RegimeFilter
-from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.validate import Limits, alive_ns, clock_set

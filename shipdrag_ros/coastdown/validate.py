@@ -32,8 +32,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.outliers import (
+from shipdrag_ros.coastdown.past import (
+    CHANNELS,
+    NEVER,
     JudgedReading,
+    Past,
     fits,
     proves_refused,
     quickness,
@@ -41,7 +44,6 @@ from shipdrag_ros.coastdown.outliers import (
     repeats_refused,
     take,
 )
-from shipdrag_ros.coastdown.past import CHANNELS, NEVER, Past
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (

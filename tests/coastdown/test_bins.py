@@ -11,6 +11,8 @@ from shipdrag_ros.coastdown.bins import (
     PER_SECOND,
     TIME,
     Bins,
+    add,
+    close,
     displacement,
     line,
     mean_place,
@@ -18,7 +20,6 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
     span,
 )
-from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.samples import Channel
 
 SECOND_NS = 1_000_000_000

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown.ring import RingBuffer, append, make_room, since
+from shipdrag_ros.coastdown.memory import RingBuffer, append, make_room, since
 from shipdrag_ros.samples import Block, Channel
 
 LATE_NS = 5
