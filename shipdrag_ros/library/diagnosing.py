@@ -284,7 +284,7 @@ def _found(
         stage(0, 0)
         ship = ship_of(each, ship)
         sheet, of_run = _sheet(listener, each, ship)
-        told = replace(ship, facts=overriding(ship.facts, sheet.facts, facts))
+        told = replace(of_run or ship, facts=overriding(ship.facts, sheet.facts, facts))
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
         result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
         parameters = parameters or result.parameters
