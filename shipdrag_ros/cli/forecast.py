@@ -66,6 +66,9 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     # a window says when `now` is, not that she glides in it
     results = replayed(options, output, parts=options.if_stopped_now)
+    for result in results:
+        for warning in result.run.warnings:
+            output.log(f'{result.bag}: {warning}')
     if options.if_stopped_now:
         stopped = forecasts.if_stopped_now(results)
         output.heading(stopped.bag)

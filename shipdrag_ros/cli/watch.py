@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     deltas = None if options.signal_k is None else listen(LOOPBACK, options.signal_k)
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
-        source, mark = stack.enter_context(_source(options, ship, past, output))
+        source, mark = stack.enter_context(_source(options, ship, past, output, notes))
         fleet = None if options.store is None else fleet_pages(output, options.store)
         for note in notes:
             output.log(note)
@@ -134,14 +134,19 @@ def run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _source(
-    options: argparse.Namespace, ship: Ship | None, past: list[PastRun], output: Output
+    options: argparse.Namespace,
+    ship: Ship | None,
+    past: list[PastRun],
+    output: Output,
+    notes: list[str],
 ) -> Iterator[tuple[PictureFeed, Callable[[], str] | None]]:
-    """Yield what feeds the page, and what tells the node of a stop; end it."""
+    """Yield what feeds the page, and what tells the node of a stop; end it. Bags add notes."""
     from shipdrag_ros.live.source import BagSource, NodeSource
 
     if options.bags:
         runs = open_parts(options.bags, output, remap=options.remap)
         player = BagSource(runs, ship=ship, speed=options.speed, past=past)
+        notes += (f'{run.name}: {each}' for run in runs for each in run.warnings)
         with contextlib.closing(player) as bags:
             yield bags, None
         return

@@ -35,6 +35,7 @@ from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, repla
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.words import run_warnings
 from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
+from shipdrag_ros.ship.facts import overriding
 from shipdrag_ros.simulation.effects import carrying
 from shipdrag_ros.sources.reading import read_any
 
@@ -236,7 +237,8 @@ def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
     for run in runs:
         hull = _hull(source, run)
         hull = hull._replace(ship=carrying(hull.ship, job.learnt))
-        result = replay(run, ship=hull.ship, compare=False)
+        told = replace(hull.ship, facts=overriding(hull.ship.facts, hull.facts))
+        result = replay(run, ship=told, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
         found, notes = _coastdowns(job, hull, result)
@@ -265,7 +267,7 @@ def _coastdowns(
         'content_hash': job.content_hash,
         'software_version': __version__,
         'water_temperature_c': hull.temperature_c,
-        'facts': [str(fact) for fact in (*hull.ship.facts, *hull.facts)],
+        'facts': [str(fact) for fact in result.ship.facts],
     }
     shared = ['clocks_apart'] if clocks_apart(result) else []
     if result.run.warnings:

@@ -28,7 +28,7 @@ from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import RankedHull, Ranking, together
+from shipdrag_ros.replay.together import RankedHull, Ranking, of_one_ship, together
 from shipdrag_ros.replay.words import StretchSpan, cut_lines, inside, stretch
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, picture
@@ -374,7 +374,7 @@ def _all(runs: Sequence[RunResult]) -> Section:
     many = '; the darker the line, the earlier' if estimate_pictures.is_shaded(len(dated)) else ''
     whole = ', all together with their band' if found.combined is not None else ''
     drawn: list[Picture] = []
-    if dated and len({run.ship for run in runs}) == 1:
+    if dated and of_one_ship(runs):
         drawn.append(
             picture(
                 estimate_pictures.curves_picture(dated, ship, combined=found.combined),

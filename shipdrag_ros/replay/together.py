@@ -11,7 +11,7 @@ hull and not to the speed it started from.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -23,7 +23,7 @@ from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.reciprocal import Combined, combine, comparable
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Ship, Water
 
 
 @dataclass(frozen=True)
@@ -170,8 +170,11 @@ def together(runs: Sequence[RunResult]) -> Together:
     ]
     if len(found) < 2:
         return Together(None)
-    if len({run.ship for run in runs}) > 1:
-        return Together(None, 'the bags are of different ships, so nothing is combined')
+    if not of_one_ship(runs):
+        return Together(
+            None,
+            'the bags are of different ships, or of one loaded otherwise: nothing is combined',
+        )
     twice = _twice(runs)
     if twice:
         return Together(None, f'windows of {twice!r} overlap, and what they share is one run')
@@ -182,6 +185,18 @@ def together(runs: Sequence[RunResult]) -> Together:
         return Together(combine([part[0] for part in found], [part[1] for part in found]))
     except EstimationError as error:
         return Together(None, str(error))
+
+
+def of_one_ship(runs: Sequence[RunResult]) -> bool:
+    """
+    Say whether all runs are of one ship, as deep; what is known of each, and how warm the water
+    was, may differ.
+    """
+    ships = {
+        replace(ship, facts=(), water=Water(ship.water.density_kg_m3))
+        for ship in (run.ship for run in runs)
+    }
+    return len(ships) == 1
 
 
 def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:

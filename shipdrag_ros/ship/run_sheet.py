@@ -162,6 +162,8 @@ def find(paths: tuple[Path, ...]) -> Path | None:
         If there is more than one.
     """
     first, folder = paths[0], paths[0].parent
+    if not first.is_file():  # a frame lies in no folder
+        return None
     places = [first.with_name(f'{first.name}.{NAME}'), first.with_name(f'{first.stem}.{NAME}')]
     if (folder / 'metadata.yaml').exists():
         places += [folder / NAME, folder.parent / f'{folder.name}.{NAME}']

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,13 @@ def test_no_glide_is_said(steady_bag: Path, capsys: pytest.CaptureFixture[str]) 
     (none,) = json.loads(told.out)['not_made']
     assert (none['bag'], none['stop_ns']) == (str(steady_bag), None)
     assert 'No coastdown found' in none['reason']
+
+
+def test_what_holds_for_a_run_is_said(steady_bag: Path, tmp_path: Path, capsys) -> None:
+    bag = shutil.copy(steady_bag, tmp_path / 'own.mcap')
+    (tmp_path / 'run.yaml').write_text('facts: [calm]\n')
+    assert main(['forecast', str(bag), '--json']) == 0
+    assert f'{bag}: {tmp_path / "run.yaml"} holds for this run' in capsys.readouterr().err
 
 
 def test_a_bag_without_a_glide_is_said_beside_one_with_a_glide(steady_bag, coastdown_bag, capsys):

@@ -87,6 +87,15 @@ def test_the_run_file_says_how_she_was(bags: list[Path], tmp_path: Path) -> None
     assert 20200 / 18700 < ratio < 1.05 * 20200 / 18700
 
 
+def test_what_a_run_file_knows_counts_for_its_curve(bags: list[Path], tmp_path: Path) -> None:
+    path = tmp_path / 'a.mcap'
+    shutil.copy(bags[0], path)
+    (before,) = done(path).coastdowns
+    (tmp_path / 'a.mcap.run.yaml').write_text('facts: [calm, deep_water]')
+    (row,) = done(path).coastdowns
+    assert np.nanmean(row['sigma_m_s2']) < np.nanmean(before['sigma_m_s2'])
+
+
 def test_a_ship_file_beside_speaks_for_its_own_ship_alone(bags: list[Path], tmp_path) -> None:
     shutil.copy(bags[1], tmp_path / 'a.mcap')
     beside = SHIP.read_text().replace('form_factor: 0.20', 'form_factor: 0.30')

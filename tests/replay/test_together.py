@@ -13,6 +13,8 @@ from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import rank, together
+from shipdrag_ros.ship import Fact, RunSheet
+from shipdrag_ros.ship.run_sheet import RunWater
 from tests.runs import seen
 
 DAY_NS = 86_400 * 1_000_000_000
@@ -50,6 +52,15 @@ def test_of_many_dates_the_least_and_the_most_are_named(run: RunResult) -> None:
     assert 'of 5 dates the least and the most: 2023-11-14: ' in found.why_not
     assert '; 2024-11-08: ' in found.why_not
     assert '2024-02-12' not in found.why_not
+
+
+def test_what_is_known_of_a_run_makes_no_other_ship_but_her_load_does(run: RunResult) -> None:
+    other = later(run, days=1.0, factor=1.0)
+    sheet = RunSheet(facts=(Fact('calm'),), water=RunWater(temperature_c=4.0))
+    known = replace(sheet.of(run.ship, subject='run.yaml'), facts=sheet.facts)
+    assert together([run, replace(other, ship=known)]).combined is not None
+    loaded = replace(run.ship, displaced_volume_m3=1.05 * run.ship.displaced_volume_m3)
+    assert 'loaded otherwise' in together([run, replace(other, ship=loaded)]).why_not
 
 
 def test_months_later_the_same_resistance_is_the_same_state(run: RunResult) -> None:

@@ -93,3 +93,9 @@ def test_two_run_files_are_one_too_many(tmp_path: Path) -> None:
     touched(tmp_path / 'a.run.yaml')
     with pytest.raises(ShipFileError, match='two run files'):
         find((bag,))
+
+
+def test_a_frame_has_no_run_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    touched(tmp_path / 'run.yaml')  # of whatever lies where the script was started
+    monkeypatch.chdir(tmp_path)
+    assert find((Path('frame'),)) is None
