@@ -13,11 +13,11 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp, ndtri
 
 from shipdrag_ros.parameter import Prior, Shape
 from shipdrag_ros.samples import Float64
@@ -237,7 +237,7 @@ def mixture(parts: Iterable[tuple[float, float, float]]) -> tuple[float, float]:
 
 
 LineNumbers = NDArray[np.intp]
-_UNLUCKY_SD = float(ndtri(CERTAIN))  # noise is kinder in so many of all runs
+_UNLUCKY_SD = NormalDist().inv_cdf(CERTAIN)  # noise is kinder in so many of all runs
 
 
 class SizePosterior(NamedTuple):
@@ -383,7 +383,7 @@ def _expected(rival: Rival, information: Float64, truths: LineNumbers) -> _Expec
         gain += 0.5 * np.sum(score * found, axis=0) - 0.5 * np.linalg.slogdet(block)[1]
         gains.append(gain + chance)
         parts.append(np.vstack([np.ones(len(truths)), scale * found]))
-    gain = logsumexp(gains, axis=0)
+    gain = np.logaddexp.reduce(gains, axis=0)
     lines, place = np.unique(np.column_stack([rival.trace, places]), return_inverse=True)
     made = np.zeros((len(lines), len(truths)))
     weight = np.exp(np.array(gains) - gain)

@@ -75,7 +75,7 @@ def test_watch_plays_the_part_that_is_given(coastdown_bag: Path) -> None:
     watch.add_arguments(parser)
     options = parser.parse_args([f'{coastdown_bag}@400:460', str(coastdown_bag)])
     part, whole = open_parts(options.bags, Output(), remap={})
-    with watch._source(options, None, [], Output()) as (source, _):
+    with watch._source(options, None, [], Output(), []) as (source, _):
         player = source.player()
     assert player is not None
     assert (player['start_s'], player['end_s']) == tuple(each // 10**9 for each in part.span_ns)

@@ -83,7 +83,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(start: Any, view: Any, t
         stop_ns = int(block.stamp_ns[0]) + 430 * 10**9
         rehearsal.player.play(block[block.stamp_ns < stop_ns], speed=140.0, progress=note)
         viewer.wait_for('#headline', 'STEADY')
-        viewer.wait_for('#verdict', 'A coastdown from 8.2 m/s')  # before the stop
+        viewer.wait_for('#verdict', 'A coastdown from 15.9 knots')  # before the stop
         note(0.0)
         slowly_ns = int(block.stamp_ns[-1]) - 15 * 10**9
         glide = block[(block.stamp_ns >= stop_ns) & (block.stamp_ns < slowly_ns)]
