@@ -350,9 +350,12 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
     assert soon < late
 
 
-@pytest.mark.parametrize('lead_s', [300.0, 600.0])
-def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(ship, record, lead_s) -> None:
+@pytest.mark.parametrize(('lead_s', 'behind_s'), [(300.0, 0), (600.0, 0), (600.0, 100)])
+def test_a_stop_that_is_told_soon_after_the_start_keeps_its_time(
+    ship, record, lead_s, behind_s
+) -> None:
     block = record(sensors=(LOG,), seed=2, lead_in_s=lead_s)
+    block = replace(block, receive_ns=block.receive_ns + behind_s * S)  # by the clock of the log
     at = int(np.searchsorted(block.stamp_ns, START_NS + round((lead_s + 5.0) * S)))
     monitor = Monitor(ship, SLOW_UPDATES, estimate=None, final=window_itself)
     events = monitor.update(block[:at])
