@@ -217,7 +217,7 @@ def coasts_of(
     runs
         Where to look.
     given
-        The ship; None: the one attached to the first run.
+        The ship; None: the one attached to the first run that has one.
     progress
         Called with each stage, how much of it is done, and of how much.
     whole
@@ -292,11 +292,12 @@ def _found(
     own: list[Ship | None] = []
     warnings: list[str] = []
     ship, parameters = given, None
+    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), None)
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
         refuse_without_input(each)
-        ship = ship_of(each, ship)
+        ship = ship_of(owner or each, ship)
         said: list[str] = []
         sheet, where = sheet_of(each, said.append)
         for text in said:
