@@ -27,7 +27,6 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import overriding
-from shipdrag_ros.sources.beside import sheet_of
 
 _LATE_S = 10.0
 _MOVING_M_S = 0.5
@@ -138,6 +137,8 @@ def ship_in(run: Run, given: Ship | None) -> Ship:
     ShipFileError
         If `run.yaml` cannot be used, or what it says does not fit the ship.
     """
+    from shipdrag_ros.sources.beside import sheet_of  # of a room that no bag needs
+
     refuse_without_input(run)
     ship = ship_of(run, given)
     sheet, where = sheet_of(run, lambda text: run.note([text]))
