@@ -19,7 +19,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import NamedTemporaryFile
 from typing import IO, Any
 
 import numpy as np
@@ -227,7 +227,7 @@ def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
     Parameters
     ----------
     path
-        `.mcap.zstd`; of one that is not packed there is None.
+        `.zstd`; of one that is not packed there is None.
     damages
         Where is noted what is wrong with it.
 
@@ -238,7 +238,7 @@ def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
     """
     if path.suffix != '.zstd':
         return None
-    unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
+    unpacked = NamedTemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
     decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
     try:
         with disk_errors(path, 'unpacked'), path.open('rb') as packed:
@@ -292,7 +292,7 @@ def is_bag(path: Path) -> bool:
     """
     if path.is_dir() or path.name == 'metadata.yaml':
         folder = path if path.is_dir() else path.parent
-        return not any(folder.glob('*.db3')) or any(folder.glob('*.mcap*'))
+        return not any(folder.glob('*.db3*')) or any(folder.glob('*.mcap*'))
     if not path.is_file() or path.name.endswith(_SUFFIXES):
         return True
     with path.open('rb') as file:
@@ -367,7 +367,7 @@ def _without_metadata(path: Path) -> list[BagFiles]:
         (file for file in path.iterdir() if file.name.endswith(_SUFFIXES)), key=_natural_order
     )
     if not files:
-        if any(path.glob('*.db3')):
+        if any(path.glob('*.db3*')):
             raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {IMPORT}')
         raise BagError(f'{str(path)!r} holds no .mcap file; {_instead(path)}')
     stem = re.escape(path.name)

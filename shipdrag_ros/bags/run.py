@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
+from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.bags.writer import METADATA
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.messages import (
@@ -255,13 +256,16 @@ class Run:
 
     def save(self, out: Path) -> None:
         """
-        Copy the one file of the run.
+        Copy the one file of the run, unpacked where rosbag2 has packed it.
 
         Raises
         ------
         BagError
             If the disk does not take it.
         """
+        if self._message_compression or self.parts[0].path.suffix == '.zstd':
+            recover(Path(self.name), out)
+            return
         with disk_errors(out, 'written'):
             shutil.copyfile(self.parts[0].path, out)
 
@@ -488,11 +492,14 @@ def _mark(payload: bytes) -> Mark | None:
 
 
 def _unpacked(messages: Messages) -> Messages:
-    """Unpack each message for itself; one that cannot be is empty, and so malformed."""
-    return messages.holding([_unpack(messages.payload(n)) for n in range(len(messages))])
+    """Unpack each message for itself; an empty one is malformed."""
+    return messages.holding([unpacked_message(messages.payload(n)) for n in range(len(messages))])
 
 
-def _unpack(payload: bytes) -> bytes:
+def unpacked_message(payload: bytes) -> bytes:
+    """
+    Unpack a message that rosbag2 has packed for itself; one that cannot be is empty.
+    """
     try:
         return unpack_zstd(payload, _MESSAGE_LIMIT_BYTES)
     except (ValueError, zstandard.ZstdError):

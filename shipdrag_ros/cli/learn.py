@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add, new_file, unused_file
+from shipdrag_ros.cli.arguments import add, unused_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import WindowedBag, add_bags, open_windowed
 from shipdrag_ros.display import Table
-from shipdrag_ros.errors import DiagnosisError, EffectFileError, FleetError
+from shipdrag_ros.errors import EffectFileError, FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.ship import LearntTerm, Ship
 from shipdrag_ros.ship.expression import unit_text
@@ -31,7 +31,7 @@ def add_baseline(parser: argparse.ArgumentParser) -> None:
     """
     add_bags(parser)
     parser.add_argument('--ship', required=True, type=Path)
-    parser.add_argument('-o', '--out', required=True, type=new_file('.yaml'))
+    parser.add_argument('-o', '--out', required=True, type=unused_file('.yaml'))
     add(parser, '--remap', '--json')
 
 
@@ -50,7 +50,7 @@ def run_baseline(options: argparse.Namespace) -> int:
     --ship FILE
         ship file (YAML); the baseline in it is taken for what was known before
     --out FILE
-        ship file to write, with the learnt baseline
+        ship file to write, with the learnt baseline; an existing one is not overwritten
 
     Examples
     --------
@@ -63,11 +63,6 @@ def run_baseline(options: argparse.Namespace) -> int:
     from shipdrag_ros.library.replaying import refuse_overlaps
 
     output = Output(options.json)
-    if options.out.resolve() == options.ship.resolve():
-        raise DiagnosisError(
-            f'{str(options.out)!r} is the ship file itself, with what was known before; '
-            'write to another file'
-        )
     runs = open_windowed(options.bags, remap=options.remap, output=output)
     refuse_overlaps(runs)
     with stages(output) as progress:

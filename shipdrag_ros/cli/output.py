@@ -86,6 +86,7 @@ class ProgressLines:
         self._text = ''
         self._begun_s = self._said_s = time.monotonic()
         self._waits = not at_once
+        self._first = 0  # that was done when the stage was first seen
 
     def show(self, text: str, done: int, total: int) -> None:
         """
@@ -93,14 +94,14 @@ class ProgressLines:
         """
         now_s = time.monotonic()
         if text != self._text:
-            self._text, self._begun_s = text, now_s
+            self._text, self._begun_s, self._first = text, now_s, done
         if self._waits and (not done or now_s - self._said_s < self._every_s):
             return
         self._waits, self._said_s = True, now_s
-        if not done:
-            self._log(text if total < 2 else f'{text}: 0 of {total}')
+        if done == self._first:
+            self._log(text if total < 2 else f'{text}: {done} of {total}')
             return
-        left_s = (now_s - self._begun_s) / done * (total - done)
+        left_s = (now_s - self._begun_s) / (done - self._first) * (total - done)
         self._log(f'{text}: {done} of {total}, {duration(round(left_s))} left')
 
 

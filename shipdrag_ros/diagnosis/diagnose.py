@@ -168,7 +168,9 @@ def diagnose(
         found = _answer(case, notes, baseline, progress, advise=advise and not questions)
     except (DiagnosisError, SimulationError) as error:
         if not questions:
-            raise
+            beyond = (asked_of_speed(run.speed_m_s, known, checked=True) for run in seen)
+            named = [f'{run.name}: {why}' for run, why in zip(seen, beyond, strict=True) if why]
+            raise DiagnosisError('; '.join(named) or str(error)) from error
         found = DiagnosisResult(  # no hypothesis can be compared with these runs
             verdict=Verdict.ONE_OF,
             before=Gap(None, None, math.nan),
@@ -415,7 +417,7 @@ def asked(ratio: float) -> str:
     )
 
 
-def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
+def asked_of_speed(speed_m_s: float, ship: Ship, *, checked: bool = False) -> str:
     """
     Ask about the unit of a speed that no resistance is known for; else return ''.
 
@@ -425,6 +427,8 @@ def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
         Before the stop, as it was read.
     ship
         With a baseline.
+    checked
+        Whether the unit is known to be right: no question, but what to do.
     """
     low, high = ship.baseline_range_m_s
     if low <= speed_m_s <= high:
@@ -432,8 +436,9 @@ def asked_of_speed(speed_m_s: float, ship: Ship) -> str:
     read, least, most = (ship_speed(each, ship.mass_kg) for each in (speed_m_s, low, high))
     return (
         f'the speed before the stop was read as {speed_m_s:.3g} m/s ({read}), and resistance is '
-        f'known for {low:.3g} to {high:.3g} m/s ({least.partition(" ")[0]} to {most}): is the '
-        f'unit wrong? {_AGAIN}; if it is right, state a `baseline` that holds this speed'
+        f'known for {low:.3g} to {high:.3g} m/s ({least.partition(" ")[0]} to {most})'
+        f'{"; " if checked else f": is the unit wrong? {_AGAIN}; if it is right, "}'
+        'state a `baseline` that holds this speed'
     )
 
 

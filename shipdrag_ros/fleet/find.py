@@ -13,14 +13,23 @@ import os
 import posixpath
 import re
 import stat
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.errors import FleetError, reason_of
+from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
+from shipdrag_ros.sources.beside import (
+    BAGS,
+    FIRST_BYTES,
+    METADATA,
+    RUN_FILE,
+    is_bag_folder,
+    is_source,
+    run_file,
+)
 
 if TYPE_CHECKING:
     from fsspec import AbstractFileSystem
@@ -131,7 +140,10 @@ class Tree:
             if real in seen:
                 continue
             seen.add(real)
-            inside, folder = self._read(path, parts)
+            inside, folder = self.read(path, parts)
+            if self.only:
+                files = tuple(each for each in folder.files if each.name == self.only)
+                folder = replace(folder, files=files)
             yield folder
             if self.only or len(parts) >= _AT_MOST:
                 continue
@@ -188,8 +200,10 @@ class Tree:
         url: str = self._fs.unstrip_protocol(path)
         return url
 
-    def _read(self, path: str, parts: tuple[str, ...]) -> tuple[list[str], Folder]:
-        """Return the folders in a folder, and itself."""
+    def read(self, path: str, parts: tuple[str, ...] = ()) -> tuple[list[str], Folder]:
+        """
+        Return the folders in a folder, and itself.
+        """
         try:
             # not `fs.walk`: it follows no link, and drops what it cannot list below the top
             listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
@@ -204,7 +218,7 @@ class Tree:
             entry, is_folder = self._entry(place, about)
             if is_folder:
                 folders.append(place)
-            elif self.only in ('', entry.name):
+            else:
                 files.append(entry)
         return folders, Folder(path, parts, tuple(sorted(files, key=lambda each: each.name)))
 
@@ -259,17 +273,11 @@ def _irregular(mode: int) -> str:
     return f'is {kind} and no file; it may have no end'
 
 
-SHIP_FILE, EVENTS_FILE, RUN_FILE = 'ship.yaml', 'events.csv', 'run.yaml'
+SHIP_FILE, EVENTS_FILE = 'ship.yaml', 'events.csv'
 LIMIT_BYTES = 64 << 30
 """Of a file; a longer one is skipped."""
 
-_NO_BAGS = (EVENTS_FILE, 'truth.csv')  # the second: of `shipdrag simulate-fleet`
-_METADATA = 'metadata.yaml'
-_BAGS = ('.mcap', '.mcap.zstd')
-_FOREIGN = ('.db3', '.bag')  # of rosbag2 in sqlite3, and of ROS 1
-LOGS = ('.nmea', '.nmea.gz')
-TABLES = ('.csv', '.tsv')
-_FIRST_BYTES = 1 << 13
+_BESIDE = (SHIP_FILE, RUN_FILE, EVENTS_FILE, 'truth.csv')
 _PART = re.compile(r'(.*)_\d+\.mcap(\.zstd)?')
 
 
@@ -396,6 +404,7 @@ class _Search:
             )
         self._top = tree.root
         self._ships: dict[str, Beside] = {}
+        self._sources: dict[str, list[str]] = {}
         self.skipped: list[Skipped] = []
         self.left_alone = 0
         self.notes: list[str] = []
@@ -415,56 +424,37 @@ class _Search:
         return Path(path).resolve().is_relative_to(self._store)
 
     def _in_folder(self, folder: Folder) -> Iterator[BagToRead]:
-        if any(entry.name == _METADATA or entry.name.endswith('.db3') for entry in folder.files):
+        names = [entry.name for entry in folder.files]
+        if is_bag_folder(names):
             yield from self._bag_folder(folder)
             return
-        beside = (SHIP_FILE, RUN_FILE, *_NO_BAGS)
-        others = [e for e in folder.files if not e.name.endswith(beside)]
-        bags = [entry for entry in others if self._is_bag(entry)]
+        others = [e for e in folder.files if not e.name.endswith(_BESIDE)]
+        bags = [entry for entry in others if self._is_source(entry)]
         self.left_alone += len(others) - len(bags)
-        # parts of one recording are one bag
-        alone = len({_PART.sub(r'\1', entry.name) for entry in bags}) == 1
-        if len(bags) > 1 and not alone and any(e.name == RUN_FILE for e in folder.files):
-            where = _text('/'.join((*folder.parts, RUN_FILE)))
-            self.notes.append(
-                f'{where!r} lies beside {len(bags)} bags and is used for none of them; name it '
-                f'BAG.{RUN_FILE}'
-            )
         for entry in bags:
-            yield from self._one(folder, entry, alone=alone)
+            bag = _text('/'.join((*folder.parts, entry.name)))
+            yield from self._source(folder, bag, (entry,))
 
-    def _is_bag(self, entry: Entry) -> bool:
-        if entry.name.endswith((*_BAGS, *_FOREIGN, *LOGS, *TABLES)):
-            return True
-        if entry.problem or not entry.size:
-            return False
-        return is_log(entry.name, self._tree.beginning(entry.path, _FIRST_BYTES))
-
-    def _one(self, folder: Folder, entry: Entry, *, alone: bool) -> Iterator[BagToRead]:
-        bag = _text('/'.join((*folder.parts, entry.name)))
-        stem = entry.name.partition('.')[0]
-        names = [f'{entry.name}.{RUN_FILE}', f'{stem}.{RUN_FILE}', *([RUN_FILE] if alone else [])]
-        yield from self._source(folder, bag, (entry,), names, folder_bag=False)
+    def _is_source(self, entry: Entry) -> bool:
+        readable = entry.size and not entry.problem
+        first = partial(self._tree.beginning, entry.path, FIRST_BYTES) if readable else bytes
+        return is_source(entry.name, first)
 
     def _bag_folder(self, folder: Folder) -> Iterator[BagToRead]:
         """Yield a directory of rosbag2 as one bag."""
-        files = tuple(e for e in folder.files if e.name.endswith((_METADATA, *_BAGS, '.db3')))
+        files = tuple(e for e in folder.files if e.name.endswith((METADATA, *BAGS)))
         bag = _text('/'.join(folder.parts) or self._tree.name)
         if folder.path == self._tree.root:  # the bag itself was given: what lies beside it counts
             self._top = posixpath.dirname(self._tree.root)
-        beside = f'../{posixpath.basename(folder.path)}.{RUN_FILE}'
-        yield from self._source(
-            folder, bag, files, (RUN_FILE, beside, f'../{RUN_FILE}'), folder_bag=True
-        )
+        yield from self._source(folder, bag, files, whole=True)
 
     def _source(
         self,
         folder: Folder,
         bag: str,
         files: tuple[Entry, ...],
-        run_names: Sequence[str],
         *,
-        folder_bag: bool,
+        whole: bool = False,
     ) -> Iterator[BagToRead]:
         problem = next((_problem(entry) for entry in files if _problem(entry)), '')
         if problem:
@@ -472,19 +462,42 @@ class _Search:
             return
         try:
             beside = self._beside(folder.path)
-            run = self._run(folder, run_names)
-        except FleetError as error:
+            run = self._run(folder.path if whole else files[0].path, whole)
+        except (FleetError, ShipFileError) as error:
             self._skip(bag, str(error))
             return
         urls = tuple(self._tree.url(entry.path) for entry in files)
-        yield BagToRead(_text(self._tree.name), bag, urls, folder_bag, beside, run)
+        yield BagToRead(_text(self._tree.name), bag, urls, whole, beside, run)
 
-    def _run(self, folder: Folder, names: Sequence[str]) -> str:
-        for name in names:
-            text = self._tree.text(posixpath.normpath(posixpath.join(folder.path, name)))
-            if text is not None:
-                return text
-        return ''
+    def _run(self, bag: str, whole: bool) -> str:
+        where, name = posixpath.split(bag)
+        place = partial(posixpath.join, where)
+
+        def say(text: str) -> None:
+            shown = _text(posixpath.relpath(place(RUN_FILE), self._tree.root))
+            note = f'{shown!r} {text}'
+            if note not in self.notes:
+                self.notes.append(note)
+
+        found = run_file(
+            [name],
+            lambda each: self._tree.text(place(each)) is not None,
+            partial(self._sources_in, where),
+            say,
+            folder=whole,
+        )
+        return '' if found is None else self._tree.text(place(found)) or ''
+
+    def _sources_in(self, path: str) -> list[str]:
+        """Return the names of all bags and logs in a folder."""
+        if path not in self._sources:
+            inside, folder = self._tree.read(path)
+            names = [entry.name for entry in folder.files if self._is_source(entry)]
+            for each in inside:
+                if is_bag_folder([entry.name for entry in self._tree.read(each)[1].files]):
+                    names.append(posixpath.basename(each))
+            self._sources[path] = names
+        return self._sources[path]
 
     def _beside(self, path: str) -> Beside:
         """Return the nearest ship file from a folder up to the one given, and its events."""
@@ -509,30 +522,6 @@ class _Search:
 
     def _skip(self, bag: str, reason: str) -> None:
         self.skipped.append(Skipped(_text(self._tree.name), _text(bag), reason))
-
-
-def is_log(name: str, first: bytes) -> bool:
-    """
-    Say whether a file is a log that is imported, by its first bytes alone.
-
-    Parameters
-    ----------
-    name
-        Of the file.
-    first
-        Its first bytes, packed with gzip or not.
-    """
-    from shipdrag_ros.sources import formats  # where all names say what they are, not needed
-    from shipdrag_ros.sources.format import CERTAIN, Head
-    from shipdrag_ros.sources.opened import GZIP
-
-    if first.startswith(GZIP):
-        try:
-            first = zlib.decompressobj(wbits=31).decompress(first, _FIRST_BYTES)
-        except zlib.error:
-            return False
-    head = Head(Path(name), first)
-    return any(each.by_head and each.score(head) >= CERTAIN for each in formats.found())
 
 
 def _problem(entry: Entry) -> str:

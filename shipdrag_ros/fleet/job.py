@@ -29,14 +29,15 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
+from shipdrag_ros.fleet.find import SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.store import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.words import run_warnings
-from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
+from shipdrag_ros.ship import LearntTerm, RunSheet, Ship
 from shipdrag_ros.ship.facts import overriding
 from shipdrag_ros.simulation.effects import carrying
+from shipdrag_ros.sources.beside import RUN_FILE
 from shipdrag_ros.sources.reading import read_any
 
 _AT_ONCE_BYTES = 1 << 20
@@ -194,8 +195,7 @@ class _ShipInRun(NamedTuple):
     """The ship as she was in a run, and what is known of it."""
 
     ship: Ship
-    facts: tuple[Fact, ...]
-    temperature_c: float | None
+    sheet: RunSheet
     text: str
     warnings: tuple[str, ...]
 
@@ -237,7 +237,7 @@ def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
     for run in runs:
         hull = _hull(source, run)
         hull = hull._replace(ship=carrying(hull.ship, job.learnt))
-        told = replace(hull.ship, facts=overriding(hull.ship.facts, hull.facts))
+        told = replace(hull.ship, facts=overriding(hull.ship.facts, hull.sheet.facts))
         result = replay(run, ship=told, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
@@ -266,7 +266,7 @@ def _coastdowns(
         'bag': job.sources[0].bag,
         'content_hash': job.content_hash,
         'software_version': __version__,
-        'water_temperature_c': hull.temperature_c,
+        'water_temperature_c': hull.sheet.temperature_c,
         'facts': [str(fact) for fact in result.ship.facts],
     }
     shared = ['clocks_apart'] if clocks_apart(result) else []
@@ -295,7 +295,7 @@ def _diagnosis(
     result: ReplayResult, hull: _ShipInRun, coastdown: EndedCoastdown, window: Window
 ) -> tuple[DiagnosisResult | None, list[str]]:
     """Diagnose one coastdown; with the ends of sentences that are to be said of it."""
-    run = CoastRun(Path(result.run.name).name, window, hull.facts)
+    run = CoastRun(Path(result.run.name).name, window, hull.sheet.facts)
     try:
         if hull.ship.baseline is None:
             return _held(result, hull, run), []
@@ -317,7 +317,7 @@ def _dismissed(result: ReplayResult, hull: _ShipInRun) -> list[str]:
         return []
     notes = []
     for glide in dismissed_glides(result):
-        run = CoastRun(Path(result.run.name).name, glide, hull.facts)
+        run = CoastRun(Path(result.run.name).name, glide, hull.sheet.facts)
         try:
             said = sentence(_held(result, hull, run))
         except ShipdragError as error:  # a glide that is like none may not be followed
@@ -351,11 +351,8 @@ def _hull(source: BagToRead, run: Run) -> _ShipInRun:
                 'which is used',
             )
     ship = Ship.from_yaml(text, subject=subject)
-    if not source.run:
-        return _ShipInRun(ship, (), None, text, warnings)
-    sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE)
-    temperature_c = None if sheet.water is None else sheet.water.temperature_c
-    return _ShipInRun(sheet.of(ship, subject=RUN_FILE), sheet.facts, temperature_c, text, warnings)
+    sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE) if source.run else RunSheet()
+    return _ShipInRun(sheet.of(ship, subject=RUN_FILE), sheet, text, warnings)
 
 
 def _name(ship: Ship, source: BagToRead) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
-from shipdrag_ros.bags import Run, WindowedRun, WindowSpan
+from shipdrag_ros.bags import WindowedRun, WindowSpan
 from shipdrag_ros.coastdown.events import ENDED_BY, NOT_ALL, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, SailingRecord, diagnose, diagnose_sailing
 from shipdrag_ros.diagnosis.diagnose import with_log_track, with_whole_glides
@@ -29,10 +29,17 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, ship_of, told_beside
+from shipdrag_ros.replay.playback import (
+    SHIP_FILE,
+    StopTime,
+    refuse_without_input,
+    ship_of,
+    told_beside,
+)
 from shipdrag_ros.replay.words import cut_lines, run_warnings
-from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
+from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import UNITS_CHECKED, overriding
+from shipdrag_ros.sources.beside import sheet_of
 
 
 def diagnose_runs(
@@ -176,9 +183,8 @@ class _Together:
         records, parameters = [], None
         for done, (run, _) in enumerate(self.runs):
             self.progress(f'reading {run.name}', done, len(self.runs))
-            own = run_sheet.find(run.paths)
-            stated = (*facts, *(RunSheet.load(own).facts if own is not None else ()))
-            checked = any(fact.name == UNITS_CHECKED for fact in stated)
+            sheet, _ = sheet_of(run, lambda text: None)  # said where coastdowns are looked for
+            checked = any(fact.name == UNITS_CHECKED for fact in (*facts, *sheet.facts))
             block, used = accepted_samples(run, ship, zeros=True)
             parameters = parameters or used
             records.append(SailingRecord(run.name, block, checked))
@@ -211,7 +217,7 @@ def coasts_of(
     runs
         Where to look.
     given
-        The ship; None: the one attached to the first run.
+        The ship; None: the one attached to the first run that has one.
     progress
         Called with each stage, how much of it is done, and of how much.
     whole
@@ -286,12 +292,19 @@ def _found(
     own: list[Ship | None] = []
     warnings: list[str] = []
     ship, parameters = given, None
+    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), None)
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
-        ship = ship_of(each, ship)
-        sheet, of_run = _sheet(listener, each, ship)
-        told = replace(of_run or ship, facts=overriding(ship.facts, sheet.facts, facts))
+        refuse_without_input(each)
+        ship = ship_of(owner or each, ship)
+        said: list[str] = []
+        sheet, where = sheet_of(each, said.append)
+        for text in said:
+            listener.log(f'{each.name}: {text}')
+        was = sheet.of(ship, subject=where)
+        of_run = None if was == ship else was
+        told = replace(was, facts=overriding(ship.facts, sheet.facts, facts))
         own.append(of_run)
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
         result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
@@ -380,17 +393,6 @@ def _ends(bag: str, windows: Sequence[tuple[EndedCoastdown, Window]]) -> Iterato
         if coastdown.ended_by not in known:
             also = f'; {coastdown.disturbed}' if coastdown.disturbed else ''
             yield f'{name}: the coastdown ends where {ENDED_BY[coastdown.ended_by]}{also}'
-
-
-def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:
-    """Return what is known of a run alone, and the ship where she was another in it."""
-    path = run_sheet.find(run.paths)
-    if path is None:
-        return RunSheet(), None
-    sheet = RunSheet.load(path)
-    listener.log(f'{run.name}: {path} holds for this run')
-    of_run = sheet.of(ship, subject=str(path))
-    return sheet, None if of_run == ship else of_run
 
 
 def _cuts(result: ReplayResult, window: WindowSpan | None) -> Iterator[str]:

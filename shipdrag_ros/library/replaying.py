@@ -16,10 +16,17 @@ from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, in_run, told_beside
+from shipdrag_ros.replay.playback import (
+    SHIP_FILE,
+    StopTime,
+    refuse_without_input,
+    ship_of,
+    told_beside,
+)
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.facts import overriding
 
 _LATE_S = 10.0
 _MOVING_M_S = 0.5
@@ -119,6 +126,25 @@ def _text(window: WindowSpan) -> str:
     return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'
 
 
+def ship_in(run: Run, given: Ship | None) -> Ship:
+    """
+    Return the ship as she was in a run, with what is known of it: a `run.yaml` is noted.
+
+    Raises
+    ------
+    BagError
+        If the run has no input, or no ship file where none is given.
+    ShipFileError
+        If `run.yaml` cannot be used, or what it says does not fit the ship.
+    """
+    from shipdrag_ros.sources.beside import sheet_of  # of a room that no bag needs
+
+    refuse_without_input(run)
+    ship = ship_of(run, given)
+    sheet, where = sheet_of(run, lambda text: run.note([text]))
+    return replace(sheet.of(ship, subject=where), facts=overriding(ship.facts, sheet.facts))
+
+
 def replay_run(
     each: Run,
     listener: Listener,
@@ -140,7 +166,7 @@ def replay_run(
         result = RunResult.of(
             replay(
                 each,
-                ship=in_run(each, ship),
+                ship=ship_in(each, ship),
                 parameters=parameters,
                 window=window,
                 stop=stop,

@@ -17,7 +17,7 @@ from shipdrag_ros import simulation
 from shipdrag_ros.bags import BagWriter, Run
 from shipdrag_ros.bags.mcap_file import BagFiles, McapFile
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.record import Record, ShipGiven, ship_of
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.shown import says_it_in_python
 from shipdrag_ros.parameters import Parameters
@@ -211,13 +211,13 @@ class Sensing(TypedDict, total=False):
 
 @says_it_in_python
 def simulate(
-    ship: Ship,
+    ship: ShipGiven,
     effects: Mapping[str, Size] | None = None,
     *,
     speed_m_s: float | None = None,
     duration_s: float = 1500.0,
     heading_rad: float = 0.0,
-    start: str | None = None,
+    start: str | datetime | None = None,
     seed: int = 0,
     **sensing: Unpack[Sensing],
 ) -> Record:
@@ -227,7 +227,7 @@ def simulate(
     Parameters
     ----------
     ship
-        With a baseline.
+        With a baseline, or the path of its file.
     effects
         What acts in addition, by name: `{'fouling': 0.2}` for the first parameter, or
         `{'current': {'along_track_m_s': 0.4}}`. docs/effects.md has all, in SI.
@@ -270,13 +270,17 @@ def simulate(
     >>> bool(record.truth.at(6.0) > clean.truth.at(6.0))
     True
     """
+    hull = ship_of(ship)
+    if hull is None:
+        raise SimulationError('no ship is given: a Ship, or the path of a ship file')
     if not isinstance(effects or {}, Mapping):
         raise SimulationError(f"effects {effects!r}: give names with sizes, {{'fouling': 0.3}}")
     if not isinstance(seed, int | np.integer) or seed < 0:
         raise SimulationError(f'seed {seed!r}: expected a whole number from 0 on')
     more = {**sensing}
     if 'inputs' in more:
-        more['inputs'] = tuple(sensing['inputs'])
+        inputs = sensing['inputs']
+        more['inputs'] = (inputs,) if isinstance(inputs, str) else tuple(inputs)
     unknown = set(more) - set(Sensing.__annotations__)
     if unknown:
         raise SimulationError(
@@ -284,18 +288,18 @@ def simulate(
             f'{", ".join(Sensing.__annotations__)}'
         )
     settings = SimulationSettings(
-        speed_m_s=usual_speed(ship) if speed_m_s is None else speed_m_s,
+        speed_m_s=usual_speed(hull) if speed_m_s is None else speed_m_s,
         duration_s=duration_s,
         heading_rad=heading_rad,
         seed=seed,
         effects=tuple(_stated(name, size) for name, size in (effects or {}).items()),
-        start_ns=START_NS if start is None else moment_ns(start),
+        start_ns=START_NS if start is None else moment_ns(str(start)),
         **more,  # type: ignore[arg-type]
     )
-    block, truth = make(ship, settings)
+    block, truth = make(hull, settings)
     folder = TemporaryDirectory(prefix='shipdrag-')
     bag = Path(folder.name) / f'{NAME}.mcap'
-    write_bag(bag, block, ship, truth, Notes())
+    write_bag(bag, block, hull, truth, Notes())
     # two runs of one day are known by their names
     name = f'{NAME}, seed {seed}' + (f', heading {heading_rad:.4g} rad' if heading_rad else '')
     run = Run(BagFiles(name, (bag,)), [McapFile(bag)])

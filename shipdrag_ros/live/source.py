@@ -16,6 +16,7 @@ from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
 from shipdrag_ros.errors import ShipdragError, reason_of
+from shipdrag_ros.library.replaying import ship_in
 from shipdrag_ros.live import FASTEST
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.outputs import PastRun
@@ -24,7 +25,7 @@ from shipdrag_ros.messages.topics import Health, Heard, NodeMessage, Samples
 from shipdrag_ros.node.background import Diagnosing
 from shipdrag_ros.node.health import InputFacts, InputStates, Standing, state_status
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.playback import feed, in_run, settings_of
+from shipdrag_ros.replay.playback import feed, settings_of
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 
@@ -277,7 +278,7 @@ class BagSource(PictureFeed):
         speed: float = 1.0,
         past: Sequence[PastRun] = (),
     ) -> None:
-        self._runs = [(run, *settings_of(run, in_run(run, ship))) for run in runs]
+        self._runs = [(run, *settings_of(run, ship_in(run, ship))) for run in runs]
         self._number = -1
         self._speed = speed
         self._playing = True

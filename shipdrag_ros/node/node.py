@@ -84,6 +84,7 @@ class CoastdownNode(LifecycleNode):
         self._compiling: Compiling | None = None
         self._diagnosing: Diagnosing | None = None
         self._diagnosed: DiagnosisStatus | None = None
+        self._ahead = ''
         self._input_topics: list[InputTopic] = []
         self._nmea: NmeaFeed | None = None
         self._input_states = health.InputStates()
@@ -355,6 +356,9 @@ class CoastdownNode(LifecycleNode):
                 self._diagnosed = found
                 self._publish_diagnosis(found, now_ns)
                 self.get_logger().info(f'diagnosis: {statuses[-1].message}')
+            if self._diagnosing.ahead != self._ahead:  # also why it could not be foretold
+                self._ahead = self._diagnosing.ahead
+                self.get_logger().info(self._ahead)
         message = DiagnosticArray(status=[self._labelled(each) for each in statuses])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)

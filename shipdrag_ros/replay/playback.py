@@ -8,7 +8,7 @@ Also one window of it, given by hand, through the same estimator.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
 from numbers import Real
 from typing import NamedTuple
@@ -38,8 +38,7 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
 from shipdrag_ros.samples import SECOND_NS, Block, concatenate
-from shipdrag_ros.ship import RunSheet, Ship, run_sheet
-from shipdrag_ros.ship.facts import overriding
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import checked
 
 SHIP_FILE = 'ship.yaml'
@@ -380,31 +379,6 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     if SHIP_FILE not in run.attachments:
         raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
     return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
-
-
-def in_run(run: Run, given: Ship | None) -> Ship | None:
-    """
-    Return the ship as she was in a run: as a `run.yaml` beside it says, which is noted.
-
-    What is given, where none lies there or it says nothing else of her.
-
-    Raises
-    ------
-    BagError
-        If no ship is given, and none is attached.
-    ShipFileError
-        If `run.yaml` cannot be used, or what it says does not fit the ship.
-    """
-    path = run_sheet.find(run.paths)
-    if path is None:
-        return given
-    ship, sheet = ship_of(run, given), RunSheet.load(path)
-    was = sheet.of(ship, subject=str(path))
-    was = replace(was, facts=overriding(ship.facts, sheet.facts))
-    if was == ship:
-        return given
-    run.note([f'{path} holds for this run'])
-    return was
 
 
 def recorded_parameters(run: Run) -> Parameters:

@@ -13,7 +13,6 @@ from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, sect
 from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.model import Ship, inconsistencies
 
-NAME = 'run.yaml'
 _FRESH, _SEA = 999.0, 1026.0  # kg/m^3 at 15 degrees
 
 
@@ -46,6 +45,11 @@ class RunSheet:
         number(1e-4, 1e6, 'm^3'), 'displaced volume', default=None
     )
     water: RunWater | None = declare(section(RunWater), 'the water', default=None)
+
+    @property
+    def temperature_c(self) -> float | None:
+        """Temperature of the water [degC]; None where it is not stated."""
+        return None if self.water is None else self.water.temperature_c
 
     @classmethod
     def load(cls, path: Path) -> RunSheet:
@@ -139,39 +143,3 @@ def kinematic_viscosity(temperature_c: float, density_kg_m3: float) -> float:
     fresh = (0.000585 * (temperature_c - 12.0) - 0.03361) * (temperature_c - 12.0) + 1.2350
     sea = (0.000659 * (temperature_c - 1.0) - 0.05076) * (temperature_c - 1.0) + 1.7688
     return 1e-6 * float(np.interp(density_kg_m3, (_FRESH, _SEA), (fresh, sea)))
-
-
-def find(paths: tuple[Path, ...]) -> Path | None:
-    """
-    Find the file that belongs to a recording.
-
-    Parameters
-    ----------
-    paths
-        Files of one recording.
-
-    Returns
-    -------
-    Path or None
-        `run.yaml` in or beside the folder of a bag, or beside the only bag of a
-        folder; `BAG.run.yaml`, with or without the ending of the bag.
-
-    Raises
-    ------
-    ShipFileError
-        If there is more than one.
-    """
-    first, folder = paths[0], paths[0].parent
-    if not first.is_file():  # a frame lies in no folder
-        return None
-    places = [first.with_name(f'{first.name}.{NAME}'), first.with_name(f'{first.stem}.{NAME}')]
-    if (folder / 'metadata.yaml').exists():
-        places += [folder / NAME, folder.parent / f'{folder.name}.{NAME}']
-        if sum(1 for _ in folder.parent.glob('*/metadata.yaml')) == 1:
-            places.append(folder.parent / NAME)
-    elif set(folder.glob('*.mcap')) <= set(paths):
-        places.append(folder / NAME)
-    found = [place for place in dict.fromkeys(places) if place.is_file()]
-    if len(found) > 1:
-        raise ShipFileError(str(first), [f'two run files, {found[0]} and {found[1]}: keep one'])
-    return found[0] if found else None

@@ -285,7 +285,12 @@ class LogRun(Run):
         name = ', '.join(map(str, sources))
         part = LogPart(log, Path(name))
         super().__init__(BagFiles(name, tuple(sources)), [part], remap=remap)  # type: ignore[list-item]
-        self._sources = tuple(sources)
+        folders = [each.parent if each.name == 'metadata.yaml' else each for each in sources]
+        self._sources = tuple(
+            file
+            for each, folder in zip(sources, folders, strict=True)
+            for file in sorted(folder.glob('*.db3*')) or [each]
+        )
         self._log = log
 
     @property

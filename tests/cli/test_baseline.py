@@ -56,11 +56,13 @@ def test_a_ship_without_a_baseline_gets_a_table(bags, ship_file, tmp_path, capsy
     assert isinstance(Ship.load(out).baseline, TableBaseline)
 
 
-def test_refuses_to_write_over_the_ship_file(bags, ship_file, tmp_path, capsys):
-    same = tmp_path / 'ship.yaml'
-    same.write_text(ship_file.read_text())
-    assert main(['baseline', *bags, '--ship', str(same), '-o', str(same)]) == 1
-    assert 'write to another file' in capsys.readouterr().err
+def test_an_existing_file_is_not_overwritten(ship_file, tmp_path, capsys):
+    earlier = tmp_path / 'learnt.yaml'
+    earlier.write_text('of last year')
+    with pytest.raises(SystemExit) as ended:
+        main(['baseline', 'any.mcap', '--ship', str(ship_file), '-o', str(earlier)])
+    assert (ended.value.code, earlier.read_text()) == (2, 'of last year')
+    assert 'exists; choose another name or remove it' in capsys.readouterr().err
 
 
 def test_a_record_without_a_coastdown_is_refused(steady_bag, ship_file, tmp_path, capsys):

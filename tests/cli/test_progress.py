@@ -54,6 +54,11 @@ def test_the_first_word_comes_at_once_and_the_others_wait(monkeypatch: pytest.Mo
         lines.show('fitting', done, 8)
         clock[0] += 1.0
     assert said == ['reading', 'fitting: 3 of 8, 5 s left', 'fitting: 6 of 8, 2 s left']
+    clock[0] += 5.0
+    for done in (1, 3):  # how long the first took is not known
+        lines.show('diagnosing', done, 4)
+        clock[0] += 6.0
+    assert said[3:] == ['diagnosing: 1 of 4', 'diagnosing: 3 of 4, 3 s left']
 
 
 @compiled

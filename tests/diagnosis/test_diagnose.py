@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis.diagnose import compare, observed
 from shipdrag_ros.diagnosis.known import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
-from shipdrag_ros.errors import DiagnosisError, SimulationError
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import NONE, Verdict
@@ -64,7 +64,8 @@ def test_a_speed_that_no_resistance_is_known_for_asks_for_its_unit() -> None:
     assert '--map speed_through_water=COLUMN:kn' in said
     assert '15.50' not in said
     assert not found.candidates
-    with pytest.raises(SimulationError, match='the baseline is stated for'):
+    todo = r'log: the speed before .* knots\); state a `baseline` that holds this speed'
+    with pytest.raises(DiagnosisError, match=todo):
         diagnose([CoastRun('log', log_alone)], SHIP, PARAMETERS, facts=[Fact('units_checked')])
 
 

@@ -37,3 +37,12 @@ def test_the_estimate_is_of_the_ship_as_she_was_as_that_of_a_replay(bag: Path, t
     (found,) = _found(Notes(), [(run, None)], None, silent, None).estimates
     (replayed,) = sd.estimate(sd.read(own)).coastdowns
     np.testing.assert_array_equal(found.curve.resistance_m_s2, replayed.curve.resistance_m_s2)
+
+
+def test_the_ship_is_that_of_the_first_run_that_has_one(bag: Path, tmp_path: Path):
+    other = Path(shutil.copy(bag, tmp_path / 'other.mcap'))
+    (bare,), (own,) = sd.read(other).runs, sd.read(bag).runs
+    bare.attachments = {}  # as a log has none
+    found = _found(Notes(), [(bare, None), (own, None)], None, silent, None)
+    assert found.ship == ship_of(own, None)
+    assert len(found.coasts) == 2

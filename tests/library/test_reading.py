@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import gc
+import struct
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,22 @@ def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:
     assert speeds(saved).tolist() == speeds(record).tolist()
     with pytest.raises(sd.ShipdragError, match='exists; choose another name'):
         record.save(tmp_path / 'saved.mcap')
+
+
+@pytest.mark.parametrize('packed', ['file', 'message'])
+def test_what_rosbag2_has_packed_is_saved_unpacked(tmp_path: Path, packed: str) -> None:
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode[packed.upper()], CompressionFormat.ZSTD)
+    kind, store = 'geometry_msgs/msg/TwistStamped', get_typestore(Stores.ROS2_JAZZY)
+    with writer:
+        topic = writer.add_connection('/speed_through_water', kind, typestore=store)
+        reading = struct.pack('<4xiI4sx3x6d', 10**9, 0, b'\1', 5.0, *[0.0] * 5)
+        writer.write(topic, 10**18, b'\0\1' + reading[2:])
+    saved = sd.read(tmp_path / 'bag').save(tmp_path / 'saved.mcap')
+    assert speeds(sd.read(saved)).tolist() == [5.0]
 
 
 def test_what_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:

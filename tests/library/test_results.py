@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -231,3 +232,16 @@ def test_a_trend_says_what_it_is_of() -> None:
         sd.trends([], events={'North': [('2026-03-01', 'painting')]})
     with pytest.raises(sd.ShipdragError, match='own events'):
         sd.trends('store', events={})
+
+
+def test_a_simulation_takes_the_path_of_a_ship_a_date_and_the_name_of_a_sensor(tmp_path: Path):
+    ship = tmp_path / 'ship.yaml'
+    ship.write_text(sd.Ship.example().to_yaml())
+    short = {'duration_s': 10.0, 'lead_in_s': 10.0, 'inputs': 'speed_through_water'}
+    record = sd.simulate(ship, start=datetime(2026, 3, 1, tzinfo=UTC), **short)
+    assert record.ship == sd.Ship.load(ship)
+    assert {topic.topic for topic in record.runs[0].topics} == {'/speed_through_water'}
+    same = sd.simulate(str(ship), start='2026-03-01', **short)
+    assert record.runs[0].span_ns == same.runs[0].span_ns
+    with pytest.raises(sd.ShipdragError, match='no ship is given'):
+        sd.simulate(None)

@@ -138,6 +138,7 @@ def test_node_names_what_is_missing_as_the_verb_does(start_node, peer, diagnosti
     assert status.level == b'\x01'
     assert values(status)['verdict'] == 'named'
     assert 'diagnosis: Missing in the model: current' in node.log
+    assert values(status)[AHEAD] in node.log
     # the document of the verb to the last digit, on the topic and in the bag
     expected = json.loads(json_text(document(found, result.ship)))
     answer = json.loads(told.data)

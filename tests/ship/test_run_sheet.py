@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.ship import Fact, RunSheet, Ship
-from shipdrag_ros.ship.run_sheet import find, kinematic_viscosity
+from shipdrag_ros.ship.run_sheet import kinematic_viscosity
 
 SHIP = Ship(length_m=80.0, displaced_volume_m3=4000.0, breadth_m=13.0, draught_m=5.5)
 SHEET = """
@@ -61,41 +60,3 @@ def test_a_wrong_run_file_says_what_is_wrong(text: str, wrong: str) -> None:
 def test_a_volume_that_cannot_be_hers_is_refused() -> None:
     with pytest.raises(ShipFileError, match=r'run\.yaml'):
         RunSheet(displaced_volume_m3=40.0).of(SHIP, subject='run.yaml')
-
-
-def touched(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.touch()
-    return path
-
-
-@pytest.mark.parametrize('name', ['a.mcap.run.yaml', 'a.run.yaml'])
-def test_the_run_file_of_a_bag_has_its_name(name: str, tmp_path: Path) -> None:
-    bag, _ = touched(tmp_path / 'a.mcap'), touched(tmp_path / 'b.mcap')
-    assert find((bag,)) is None
-    touched(tmp_path / 'run.yaml')  # of which of the two it is, nobody knows
-    assert find((bag,)) is None
-    sheet = touched(tmp_path / name)
-    assert find((bag,)) == sheet
-
-
-@pytest.mark.parametrize('name', ['run.yaml', 'bag/run.yaml', 'bag.run.yaml'])
-def test_the_run_file_of_a_folder_is_in_it_or_beside_it(name: str, tmp_path: Path) -> None:
-    bag = touched(tmp_path / 'bag' / 'bag_0.mcap')
-    touched(tmp_path / 'bag' / 'metadata.yaml')
-    sheet = touched(tmp_path / name)
-    assert find((bag,)) == sheet
-
-
-def test_two_run_files_are_one_too_many(tmp_path: Path) -> None:
-    bag = touched(tmp_path / 'a.mcap')
-    touched(tmp_path / 'run.yaml')
-    touched(tmp_path / 'a.run.yaml')
-    with pytest.raises(ShipFileError, match='two run files'):
-        find((bag,))
-
-
-def test_a_frame_has_no_run_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    touched(tmp_path / 'run.yaml')  # of whatever lies where the script was started
-    monkeypatch.chdir(tmp_path)
-    assert find((Path('frame'),)) is None

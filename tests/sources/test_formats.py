@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 
 from shipdrag_ros.bags.mcap_file import is_bag
 from shipdrag_ros.cli import main
@@ -379,6 +380,28 @@ def test_what_a_killed_recorder_left_in_the_log_of_sqlite3_is_read(files, tmp_pa
         left = [shutil.copy(f'{path}{end}', bag) for end in ('', '-wal')]
     assert len(block_of(Path(left[0]))) == 2 * len(block_of(files['sqlite3']))
     assert sorted(map(str, bag.iterdir())) == left
+
+
+@pytest.mark.parametrize('packed', ['file', 'message'])
+def test_what_rosbag2_packs_in_sqlite3_is_read(files, tmp_path, packed: str):
+    plain = tmp_path / 'bag' / 'bag.db3'
+    plain.parent.mkdir()
+    shutil.copy(files['sqlite3'], plain)
+    (plain.parent / 'metadata.yaml').write_text('rosbag2_bagfile_information: {}')
+    pack = zstandard.ZstdCompressor().compress
+    if packed == 'file':
+        plain.with_name('bag.db3.zstd').write_bytes(pack(plain.read_bytes()))
+        plain.unlink()
+    else:
+        with closing(sqlite3.connect(plain)) as database:
+            database.create_function('pack', 1, pack)
+            database.execute('update messages set data = pack(data)')
+            database.commit()
+    whole = block_of(files['sqlite3'])
+    for source in (plain.parent, plain.with_name('metadata.yaml')):
+        np.testing.assert_array_equal(block_of(source).value, whole.value)
+    (run,) = read_any([plain.parent])
+    assert run.paths == tuple(plain.parent.glob('bag.db3*'))
 
 
 def test_a_heading_without_end_costs_no_other_value_of_a_log_of_ardupilot(files, tmp_path):

@@ -13,7 +13,7 @@ import bz2
 import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,9 +21,13 @@ from typing import ClassVar
 from urllib.parse import quote
 
 import lz4.frame
+import zstandard
 from rosbags.rosbag1 import Reader
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.bags.mcap_file import unpacked_file
+from shipdrag_ros.bags.records import DamageKind, DamageList
+from shipdrag_ros.bags.run import unpacked_message
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
@@ -40,6 +44,7 @@ from shipdrag_ros.sources.log import (
 )
 from shipdrag_ros.sources.opened import beginning
 
+METADATA = 'metadata.yaml'
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20
 _MESSAGE_BYTES = 16 << 20
@@ -80,9 +85,10 @@ class CopyResult(ImportResult):
 
 
 def _score(head: Head) -> float:
-    if head.path.is_dir():
-        return CERTAIN if any(head.path.glob('*.db3')) else NO
-    return CERTAIN if head.raw.startswith((_ROS1, _SQLITE)) else NO
+    if head.path.is_dir() or head.path.name == METADATA:
+        return CERTAIN if _sqlite_files(head.path) else NO
+    packed = head.path.name.endswith('.db3.zstd')
+    return CERTAIN if packed or head.raw.startswith((_ROS1, _SQLITE)) else NO
 
 
 def _open(job: Job, log: Log) -> CopyResult:
@@ -176,17 +182,23 @@ def _bounded(decompress: Callable[[bytes], bytes]) -> Callable[[bytes], bytes]:
 
 def _sqlite(path: Path, tally: Tally) -> Iterator[EncodedMessage]:
     """Yield the messages of the files of a bag of rosbag2."""
-    if path.is_dir():
-        if any(path.glob('*.db3.zstd')):
-            tally.notes.append('Files packed with zstd are left out; unpack them with `unzstd`.')
-        files = sorted(path.glob('*.db3'), key=lambda file: (len(file.name), file.name))
-    else:
-        files = [path]
-    for file in files:
+    for file in _sqlite_files(path):
+        damages = DamageList()
         try:
-            yield from _one_sqlite(file, tally)
+            with unpacked_file(file, damages) or nullcontext() as unpacked:
+                yield from _one_sqlite(Path(unpacked.name) if unpacked else file, tally)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            tally.notes.append(f'{file.name} could not be read to its end: {error}.')
+            damages.add(0, 'file', DamageKind.CONTENT, str(error))
+        for damage in damages.listed[:1]:
+            tally.notes.append(f'{file.name} could not be read to its end: {damage.detail}.')
+
+
+def _sqlite_files(path: Path) -> list[Path]:
+    """Return the files of a bag of rosbag2, each once where it is there packed too."""
+    folder = path.parent if path.name == METADATA else path
+    found = [*folder.glob('*.db3.zstd'), *folder.glob('*.db3')] if folder.is_dir() else [path]
+    once = {file.name.removesuffix('.zstd'): file for file in found}
+    return [once[name] for name in sorted(once, key=lambda name: (len(name), name))]
 
 
 def _one_sqlite(file: Path, tally: Tally) -> Iterator[EncodedMessage]:
@@ -221,6 +233,8 @@ def _one_sqlite(file: Path, tally: Tally) -> Iterator[EncodedMessage]:
             elif not 0 < time_ns < LIMIT_NS:
                 tally.reject(topic, 'no possible date', str(time_ns))
             else:
+                if payload.startswith(zstandard.FRAME_HEADER):  # no CDR begins so
+                    payload = unpacked_message(payload)
                 yield EncodedMessage(topic, kind, payload, time_ns, time_ns)
 
 
