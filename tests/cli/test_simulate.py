@@ -182,20 +182,11 @@ def test_the_json_says_what_was_made(ship_file: Path, tmp_path, capsys) -> None:
     assert said['end_ns'] - said['start_ns'] == 80_000_000_000
 
 
-@pytest.mark.parametrize(
-    ('arguments', 'said'),
-    [
-        (('--effect', 'barnacles=1'), "ERROR: effect 'barnacles' is not known; known are added_"),
-        (('--effect', 'current=1,up=2'), "ERROR: effect 'current=1,up=2': parameter 'up' is not"),
-        (
-            ('--effect', 'current=9'),
-            'ERROR: effects: current: along_track_m_s is 9.0, expected -5',
-        ),
-    ],
-)
-def test_a_user_error_is_told_and_leaves_no_bag(ship_file, tmp_path, capsys, arguments, said):
+def test_a_user_error_is_told_and_leaves_no_bag(ship_file, tmp_path, capsys) -> None:
     path = tmp_path / 'a.mcap'
-    assert main(['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT, *arguments]) == 1
+    line = ['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT]
+    assert main([*line, '--effect', 'current=1,up=2']) == 1
+    said = "ERROR: effect 'current=1,up=2': parameter 'up' is not"
     assert capsys.readouterr().err.startswith(said)
     assert not path.exists()
 

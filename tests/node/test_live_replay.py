@@ -94,11 +94,10 @@ def test_from_the_beginning(desk: ReplayedDesk) -> None:
     assert len(figures) > 50
 
 
-@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, APART_S - 100.0])
-def test_a_recording_that_starts_mid_run(desk: ReplayedDesk, start_s: float) -> None:
-    desk.feed(0, start_s)
+def test_a_recording_that_starts_in_steady_sailing(desk: ReplayedDesk) -> None:
+    desk.feed(0, LEAD_IN_S - 50.0)
     desk.recorder.start()
-    desk.feed(start_s, 1e9)
+    desk.feed(LEAD_IN_S - 50.0, 1e9)
     (result,) = desk.replay()
     assert_identical(result, at_least=20)
 
