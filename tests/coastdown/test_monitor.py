@@ -467,7 +467,7 @@ def test_a_shaft_sensor_that_dies_makes_no_coastdown(ship, record, sensors, stop
         duration_s=1600.0,
         orders=orders,
     )
-    monitor = Monitor(ship, Parameters())
+    monitor = Monitor(ship, Parameters(update_s=600.0))
     early = block.stamp_ns < block.stamp_ns[0] + 1_800_000_000_000
     events = monitor.update(block[early])
     assert 'not used: check the sensor' in monitor.doubts()['shaft']
