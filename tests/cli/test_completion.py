@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -64,3 +65,18 @@ def test_to_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['completion', 'zsh', '-o', str(out)]) == 0
     assert 'completes shipdrag in zsh' in capsys.readouterr().out
     assert out.read_text().startswith('#compdef shipdrag')
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)  # before a word is written: a pipe would hold all of it
+    done = subprocess.run(
+        [*PROGRAM, 'completion', 'zsh'],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        timeout=LIMIT_S,
+        check=False,
+    )
+    os.close(writer)
+    assert done.stderr == b''
+    assert done.returncode == 141
