@@ -182,11 +182,17 @@ def test_the_json_says_what_was_made(ship_file: Path, tmp_path, capsys) -> None:
     assert said['end_ns'] - said['start_ns'] == 80_000_000_000
 
 
-def test_a_user_error_is_told_and_leaves_no_bag(ship_file, tmp_path, capsys) -> None:
+@pytest.mark.parametrize(
+    ('effect', 'said'),
+    [
+        ('barnacles=1', "ERROR: effect 'barnacles' is not known; known are added_"),
+        ('current=1,up=2', "ERROR: effect 'current=1,up=2': parameter 'up' is not"),
+    ],
+)
+def test_a_user_error_is_told_and_leaves_no_bag(ship_file, tmp_path, capsys, effect, said):
     path = tmp_path / 'a.mcap'
     line = ['simulate', '--ship', str(ship_file), '-o', str(path), *SHORT]
-    assert main([*line, '--effect', 'current=1,up=2']) == 1
-    said = "ERROR: effect 'current=1,up=2': parameter 'up' is not"
+    assert main([*line, '--effect', effect]) == 1
     assert capsys.readouterr().err.startswith(said)
     assert not path.exists()
 
