@@ -84,8 +84,9 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
 
 def test_a_window_and_a_ship_file_beside_the_bags_of_a_store_count(fleet, tmp_path, capsys):
     store = bare(fleet, tmp_path, 'Vitus Bering')
-    assert main(['learn', f'{store}@0:200', '-o', str(tmp_path / 'a.yaml')]) == 1
-    assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err  # else: give --ship
+    for given in (store, fleet / 'bags' / 'run.mcap'):
+        assert main(['learn', f'{given}@0:200', '-o', str(tmp_path / 'a.yaml')]) == 1
+        assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err  # else: give --ship
 
 
 def test_a_store_of_two_ships_names_them(fleet: Path, tmp_path, capsys) -> None:
