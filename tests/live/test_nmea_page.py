@@ -140,8 +140,8 @@ def test_what_instruments_say_by_nmea_is_what_a_mate_reads(start, view, talker, 
     assert 'stale' in viewer.page.get_attribute('#figure-speed', 'class')
     # no topic of the node itself is offered, and the last figures are not those of now
     assert '/coastdown_node/nmea' not in viewer.text('#action')
-    assert viewer.text('#trace-say').startswith('Last: ')
-    assert viewer.text('#shaft-say').startswith('Last: 60 rpm')
+    viewer.wait_for('#trace-say', 'Last: ', within_s=LATEST_S)
+    viewer.wait_for('#shaft-say', 'Last: 60 rpm', within_s=LATEST_S)
     assert 'over ground' in viewer.text('#note-speed')
     viewer.wait_for('#checks', 'no reading now')
     for name in ('Wind', 'Depth', 'Rudder', 'Course'):
