@@ -49,11 +49,6 @@ def _samples(change: Callable[[Block], Block], *, ship: bool = True) -> Callable
     return lambda folder: write(folder / 'bag.mcap', change(steady()), ship=ship)
 
 
-def _two_namespaces(folder: Path) -> Path:
-    messages = [*encode(steady(), namespace='/port'), *encode(steady(), namespace='/starboard')]
-    return write_messages(folder / 'bag.mcap', sorted(messages, key=lambda m: m.log_ns))
-
-
 def _in_protobuf(folder: Path) -> Path:
     path = folder / 'bag.mcap'
     with path.open('wb') as file:
@@ -73,10 +68,6 @@ def _bad_ship(folder: Path) -> Path:
         bag.attach('ship.yaml', 'length_m: 150.0\n')
         bag.write_samples(steady())
     return path
-
-
-def _other_topic(_: int, message: EncodedMessage) -> EncodedMessage:
-    return message._replace(topic=f'/log{message.topic}_raw')
 
 
 def _log_of_another_type(_: int, message: EncodedMessage) -> EncodedMessage:
@@ -148,23 +139,10 @@ CASES = (
         "'bag.mcap' holds no message: nothing was recorded; give another bag",
     ),
     _case(
-        'none of the topics is an input',
-        _messages(_other_topic),
-        'holds none of the inputs speed_through_water',
-        '/log/speed_through_water_raw',
-        '--remap FROM:=TO',
-    ),
-    _case(
         'another type on the topic of an input',
         _messages(_log_of_another_type),
         'Warning: speed_through_water: 302 of 302 messages not used; 302 type',
         status=0,
-    ),
-    _case(
-        'the same input in two namespaces',
-        _two_namespaces,
-        'found under 2 topics, /port/speed_through_water, /starboard/speed_through_water',
-        'choose one with --remap',
     ),
     _case(
         'no ship file attached',

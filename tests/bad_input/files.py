@@ -63,12 +63,6 @@ SHIPS = (
         'length_m',
     ),
     _ship(
-        'a length in feet',
-        _changed('length_m: 150.0', 'length_m: 492.0'),
-        'length_m: 492.0 beside displaced_volume_m3: 20200.0',
-        'is the length in metres',
-    ),
-    _ship(
         'tonnes, under a key of their own',
         'length_m: 150.0\ndisplacement_t: 20705.0\n',
         'displacement_t: unknown key; did you mean displaced_volume_m3?',

@@ -54,11 +54,6 @@ CASES = (
         'beta: 1 different value(s), expected 3 or more',
         '3 row(s), expected 7 or more for degree 2',
     ),
-    _case(
-        'inputs that follow from each other',
-        _surface(*(f'{i},{2 * i},{i * i}' for i in range(20))),
-        'alpha, beta: inputs follow from each other',
-    ),
     _case('a header alone', _surface(), 'no row below the header'),
     _case(
         'a Froude number of 0, a negative ratio',

@@ -374,7 +374,7 @@ def test_cut_and_flipped_everywhere(write, tmp_path, block, save, damage_of):
     assert len(chunks) >= 3
     rng = random.Random(5)
     begin = chunks[0][0] - 60  # before it are long texts: of these some
-    places = [*range(120, begin, 197), *range(begin, len(content), 3)]
+    places = [*range(120, begin, 197), *range(begin, len(content), 5)]
     for number, at in enumerate(places):
         flipped = number % 2
         damaged = bytearray(content[: None if flipped else at])

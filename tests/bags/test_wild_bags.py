@@ -36,7 +36,7 @@ from shipdrag_ros.ship import Ship
 from tests.bags.conftest import as_chunk, as_record, foreign
 
 EXAMPLES = settings(
-    max_examples=120,
+    max_examples=60,
     deadline=timedelta(seconds=10),  # a hang, not a slow machine
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

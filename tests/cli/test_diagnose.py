@@ -414,16 +414,3 @@ def test_a_ship_file_of_two_values_does_not_hide_a_current(tmp_path, ship_file, 
     assert along['sd'] < 0.1
     assert found['would_decide'][0] == 'a leg on another course'
     assert 'a leg on another course' in page.read_text(encoding='utf-8')
-
-
-def test_a_log_in_knots_is_asked_about_its_unit(tmp_path, capsys) -> None:
-    rng = np.random.default_rng(1)
-    time = np.arange(3600.0)
-    speed = np.where(time // 600.0 % 3 == 0, 3.0, 6.0)
-    east = np.where(time // 600.0 % 2 == 0, speed, -speed)
-    place = np.array([np.cumsum(east), np.zeros(len(time))]).T + rng.normal(0.0, 1.0, (3600, 2))
-    log = speed / 0.5144 + rng.normal(0.0, 0.05, len(time))
-    path = bag(tmp_path / 'knots.mcap', time, speed_through_water=log, position=place)
-    assert main(['diagnose', str(path)]) == 0
-    said = capsys.readouterr().out
-    assert 'the log reads 1.94 times the way over ground, near knots over m/s' in said

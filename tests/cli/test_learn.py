@@ -19,25 +19,6 @@ from tests.runs import write_run
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 
 
-def test_one_clean_run_writes_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    bag, out, page = (tmp_path / name for name in ('run.mcap', 'new.yaml', 'page.html'))
-    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '700']
-    assert main([*line, '--duration', '900']) == 0
-    capsys.readouterr()
-    assert main(['learn', str(bag), '-o', str(out), '--report', str(page), '--json']) == 0
-    said = capsys.readouterr()
-    document = json.loads(said.out)
-    assert document['learnt'] is None
-    assert 'nothing is missing' in document['reason']
-    assert document['where'] is None
-    assert 'is not written' in said.err
-    assert document['likeliest'] in said.err
-    of = 'the resistance' if document['likeliest'].startswith('force') else 'a reading of the log'
-    assert f'{document["largest_percent"]:.0f} % of {of}.' in said.err
-    assert not out.exists()
-    assert '<h1>No effect is learnt' in page.read_text()
-
-
 @pytest.mark.parametrize('name', ['fouling', 'Kelp', '../kelp'])
 def test_a_name_that_cannot_be_is_refused_before_the_work(name: str, tmp_path, capsys) -> None:
     line = ['learn', str(tmp_path / 'none.mcap'), '-o', str(tmp_path / 'a.yaml'), '--name', name]
@@ -57,7 +38,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('fleet')
     bag = folder / 'bags' / 'run.mcap'
     bag.parent.mkdir()
-    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '400']
+    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '700']
     assert main([*line, '--duration', '900']) == 0
     store = folder / 'store'
     (store / 'coastdowns').mkdir(parents=True)
@@ -65,10 +46,26 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_bags_of_a_store_are_found_from_anywhere(fleet, tmp_path, monkeypatch, capsys):
+def test_one_clean_run_of_a_store_is_found_from_anywhere_and_writes_no_file(
+    fleet, tmp_path, monkeypatch, capsys
+) -> None:
+    out, page = tmp_path / 'new.yaml', tmp_path / 'page.html'
     monkeypatch.chdir(tmp_path)
-    assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
-    assert len(json.loads(capsys.readouterr().out)['runs']) == 1
+    assert (
+        main(['learn', str(fleet / 'store'), '-o', str(out), '--report', str(page), '--json']) == 0
+    )
+    said = capsys.readouterr()
+    document = json.loads(said.out)
+    assert len(document['runs']) == 1
+    assert document['learnt'] is None
+    assert 'nothing is missing' in document['reason']
+    assert document['where'] is None
+    assert 'is not written' in said.err
+    assert document['likeliest'] in said.err
+    of = 'the resistance' if document['likeliest'].startswith('force') else 'a reading of the log'
+    assert f'{document["largest_percent"]:.0f} % of {of}.' in said.err
+    assert not out.exists()
+    assert '<h1>No effect is learnt' in page.read_text()
 
 
 def bare(fleet: Path, folder: Path, *ships: str) -> Path:
@@ -85,22 +82,17 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
     return store.path
 
 
-def test_a_ship_file_that_lay_beside_the_bags_of_a_store_is_used(fleet, tmp_path, capsys):
+def test_a_window_and_a_ship_file_beside_the_bags_of_a_store_count(fleet, tmp_path, capsys):
     store = bare(fleet, tmp_path, 'Vitus Bering')
-    assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
-    assert len(json.loads(capsys.readouterr().out)['runs']) == 1
+    for given in (store, fleet / 'bags' / 'run.mcap'):
+        assert main(['learn', f'{given}@0:200', '-o', str(tmp_path / 'a.yaml')]) == 1
+        assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err  # else: give --ship
 
 
 def test_a_store_of_two_ships_names_them(fleet: Path, tmp_path, capsys) -> None:
     store = bare(fleet, tmp_path, 'Alder', 'Birch')
     assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
     assert "the store holds 'Alder', 'Birch'" in capsys.readouterr().err
-
-
-def test_a_window_of_a_store_counts(fleet: Path, tmp_path, capsys) -> None:
-    line = ['learn', f'{fleet / "store"}@0:200', '-o', str(tmp_path / 'a.yaml')]
-    assert main(line) == 1
-    assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err
 
 
 def test_a_bag_of_a_store_that_is_gone_is_named(fleet, tmp_path, monkeypatch, capsys):

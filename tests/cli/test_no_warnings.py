@@ -104,7 +104,6 @@ def test_odd_records(name: str, ship: Path, tmp_path: Path) -> None:
     run('diagnose', bag, '--ship', str(ship), '--window', '370', '490')
     block = block_of(RECORDS[name], slice(380, 431))
     part = str(write_run(tmp_path / 'part.mcap', block))
-    run('diagnose', part, '--ship', str(ship), '--window', '30', '50')
     parameters = tmp_path / 'parameters.yaml'
     more = ('--parameters', str(parameters), '--json', str(tmp_path / 'a.json'))
     for estimator in ESTIMATORS[:1] if name in REFUSED else (ESTIMATORS[0], NEXT[name]):

@@ -292,9 +292,9 @@ def test_a_gap_is_cut_and_a_short_one_is_not() -> None:
 # what the speed alone says
 
 
-@pytest.mark.parametrize('scale', [0.025, 1.0, 8.0])
+@pytest.mark.parametrize('scale', [0.025, 8.0])
 class TestSpeedAlone:
-    """At any scale of time: a car of 7 s, a boat, a ship of 40 min."""
+    """At any scale of time: a car of 7 s, a ship of 40 min; the rest here is of a boat."""
 
     def found(self, speed: np.ndarray, scale: float, noise: float = 0.02) -> GivenPart:
         time_s = np.linspace(0.0, LENGTH_S, 1 + round(min(LENGTH_S * scale * 100.0, 3000.0)))

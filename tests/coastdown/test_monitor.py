@@ -142,9 +142,12 @@ def test_a_clock_that_was_set_resets_and_says_so(ship, record, jumps: str) -> No
     assert rejected == ({'late': late} if late else {})
 
 
-def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, sensors) -> None:
-    block = record(sensors=(sensors['log'], sensors['compass']))
-    silent = (block.channel == LOG) & (block.stamp_ns > START_NS + 1300 * S)
+@pytest.mark.parametrize('others', [['compass'], ['radar', 'compass']])
+def test_silence_of_all_speeds_ends_a_coastdown_though_others_go_on(
+    ship, record, sensors, others
+) -> None:
+    block = record(sensors=(sensors['log'], *(sensors[each] for each in others)))
+    silent = (block.channel != Channel.HEADING) & (block.stamp_ns > START_NS + 1300 * S)
     watched = monitor(ship, data_stop_s=30.0)
     events = watched.update(block[~silent])
     (coastdown,) = of(EndedCoastdown, events)
@@ -315,16 +318,6 @@ def test_nothing_is_compiled_once_it_runs(ship, record, sensors) -> None:
     assert [len(kernel.signatures) for kernel in kernels] == compiled
 
 
-def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(ship, record, sensors):
-    everything = record(sensors=(sensors['log'], sensors['radar'], sensors['compass']))
-    silent_ns = START_NS + 1500 * S
-    heard = everything[(everything.stamp_ns < silent_ns) | (everything.channel == Channel.HEADING)]
-    watched = monitor(ship)
-    (ended,) = of(EndedCoastdown, watched.update(heard))
-    assert ended.ended_by is EndedBy.DATA_STOP
-    assert silent_ns - S <= ended.end_ns < silent_ns
-
-
 STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
 
 
@@ -390,15 +383,6 @@ def on_another_mark(block: Block, at_s: float, seed: int = 0) -> Block:
     value = block.value.copy()
     value[moved] += 150.0 * np.array([np.cos(direction), np.sin(direction)])
     return replace(block, value=value)
-
-
-def test_a_radar_that_takes_another_mark_is_no_turn(watch, record, sensors) -> None:
-    both = record(sensors=(sensors['log'], sensors['radar']))
-    start_ns = the_coastdown(watch(both)).start_ns
-    for seed, at_s in enumerate((-30.0, 60.0, 700.0)):
-        coastdown = the_coastdown(watch(on_another_mark(both, at_s, seed)))
-        assert coastdown.ended_by is EndedBy.RECORD_END, at_s
-        assert abs(coastdown.start_ns - start_ns) <= 5 * S, at_s
 
 
 def test_single_fixes_far_off_are_no_turn(watch, record, sensors) -> None:
@@ -483,7 +467,7 @@ def test_a_shaft_sensor_that_dies_makes_no_coastdown(ship, record, sensors, stop
         duration_s=1600.0,
         orders=orders,
     )
-    monitor = Monitor(ship, Parameters())
+    monitor = Monitor(ship, Parameters(update_s=600.0))
     early = block.stamp_ns < block.stamp_ns[0] + 1_800_000_000_000
     events = monitor.update(block[early])
     assert 'not used: check the sensor' in monitor.doubts()['shaft']

@@ -243,11 +243,6 @@ def test_what_is_dismissed_is_told_with_figures(watch, record, sensors) -> None:
     assert [one.reason for one in short] == [Dismissal.GAP]
 
 
-def test_a_shaft_sensor_that_reads_nothing_does_not_veto(watch, record, sensors) -> None:
-    block = record(sensors=(sensors['log'], sensors['shaft']), shaft_rad_s=0.0)
-    assert len(onsets(watch(block))) == 1
-
-
 @pytest.mark.parametrize('second', ['compass', 'radar'])
 def test_a_turn_is_no_coastdown(watch, record, sensors, second: str) -> None:
     block = record(

@@ -125,7 +125,7 @@ def test_a_glide_that_begins_later_is_not_the_one_announced(ship, record) -> Non
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
     orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.3, thrust=0.07))
     block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
-    monitor = Monitor(ship, replace(SLOW_UPDATES, update_s=20.0))
+    monitor = Monitor(ship, SLOW_UPDATES)
     updates = of(Update, [*monitor.update(block), *monitor.finish()])
     made = [each.forecast is not None for each in updates]
     assert any(made)

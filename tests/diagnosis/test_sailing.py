@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from shipdrag_ros.diagnosis import SailingRecord, diagnose_sailing
 from shipdrag_ros.diagnosis.legs import Left, Legs, StandingLog
@@ -59,8 +60,8 @@ class Sailing:
         time = np.arange(0.0, self.hours * 3600.0)
         leg = (time // 720.0).astype(int)
         courses = np.unwrap(np.radians(self.courses_deg))
-        course = follow(courses[leg % len(courses)], time, 15.0)
-        speed = follow(np.array(self.speeds_m_s)[leg % len(self.speeds_m_s)], time, 40.0)
+        course = follow(courses[leg % len(courses)], 15.0)
+        speed = follow(np.array(self.speeds_m_s)[leg % len(self.speeds_m_s)], 40.0)
         speed += wander(rng, time, 0.1, 60.0)
         yaw = course + wander(rng, time, 0.02, 8.0)
         leeway = 0.05 * np.sin(yaw - 1.0)  # pushed aside by a wind, up to 3 degrees
@@ -84,21 +85,19 @@ class Sailing:
         return in_arrival_order(blocks)
 
 
-def follow(target: Float64, time: Float64, lag_s: float) -> Float64:
+def follow(target: Float64, lag_s: float) -> Float64:
     """Return a path that comes to its target with a lag."""
-    found = np.empty(len(time))
-    found[0] = target[0]
-    for i in range(1, len(time)):
-        found[i] = found[i - 1] + (target[i] - found[i - 1]) / lag_s
+    keep = 1.0 - 1.0 / lag_s
+    found: Float64 = lfilter([1.0 - keep], [1.0, -keep], target, zi=[keep * target[0]])[0]
     return found
 
 
 def wander(rng: np.random.Generator, time: Float64, sd: float, tau_s: float) -> Float64:
     """Return a slow disturbance, Gauss-Markov of first order."""
     keep = math.exp(-1.0 / tau_s)
-    found = rng.normal(0.0, sd, len(time))
-    for i in range(1, len(time)):
-        found[i] = keep * found[i - 1] + math.sqrt(1.0 - keep**2) * found[i]
+    drawn = rng.normal(0.0, sd, len(time))
+    drawn[1:] *= math.sqrt(1.0 - keep**2)
+    found: Float64 = lfilter([1.0], [1.0, -keep], drawn)
     return found
 
 
@@ -243,7 +242,7 @@ def test_a_log_that_lags_shows_where_the_speed_changes(lag_s: float, least: floa
         block = Sailing(geodetic=True).block(seed)
         is_log = block.channel == Channel.SPEED_THROUGH_WATER
         value = block.value.copy()
-        value[is_log, 0] = follow(value[is_log, 0], value[is_log, 0], lag_s)
+        value[is_log, 0] = follow(value[is_log, 0], lag_s)
         found = diagnose_sailing(
             [SailingRecord('sailing', replace(block, value=value))], PARAMETERS
         )
