@@ -306,6 +306,17 @@ def run_of(*effects: str, heading_rad: float = 0.7, seed: int = 5) -> CoastRun:
     return coasted(*effects, heading_rad=heading_rad, reference_rad=0.7, seed=seed)
 
 
+def test_what_an_effect_makes_of_r_is_known_by_positions_alone_too() -> None:
+    of_both = [
+        diagnose([coasted(inputs=inputs, seed=5)], SHIP, Parameters(), advise=False).limits
+        for inputs in (('position', 'heading'), ('position', 'heading', 'speed_through_water'))
+    ]
+    for name in ('fouling', 'waves', 'added_mass'):
+        # of sizes that differ
+        shares = [each[name].percent_of_r / each[name].value for each in of_both]
+        assert shares[0] == pytest.approx(shares[1], rel=0.05)
+
+
 @cache
 def answer(*effects: str, ship: Ship = SHIP) -> DiagnosisResult:
     """Diagnose one run, once."""
