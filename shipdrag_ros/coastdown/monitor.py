@@ -465,7 +465,7 @@ class Monitor:
         onset = Onset(start * SECOND_NS, (number + 1) * SECOND_NS)
         heading = mean_heading(self._memory.bins, start - 1, HEADING_BEFORE_S)
         self._running = RunningCoastdown(
-            onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
+            onset, heading, dated, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
         self._silent = False
         if self._estimator is not None:
@@ -582,7 +582,9 @@ class Monitor:
         stamp_ns = int(watch.update_ns)
         watch.update_ns = self._running.due_ns(next_stamp_ns)
         gliding = self._regimes.gliding > 0.5
-        return self._running.update(stamp_ns, self._estimator, gliding=gliding)
+        last = self._regimes.glides()[-1:]
+        dated = last[0] if last and last[0].ended_by is None else None
+        return self._running.update(stamp_ns, dated, self._estimator, gliding=gliding)
 
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
         """Cut a window, with the record from `first_ns` on before it."""

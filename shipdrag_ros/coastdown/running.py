@@ -44,6 +44,8 @@ class RunningCoastdown:
         When it began.
     heading
         Mean of the heading before it, as sent [rad]; NaN where none is known.
+    dated
+        As the histories have it then.
     cut
         Cuts a window from what is kept.
     ship, parameters
@@ -54,6 +56,7 @@ class RunningCoastdown:
         self,
         onset: Onset,
         heading: float,
+        dated: Dated,
         *,
         cut: CutWindow,
         ship: Ship,
@@ -63,6 +66,7 @@ class RunningCoastdown:
         self._heading_rad = (
             None if math.isnan(heading) else rep103_yaw(heading, parameters.heading_convention)
         )
+        self._dated = dated
         self._cut = cut
         self._ship = ship
         self._parameters = parameters
@@ -75,12 +79,21 @@ class RunningCoastdown:
         start, step = self.onset.start_ns, round(self._parameters.update_s * SECOND_NS)
         return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
 
-    def update(self, stamp_ns: int, estimator: WindowEstimator, *, gliding: bool = True) -> Event:
+    def update(
+        self,
+        stamp_ns: int,
+        dated: Dated | None,
+        estimator: WindowEstimator,
+        *,
+        gliding: bool = True,
+    ) -> Event:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
 
-        Nothing is foretold of a ship that is more probably not `gliding` any more.
+        It begins as the histories have it by then, `dated`; None: as they had it last. Nothing is
+        foretold of a ship that is more probably not `gliding` any more.
         """
+        self._dated = dated or self._dated
         window = self._window(stamp_ns)
         try:
             found = estimator(window, self._ship, self._parameters)
@@ -122,8 +135,7 @@ class RunningCoastdown:
         """
         stop_ns, cuts = round(dated.stop_s * SECOND_NS), dated.cuts
         start_ns, end_ns = round(dated.start_s * SECOND_NS), round(dated.end_s * SECOND_NS)
-        before_ns = 0 if cuts else round(self._parameters.steady_s * SECOND_NS)
-        window = self._cut(start_ns, end_ns, start_ns - before_ns)
+        window = self._cut(start_ns, end_ns, start_ns - _steady_ns(dated, self._parameters))
         estimate, failure = None, None
         try:
             estimate = estimator(window, self._ship, self._parameters)
@@ -175,11 +187,15 @@ class RunningCoastdown:
 
     def _window(self, end_ns: int) -> Window:
         """Cut the coastdown so far, with the record before it where all of it is there."""
-        window_ns = round(self._parameters.window_s * SECOND_NS)
-        start_ns = max(self.onset.start_ns, end_ns - window_ns)
-        before_ns = round(self._parameters.steady_s * SECOND_NS)
-        first_ns = start_ns - before_ns if start_ns == self.onset.start_ns else start_ns
-        return self._cut(start_ns, end_ns, first_ns)
+        begin_ns = min(round(self._dated.start_s * SECOND_NS), end_ns)
+        start_ns = max(begin_ns, end_ns - round(self._parameters.window_s * SECOND_NS))
+        before_ns = _steady_ns(self._dated, self._parameters) if start_ns == begin_ns else 0
+        return self._cut(start_ns, end_ns, start_ns - before_ns)
+
+
+def _steady_ns(dated: Dated, parameters: Parameters) -> int:
+    """Return how much before a glide may be steady sailing: nothing, where she was not driven."""
+    return 0 if dated.cuts else round(parameters.steady_s * SECOND_NS)
 
 
 def _rest_of_the_glide(

@@ -243,6 +243,13 @@ def _besides(case: DiagnosedRuns, named: Collection[str], *, stated: bool) -> It
     ruled_out = [each for each in effects_of(case.seen[0].ship).values() if not each.in_geodetic]
     if ruled_out and _geodetic(case.seen):
         yield of_the_earth(ruled_out)
+    unseen: dict[tuple[str, ...], list[str]] = {}
+    for effect in effects_of(case.ship).values():
+        unseen.setdefault(effect.missing(case.ship), []).append(names_text([effect.name]))
+    for keys, effects in unseen.items():
+        if keys:
+            wanted = ' and '.join(f'`{key}`' for key in keys)
+            yield f'not examined without {wanted} in the ship file: {", ".join(effects)}'
     if not stated:
         yield (
             'the ship file has no baseline: the runs are compared with all hulls of her length '

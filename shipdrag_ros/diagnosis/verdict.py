@@ -43,7 +43,7 @@ from shipdrag_ros.inference.decision import (
     quantile,
 )
 from shipdrag_ros.inference.linear import solve_scaled
-from shipdrag_ros.inference.rows import LOG, POSITION
+from shipdrag_ros.inference.rows import KIND_COUNT, LOG, POSITION
 from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.compare import (
@@ -404,7 +404,9 @@ def percent_of_r(comparing: Comparing, name: str, bound: float) -> float:
     time, lines = rows.time_s[late], shown[:, late]
     if len(time) < _FEWEST or not np.isfinite(lines).all():
         return math.nan
-    loss = np.gradient(lines, time, axis=1)
+    if rows.kind[late][0] % KIND_COUNT == POSITION:
+        lines = np.gradient(lines, time, axis=1, edge_order=2)
+    loss = np.gradient(lines, time, axis=1, edge_order=2)
     apart = np.interp(-lines[0], -lines[1], loss[1]) / np.minimum(loss[0], -1e-9) - 1.0
     inside = (lines[0] >= lines[1].min()) & (lines[0] <= lines[1].max())
     return 100.0 * float(np.sqrt(np.mean(apart[inside] ** 2))) if inside.any() else math.nan

@@ -318,6 +318,13 @@ class Comparing:
         start[: self.runs.size] = self.runs.start
         self.nothing = Fitted(self.base, start)
         self._climb([self.nothing])
+        # where a shaft stops is a step in its readings: no climb leads there from afar
+        starts = self.runs.stopping_elsewhere(self.nothing.at)
+        tables = self.runs.linearise([self.base] * len(starts), starts) if len(starts) else []
+        costs = [self._step(self.nothing, *each).cost for each in zip(tables, starts, strict=True)]
+        if costs and min(costs) < self.nothing.cost:
+            self.nothing = Fitted(self.base, starts[int(np.argmin(costs))])
+            self._climb([self.nothing])
         return self.nothing
 
     def equations(self, fit: Fitted) -> list[Float64]:

@@ -38,6 +38,7 @@ SPLINES = {'': 0, IN_SPEED: 0, IN_TIME: 6, IN_LOG: 6, IN_GROUND: 6}
 SPLINES |= {QUICK_IN_TIME: 18, QUICK_IN_LOG: 18}
 """Of something smooth, over a run: a force may change quickly."""
 _STEP_Z = 0.02  # of differences
+_STALLS = np.linspace(-1.5, 2.25, 26)  # tried for `_STALL`: a tenth of the speed apart
 _OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
 # behind the extras: place to port, first heading, shaft speed of a propeller that the water
 # turns, where friction stops it, scatter of the resistance from run to run, light air to the
@@ -322,9 +323,19 @@ class ShipRuns:
         found, _ = self._base(priors.NOTHING, 0)
         k = self.coefficients
         for place in self.places:
-            kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING)]]
+            kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING, _STALL)]]
             found[kept] = at[kept]
         return found
+
+    def stopping_elsewhere(self, at: Float64) -> list[Float64]:
+        """
+        Return unknowns with the free shaft stopping at other speeds; none where none is read.
+        """
+        if not any(run.shaft for run in self.runs):
+            return []
+        elsewhere = np.tile(at, (len(_STALLS), 1))
+        elsewhere[:, self.places[0][self.coefficients + _STALL]] = _STALLS
+        return list(elsewhere)
 
     def width(self, hypothesis: Explanation) -> int:
         """Return the number of unknowns of a hypothesis."""

@@ -119,13 +119,12 @@ def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
     """
     Return when the thrust began to fall, and whether what comes before may be steady sailing.
     """
-    if coastdown.stop_ns is None:  # given, and what she did before was cut: driven, she is steady
-        cut = any(
-            each.start_ns < coastdown.start_ns and each.reason is not Dismissal.THRUST
-            for each in coastdown.cuts
-        )
-        return coastdown.start_ns, not cut
-    return coastdown.stop_ns, True
+    driven = all(  # and of a driven ship a cut leaves steady sailing
+        each.start_ns >= coastdown.start_ns or each.reason is Dismissal.THRUST
+        for each in coastdown.cuts
+    )
+    stop_ns = coastdown.start_ns if coastdown.stop_ns is None else coastdown.stop_ns
+    return (stop_ns if driven else coastdown.start_ns), driven
 
 
 def whole_window(result: ReplayResult, coastdown: EndedCoastdown) -> Window | None:

@@ -23,9 +23,10 @@ from shipdrag_ros.coastdown.events import (
     State,
     Update,
 )
+from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
-from shipdrag_ros.simulation import EngineOrder, Turn
+from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
 from tests.coastdown.conftest import bits, refuse, window_itself
 
 START_NS = 1_700_000_000_000_000_000
@@ -559,6 +560,24 @@ def test_a_brake_from_the_stop_on_is_no_coastdown(watch, record, sensors, told) 
     events = watch(record(sensors=tuple(map(sensors.get, told)), orders=(brake, let_go)))
     assert all(event.withdrawn for event in events if isinstance(event, EndedCoastdown))
     assert any(isinstance(event, NotCoastdown) for event in events)
+
+
+@pytest.mark.parametrize('thrust', [-0.4, -1.0])
+def test_of_a_brake_that_is_let_go_the_glide_after_it_is_kept(ship, record, sensors, thrust):
+    orders = (EngineOrder(0.0, shaft=0.0, thrust=thrust), EngineOrder(90.0, shaft=0.0, thrust=0.0))
+    told = (sensors['log'], Sensor(channel=Channel.POSITION, sd=10.0))
+    watched = Monitor(ship, Parameters(), estimate=window_itself, final=estimate_final)
+    events = watched.update(record(sensors=told, orders=orders)) + watched.finish()
+    assert of(Update, events)[-1].estimate.before is None  # the brake is no steady sailing
+    (coastdown,) = [each for each in ended(events) if not each.withdrawn]
+    (cut,) = coastdown.cuts
+    assert cut.reason is Dismissal.BRAKE
+    edges = [(each - START_NS) / S - 900.0 for each in (cut.start_ns, cut.end_ns)]
+    assert edges == pytest.approx([0.0, 90.0], abs=8.0)
+    found = coastdown.estimate.calm
+    true = ship.resistance_n(found.speed_m_s) / ship.mass_kg
+    assert found.resistance_m_s2 == pytest.approx(true, rel=0.02)
+    assert np.all(np.abs(found.resistance_m_s2 - true) < 2.0 * found.sigma_m_s2)
 
 
 def test_several_coastdowns_in_one_record(watch, record) -> None:

@@ -382,8 +382,8 @@ def test_probabilities_of_regimes_are_shares_of_what_was_kept() -> None:
     weight = np.array([0.1, 0.2, 0.3, 0.35])  # 0.05 was dropped
     zero, over, end = np.zeros(4), np.array([15.0, 30.0, 45.0, 60.0]), np.full(4, 100.0)
     code, same = np.full(4, GLIDE), zero > 0.0
-    glide = Spans(code, zero, zero, zero, over, weight, code, same)
-    brake = Spans(np.full(4, BRAKE), over, over, over, end, weight, code, same)
+    glide = Spans(code, code, zero, zero, zero, zero, over, weight, code, same)
+    brake = Spans(np.full(4, BRAKE), code, zero, over, over, over, end, weight, code, same)
     both = Spans._make(np.concatenate(each) for each in zip(glide, brake, strict=True))
     shares = np.array(list(smoothed(both, 20, 5.0).values()))
     assert shares.min() == 0.0
@@ -396,7 +396,7 @@ def test_regimes_that_are_long_over_took_no_speed() -> None:
     end_s = np.linspace(5.0, 105.0, 11)
     before = np.zeros(11)
     code = np.full(11, BRAKE)
-    spans = Spans(code, before, before, end_s, end_s, weight, code, before > 0.0)
+    spans = Spans(code, code, before, before, before, end_s, end_s, weight, code, before > 0.0)
     assert probability_of(spans, 40, 5.0)[25:].max() > 0.0
     assert slowed_by(spans, np.linspace(5.0, 3.0, 40), 25, 5.0) is None
 
@@ -409,7 +409,9 @@ def test_a_glide_that_may_have_been_held_at_first_is_followed_whole(ship, one_gl
     begin_s = np.array([20.0, 20.0, 200.0, 20.0, 150.0, 200.0])
     end_s = np.array([600.0, 200.0, 600.0, 150.0, 200.0, 600.0])
     weight = np.array([one_glide, *[other] * 5])
-    spans = Spans(what, begin_s, begin_s, begin_s, end_s, weight, what, what == LEVEL)
+    spans = Spans(
+        what, what, 0.0 * begin_s, begin_s, begin_s, begin_s, end_s, weight, what, what == LEVEL
+    )
     assert unpowered(spans, 120, BankSetting.of(HullPrior.of(ship), BIN_S)) == found
 
 
@@ -417,9 +419,8 @@ def test_no_glide_is_told_twice(ship) -> None:
     """One that probably ended at a doubt, and after it another, or the same all along."""
     begin_s, end_s = np.array([20.0, 20.0, 310.0]), np.array([300.0, 600.0, 600.0])
     what = np.full(3, GLIDE)
-    spans = Spans(
-        what, begin_s, begin_s, begin_s, end_s, np.array([0.4, 0.32, 0.28]), what, what < 0
-    )
+    weight = np.array([0.4, 0.32, 0.28])
+    spans = Spans(what, what, begin_s, begin_s, begin_s, begin_s, end_s, weight, what, what < 0)
     setting = BankSetting.of(HullPrior.of(ship), BIN_S)
     told = read_out.glides(spans, setting, np.linspace(7.0, 3.0, 120))
     assert [(each.begin_s, each.end_s) for each in told] == [(20.0, 300.0)]

@@ -26,6 +26,7 @@ from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import CoefficientBaseline, Fact, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import LIBRARY, parse
+from shipdrag_ros.simulation.surge import turning
 from tests.runs import CARGO as SHIP
 from tests.runs import coasted
 
@@ -216,6 +217,57 @@ def test_latitude_and_longitude_are_in_the_scale_of_the_earth(cargo: Ship) -> No
         assert len(said) == (not may)
 
 
+def test_what_a_bare_ship_file_leaves_unexamined_is_said_with_what_to_state(cargo: Ship) -> None:
+    bare = replace(cargo, air=None, propeller=None, breadth_m=None, draught_m=None)
+    scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
+    block = sense(simulate(cargo, scenario), standard_sensors(), seed=2)
+    window = Window.from_block(
+        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
+    )
+    for ship, expected in (
+        (cargo, []),
+        (
+            bare,
+            [
+                '`propeller` in the ship file: locked propeller, windmilling propeller',
+                '`breadth_m` and `draught_m` in the ship file: shallow water',
+                '`air` in the ship file: wind',
+            ],
+        ),
+    ):
+        found = diagnose([CoastRun('run', window)], ship, Parameters(), advise=False)
+        start = 'not examined without '
+        said = [note.removeprefix(start) for note in found.notes if note.startswith(start)]
+        assert said == expected
+        unseen = {
+            name.replace(' ', '_') for one in said for name in one.split(': ')[1].split(', ')
+        }
+        assert set(found.limits) == set(LIBRARY) - unseen
+
+
+@pytest.mark.parametrize('stall_m_s', [1.6, 3.0, 5.0])
+def test_where_a_free_shaft_stops_makes_nothing_less_likely(cargo: Ship, stall_m_s: float) -> None:
+    scenario = Scenario(speed_m_s=8.0, lead_in_s=900.0, duration_s=1500.0)
+    truth = simulate(cargo, scenario)
+    block = sense(truth, standard_sensors(), seed=2)
+    time_s = (block.stamp_ns - START_NS) * 1e-9
+    shaft = block.channel == Channel.SHAFT
+    after = shaft & (time_s > 960.0)  # it has run down, and the water turns it
+    speed = np.interp(time_s[after], truth.time_s, truth.speed_through_water_m_s)
+    value = block.value.copy()
+    steady = np.median(value[shaft & (time_s < 900.0), 0])
+    value[after, 0] = 0.55 * steady * speed / 8.0 * turning(speed, stall_m_s)
+    window = Window.from_block(
+        replace(block, value=value),
+        START_NS + 900 * 10**9,
+        int(block.stamp_ns.max()),
+        before_ns=START_NS,
+    )
+    found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
+    assert found.verdict is Verdict.NONE
+    assert found.nothing > 0.9
+
+
 FIRST, SECOND = Channel.SPEED_THROUGH_WATER, Channel.SPEED_THROUGH_WATER_2
 
 
@@ -251,6 +303,17 @@ COAST_S = 1200
 
 def run_of(*effects: str, heading_rad: float = 0.7, seed: int = 5) -> CoastRun:
     return coasted(*effects, heading_rad=heading_rad, reference_rad=0.7, seed=seed)
+
+
+def test_what_an_effect_makes_of_r_is_known_by_positions_alone_too() -> None:
+    of_both = [
+        diagnose([coasted(inputs=inputs, seed=5)], SHIP, Parameters(), advise=False).limits
+        for inputs in (('position', 'heading'), ('position', 'heading', 'speed_through_water'))
+    ]
+    for name in ('fouling', 'waves', 'added_mass'):
+        # of sizes that differ
+        shares = [each[name].percent_of_r / each[name].value for each in of_both]
+        assert shares[0] == pytest.approx(shares[1], rel=0.05)
 
 
 @cache

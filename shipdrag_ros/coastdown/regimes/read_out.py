@@ -33,20 +33,22 @@ class SmoothedGlide(NamedTuple):
 
     Attributes
     ----------
-    stop_s, start_s, begin_s, end_s
-        Medians of when the thrust began to fall, of the date, of when the thrust was gone, and of
-        the end [s of the bank].
+    before_s, stop_s, start_s, begin_s, end_s
+        Medians of when the regime before it began, of when the thrust began to fall, of the
+        date, of when the thrust was gone, and of the end [s of the bank].
     begin_sd_s
         Standard deviation of `begin_s`.
-    after
-        Regime that follows; -1 where none does.
+    before, after
+        Regime that it follows, and that follows it; -1 where none does.
     """
 
+    before_s: float
     stop_s: float
     start_s: float
     begin_s: float
     end_s: float
     begin_sd_s: float
+    before: int
     after: int
 
 
@@ -77,11 +79,13 @@ class Spans(NamedTuple):
     Every regime of every history, (n,) each.
 
     `date_s` and `gone_s` are of a glide: when an abrupt stop would have cost as much speed, or a
-    shaft shows that the thrust is gone, and when it was gone; `after` the regime that follows, -1
-    where none does; `again` whether she has glided before.
+    shaft shows that the thrust is gone, and when it was gone; `before` and `after` the regimes
+    beside it, -1 where none is; `again` whether she has glided before.
     """
 
     what: Int64
+    before: Int64
+    before_s: Float64
     begin_s: Float64
     date_s: Float64
     gone_s: Float64
@@ -124,7 +128,9 @@ def spans_of(bank: Bank, setting: BankSetting) -> Spans:
     again = np.cumsum(is_glide, axis=1) - is_glide > 0
     weight = np.broadcast_to(np.exp(all_.row['weight'][:used, np.newaxis]), what.shape)
     there = (place <= count) & (end > at)
-    return Spans(what, at, date, gone, end, weight, after, again).part(there)
+    before = np.where(place == 0, -1, np.roll(what, 1, axis=1))
+    before_s = np.roll(at, 1, axis=1)
+    return Spans(what, before, before_s, at, date, gone, end, weight, after, again).part(there)
 
 
 def probability_of(found: Spans, bins: int, step_s: float) -> Float64:
@@ -203,14 +209,19 @@ def stretches(inside: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _one(found: Spans) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
-    stop, start, begin, end = (
-        median(each, share) for each in (found.begin_s, found.date_s, found.gone_s, found.end_s)
+    before, stop, start, begin, end = (
+        median(each, share)
+        for each in (found.before_s, found.begin_s, found.date_s, found.gone_s, found.end_s)
     )
     mean = float(share @ found.gone_s)
     sd = float(np.sqrt(max(share @ found.gone_s**2 - mean**2, 0.0)))
     codes = np.arange(-1, s.AMID + 1)
-    after = int(codes[np.argmax([share[found.after == code].sum() for code in codes])])
-    return SmoothedGlide(min(stop, start), start, max(start, begin), end, sd, after)
+    beside = [
+        int(codes[np.argmax([share[each == code].sum() for code in codes])])
+        for each in (found.before, found.after)
+    ]
+    stop = min(stop, start)
+    return SmoothedGlide(min(before, stop), stop, start, max(start, begin), end, sd, *beside)
 
 
 def median(value: Float64, share: Float64) -> float:

@@ -80,55 +80,31 @@ class Dated(NamedTuple):
     stop_s, start_s, begin_s, end_s
         When the thrust began to fall, the date, when it was gone, and the end. The date is where
         a shaft shows the thrust gone, or an abrupt stop would have cost as much speed.
-    begin_sd_s
-        Standard deviation of `begin_s`.
-    ran_down
-        Whether the thrust ran down for so long, and no shaft shows how, that it is no part of
-        the glide.
     ended_by
         What followed; None where she glides on.
-    unread_s
-        From when on nothing was read until it begins; NaN where it does not follow a gap.
+    cuts
+        What just before it is no part of it: something but the water that slowed her, a long
+        run-down, a gap. The record before these teaches nothing of her steady sailing.
     """
 
     stop_s: float
     start_s: float
     begin_s: float
     end_s: float
-    begin_sd_s: float
-    ran_down: bool
     ended_by: EndedBy | None
-    unread_s: float = math.nan
+    cuts: tuple[NotCoastdown, ...] = ()
 
     def since(self, begin_s: float, unread_s: float = math.nan) -> Dated:
         """
-        Return the part of it after its begin, or after a gap.
+        Return the part of it after its begin, or after a gap in which nothing was read.
         """
-        return self._replace(
-            stop_s=begin_s,
-            start_s=begin_s,
-            begin_s=begin_s,
-            begin_sd_s=0.0,
-            ran_down=False,
-            unread_s=unread_s,
-        )
+        text = 'nothing was read in it, so what she did is not known'
+        gap = () if math.isnan(unread_s) else (_cut(unread_s, begin_s, Dismissal.GAP, text),)
+        return self._replace(stop_s=begin_s, start_s=begin_s, begin_s=begin_s, cuts=gap)
 
-    @property
-    def cuts(self) -> tuple[NotCoastdown, ...]:
-        """The gap before it, or its run-down if that was a long one."""
-        if not math.isnan(self.unread_s):
-            first_s, reason = self.unread_s, Dismissal.GAP
-            text = 'nothing was read in it, so what she did is not known'
-        elif self.ran_down:
-            first_s, reason = self.stop_s, Dismissal.THRUST
-            text = (
-                f'the thrust ran down for {self.begin_s - self.stop_s:.0f} s, and was gone at the '
-                f'end of that, ± {self.begin_sd_s:.0f} s'
-            )
-        else:
-            return ()
-        first_ns, last_ns = round(first_s * SECOND_NS), round(self.begin_s * SECOND_NS)
-        return (NotCoastdown(first_ns, last_ns, reason, text),)
+
+def _cut(first_s: float, last_s: float, reason: Dismissal, text: str) -> NotCoastdown:
+    return NotCoastdown(round(first_s * SECOND_NS), round(last_s * SECOND_NS), reason, text)
 
 
 class RegimeFilter:
@@ -334,17 +310,18 @@ class RegimeFilter:
         return np.array([out[SPEED] for out in self._out])
 
     def _dated(self, glide: SmoothedGlide) -> Dated:
-        zero, pace = self._zero_s, self._setting.pace
-        slow = not self._setting.shafts and glide.begin_s - glide.stop_s > _RAN_DOWN_S * pace
-        return Dated(
-            zero + glide.stop_s,
-            zero + (glide.begin_s if slow else glide.start_s),
-            zero + glide.begin_s,
-            zero + glide.end_s,
-            glide.begin_sd_s,
-            slow,
-            self._ended_by(glide),
-        )
+        before, stop, start, begin, end = (self._zero_s + each for each in glide[:5])
+        cuts: list[NotCoastdown] = []
+        if glide.before in (s.BRAKE, s.GLIDE_TURN):  # nothing drove her before it
+            cuts.append(_cut(before, stop, *_WHY[glide.before]))
+        if not self._setting.shafts and begin - stop > _RAN_DOWN_S * self._setting.pace:
+            text = (
+                f'the thrust ran down for {begin - stop:.0f} s, and was gone at the end of that, '
+                f'± {glide.begin_sd_s:.0f} s'
+            )
+            cuts.append(_cut(stop, begin, Dismissal.THRUST, text))
+        date = begin if cuts else start
+        return Dated(stop, date, begin, end, self._ended_by(glide), tuple(cuts))
 
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
         if glide.after < 0:
