@@ -298,10 +298,7 @@ def _found(
         stage(0, 0)
         refuse_without_input(each)
         ship = ship_of(owner or each, ship)
-        said: list[str] = []
-        sheet, where = sheet_of(each, said.append)
-        for text in said:
-            listener.log(f'{each.name}: {text}')
+        sheet, where = sheet_of(each, listener.log)
         was = sheet.of(ship, subject=where)
         of_run = None if was == ship else was
         told = replace(was, facts=overriding(ship.facts, sheet.facts, facts))

@@ -19,7 +19,8 @@ FIRST_BYTES = 1 << 13
 """Of a file, by which its format is known."""
 
 BAGS = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd')
-_SOURCES = (*BAGS, '.bag', '.nmea', '.nmea.gz', '.csv', '.tsv')
+_LOGS = ('.nmea', '.nmea.gz', '.csv', '.tsv')
+_SOURCES = (*BAGS, '.bag', *_LOGS)
 _NONE = ('truth.csv', 'events.csv')  # of `shipdrag simulate-fleet`, and of a fleet
 _PART = re.compile(r'_\d{3}(?=\.mcap)')  # of a recording of the node
 
@@ -102,7 +103,13 @@ def run_file(
     found = [name for name in names if exists(name)]
     if exists(RUN_FILE):
         of_run = {_PART.sub('', each) for each in own}
-        others = [each for each in beside() if _PART.sub('', each) not in of_run]
+        others = [
+            each
+            for each in beside()
+            if _PART.sub('', each) not in of_run
+            # a log beside a bag may be what that was imported from
+            and (bag.endswith(_LOGS) or not each.endswith(_LOGS))
+        ]
         if not others:
             found.append(RUN_FILE)
         elif not found:

@@ -41,6 +41,8 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         (['a.mcap', 'b.mcap'], ['a.run.yaml'], 'a.run.yaml', False),
         (['run_1.mcap', 'run_2.mcap'], ['run.yaml'], '', True),
         (['part_000.mcap', 'part_001.mcap'], ['run.yaml'], 'run.yaml', False),
+        (['a.mcap', 'a.csv'], ['run.yaml'], 'run.yaml', True),
+        (['a.csv', 'a.mcap'], ['run.yaml'], '', True),
         (['a.csv'], ['run.yaml'], 'run.yaml', False),
         (['a.csv', 'b.csv'], ['run.yaml'], '', True),
         (['a.csv', 'b.csv', 'truth.csv'], ['a.csv.run.yaml'], 'a.csv.run.yaml', False),
@@ -49,7 +51,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         (['bag/bag_0.mcap', 'bag/metadata.yaml'], ['run.yaml'], 'run.yaml', False),
         (['bag/bag_0.mcap', 'bag/metadata.yaml'], ['bag/run.yaml'], 'bag/run.yaml', False),
         (['bag/bag_0.mcap', 'bag/metadata.yaml'], ['bag.run.yaml'], 'bag.run.yaml', False),
-        (['bag/bag_0.mcap', 'bag/metadata.yaml', 'more.csv'], ['run.yaml'], '', True),
+        (['bag/bag_0.mcap', 'bag/metadata.yaml', 'more.csv'], ['run.yaml'], 'run.yaml', True),
     ],
 )
 def test_the_file_of_a_run(
