@@ -119,7 +119,7 @@ def begins(coastdown: EndedCoastdown) -> tuple[int, bool]:
     """
     Return when the thrust began to fall, and whether what comes before may be steady sailing.
     """
-    driven = all(  # and of a driven ship a cut leaves steady sailing
+    driven = all(  # up to it, where nothing but thrust was cut before it
         each.start_ns >= coastdown.start_ns or each.reason is Dismissal.THRUST
         for each in coastdown.cuts
     )

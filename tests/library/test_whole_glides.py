@@ -14,7 +14,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
-from shipdrag_ros.coastdown.events import ENDED_BY, TURNED, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import ENDED_BY, TURNED, Dismissal, EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.fleet import job
@@ -146,11 +146,14 @@ def test_the_whole_glide_goes_on_where_the_coastdown_ends(tmp_path: Path) -> Non
     assert glide.end_ns > coastdown.end_ns + 200 * 10**9
 
 
-def test_that_something_acted_is_not_said_of_a_coastdown_in_which_nothing_did(tmp_path) -> None:
+def test_what_acted_at_the_stop_is_cut_from_the_coastdown_and_said(tmp_path: Path) -> None:
+    (run,) = open_runs([sailed(tmp_path / 'ice.mcap', ice_at_the_stop)])
+    (coastdown,) = (each for each in replay(run, compare=False).coastdowns if not each.withdrawn)
+    (cut,) = coastdown.cuts
+    assert cut.reason is Dismissal.BRAKE
+    assert coastdown.start_ns >= cut.end_ns
     found = diagnosed(tmp_path, ice_at_the_stop)
-    notes = ' '.join(found['notes'])
-    assert 'probably not in one glide' in notes
-    assert 'no instrument shows what' not in notes
+    assert 'brake: something but the water slowed her' in ' '.join(found['notes'])
 
 
 def crash_stop(time_s: float) -> float:
