@@ -582,7 +582,7 @@ class Monitor:
         stamp_ns = int(watch.update_ns)
         watch.update_ns = self._running.due_ns(next_stamp_ns)
         gliding = self._regimes.gliding > 0.5
-        last = self._regimes.glides()[-1:]
+        last = self._unreported(self._regimes)[-1:]
         dated = last[0] if last and last[0].ended_by is None else None
         return self._running.update(stamp_ns, dated, self._estimator, gliding=gliding)
 

@@ -192,6 +192,16 @@ def test_the_rest_of_a_glide_after_a_silence_is_a_coastdown_of_its_own(
     assert bits(told[0]) == bits(told[1])  # whoever notices the silence
 
 
+def test_figures_after_a_silence_are_of_the_rest_of_the_glide_alone(ship, record, sensors) -> None:
+    block = record(sensors=(sensors['log'],))
+    second = (block.stamp_ns - START_NS) // S
+    events = monitor(ship).update(block[(second < 1061) | (second >= 1360)])
+    rest = of(Onset, events)[1]
+    after = [each.estimate for each in of(Update, events) if each.stamp_ns > rest.detected_ns]
+    assert len(after) > 5
+    assert all(each.start_ns >= START_NS + 1360 * S and each.before is None for each in after)
+
+
 def test_a_compass_tells_no_speed_in_a_silence(ship, record, sensors) -> None:
     block = record(sensors=(sensors['log'], sensors['compass']), duration_s=1200.0)
     second = (block.stamp_ns - START_NS) // S
