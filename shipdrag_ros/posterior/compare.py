@@ -320,7 +320,7 @@ class Comparing:
         self._climb([self.nothing])
         # where a shaft stops is a step in its readings: no climb leads there from afar
         starts = self.runs.stopping_elsewhere(self.nothing.at)
-        tables = self.runs.linearise([self.base] * len(starts), starts) if len(starts) else []
+        tables = self.runs.linearise([self.base] * len(starts), starts) if starts else []
         costs = [self._step(self.nothing, *each).cost for each in zip(tables, starts, strict=True)]
         if costs and min(costs) < self.nothing.cost:
             self.nothing = Fitted(self.base, starts[int(np.argmin(costs))])

@@ -41,6 +41,7 @@ from shipdrag_ros.samples import (
     in_arrival_order,
 )
 from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import Format, Job, best_of, head_of
 from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of, new_bag
 
@@ -285,7 +286,7 @@ class LogRun(Run):
         name = ', '.join(map(str, sources))
         part = LogPart(log, Path(name))
         super().__init__(BagFiles(name, tuple(sources)), [part], remap=remap)  # type: ignore[list-item]
-        folders = [each.parent if each.name == 'metadata.yaml' else each for each in sources]
+        folders = [each.parent if each.name == METADATA else each for each in sources]
         self._sources = tuple(
             file
             for each, folder in zip(sources, folders, strict=True)

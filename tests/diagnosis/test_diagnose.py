@@ -219,11 +219,7 @@ def test_latitude_and_longitude_are_in_the_scale_of_the_earth(cargo: Ship) -> No
 
 def test_what_a_bare_ship_file_leaves_unexamined_is_said_with_what_to_state(cargo: Ship) -> None:
     bare = replace(cargo, air=None, propeller=None, breadth_m=None, draught_m=None)
-    scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
-    block = sense(simulate(cargo, scenario), standard_sensors(), seed=2)
-    window = Window.from_block(
-        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
-    )
+    run = coasted(speed_m_s=7.0, seed=2)
     for ship, expected in (
         (cargo, []),
         (
@@ -235,7 +231,7 @@ def test_what_a_bare_ship_file_leaves_unexamined_is_said_with_what_to_state(carg
             ],
         ),
     ):
-        found = diagnose([CoastRun('run', window)], ship, Parameters(), advise=False)
+        found = diagnose([run], ship, Parameters(), advise=False)
         start = 'not examined without '
         said = [note.removeprefix(start) for note in found.notes if note.startswith(start)]
         assert said == expected

@@ -32,6 +32,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
 from shipdrag_ros.messages.topics import TOPICS
+from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
@@ -44,7 +45,6 @@ from shipdrag_ros.sources.log import (
 )
 from shipdrag_ros.sources.opened import beginning
 
-METADATA = 'metadata.yaml'
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20
 _MESSAGE_BYTES = 16 << 20
