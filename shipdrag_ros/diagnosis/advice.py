@@ -46,7 +46,7 @@ from shipdrag_ros.posterior.hypotheses import Explanation, RunSight, ShipRuns
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship.facts import advice as fact_advice
-from shipdrag_ros.simulation.effect import COSTS, Cost, Measure, Scope
+from shipdrag_ros.simulation.effect import Cost, Measure, Scope
 from shipdrag_ros.simulation.effects import discriminating_measurements, inseparable
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -368,7 +368,7 @@ def advice(
             len(each.mean) and np.isfinite(each.slope).all() for way in settings for each in way
         ):
             named = probability_of_naming(settings, setting, rivals, inseparable=case.inseparable)
-            found.append(Advice(measure.value, named, COSTS[measure]))
+            found.append(Advice(measure.value, named, measure.cost))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
@@ -411,7 +411,7 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
             weight = one.probability * other.probability
             votes[measure] = votes.get(measure, 0.0) + weight
     return _by_cost(
-        {Advice(measure.value, None, COSTS[measure]): vote for measure, vote in votes.items()}
+        {Advice(measure.value, None, measure.cost): vote for measure, vote in votes.items()}
     )
 
 

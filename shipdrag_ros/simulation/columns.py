@@ -183,7 +183,7 @@ def simulate_columns(
 def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
     longest = _longest_step_s(ship, scenario.speed_m_s)
-    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    run_down_s = terms.run_down_s(ship, Action())
     # what changes at once is smooth later
     first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
     count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
@@ -260,7 +260,7 @@ def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
 
 def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: float) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    run_down_s = terms.run_down_s(ship, Action())
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
     counts = []

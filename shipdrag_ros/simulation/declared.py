@@ -15,7 +15,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fields import Problems, keys_of, parse, read_keys
-from shipdrag_ros.parameter import ABSOLUTE, Parameter, Prior, Scale, Shape
+from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
@@ -29,17 +29,7 @@ _KNOTS = 24  # of a force in time: straight between them
 _FOR_EVER_S = 1e7
 _STEP = 0.01  # of a speed, over which a power is looked at
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
-_SCALES: Mapping[str, Scale] = {
-    scale.text: scale
-    for scale in (
-        ABSOLUTE,
-        effect.WEIGHTS,
-        effect.AREAS,
-        effect.SPEEDS,
-        effect.LENGTHS,
-        effect.DRAUGHTS,
-    )
-}
+_SCALES = {scale.text: scale for scale in effect.SCALES}
 _NEEDS = {'B_WL': 'breadth_m', 'T_M': 'draught_m', 'D_P': 'propeller'}
 _ERRS_IN = {
     'log': ('speed_through_water',),

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from operator import attrgetter
 from typing import Any
 
 from shipdrag_ros.fields import (
@@ -27,80 +28,59 @@ from shipdrag_ros.fields import (
     section,
     text,
 )
-from shipdrag_ros.parameter import Parameter, Scale
+from shipdrag_ros.parameter import ABSOLUTE, Parameter, Scale
 from shipdrag_ros.samples import INPUTS
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action, Vector
 from shipdrag_ros.simulation.scenario import Scenario
 
 
-class Measure(StrEnum):
-    """What can be done to separate two effects, as it is advised."""
-
-    RECIPROCAL_RUN = 'a run on the reciprocal heading'
-    ANOTHER_COURSE = 'a leg on another course'
-    OTHER_SPEED = 'a run that begins or ends at another speed'
-    ANOTHER_RUN = 'another run of the same ship'
-    RADAR = 'radar or GNSS positions'
-    LOG = 'a speed log'
-    WIND = 'an anemometer (wind_apparent)'
-    DEPTH = 'an echo sounder (depth)'
-    DEEP_WATER = 'a run in deep water'
-    HEADING = 'a compass (heading)'
-    SHAFT = 'the shaft speed (shaft)'
-    RUDDER = 'the rudder angle (rudder)'
-    THIRD_SPEED = 'a third source of speed, GNSS beside log and radar'
-    WITHOUT_CABLE = 'a run without the cable'
-    FREE_PROPELLER = 'a run with the propeller turning freely'
-    CLEAN_HULL = 'a run after the hull is cleaned'
-    DRAUGHT = 'the draughts, read on both sides fore and aft'
-    FAST_CHANGE = 'a quick change of speed at a known time'
-
-
 class Cost(StrEnum):
-    """What a measure costs the crew."""
+    """What a measure costs the crew, and about as many hours of the ship."""
 
-    LOOK = 'a look'
-    LEG = 'a few minutes on another course'
-    RUN = 'another run'
-    GEAR = 'gear to be rigged or hauled in'
-    PASSAGE = 'a passage elsewhere'
-    DIVE = 'a diver or a dock'
+    LOOK = 'a look', 0.1
+    LEG = 'a few minutes on another course', 0.3
+    RUN = 'another run', 1.0
+    GEAR = 'gear to be rigged or hauled in', 2.0
+    PASSAGE = 'a passage elsewhere', 6.0
+    DIVE = 'a diver or a dock', 48.0
 
-    @property
-    def hours(self) -> float:
-        """About as many hours of the ship."""
-        return _HOURS[self]
+    hours: float
+
+    def __new__(cls, text: str, hours: float = 0.0) -> Cost:
+        member = str.__new__(cls, text)
+        member._value_, member.hours = text, hours
+        return member
 
 
-_HOURS = {
-    Cost.LOOK: 0.1,
-    Cost.LEG: 0.3,
-    Cost.RUN: 1.0,
-    Cost.GEAR: 2.0,
-    Cost.PASSAGE: 6.0,
-    Cost.DIVE: 48.0,
-}
-COSTS: Mapping[Measure, Cost] = {
-    Measure.RECIPROCAL_RUN: Cost.RUN,
-    Measure.ANOTHER_COURSE: Cost.LEG,
-    Measure.OTHER_SPEED: Cost.RUN,
-    Measure.ANOTHER_RUN: Cost.RUN,
-    Measure.RADAR: Cost.GEAR,
-    Measure.LOG: Cost.GEAR,
-    Measure.WIND: Cost.GEAR,
-    Measure.DEPTH: Cost.LOOK,
-    Measure.DEEP_WATER: Cost.PASSAGE,
-    Measure.HEADING: Cost.LOOK,
-    Measure.SHAFT: Cost.LOOK,
-    Measure.RUDDER: Cost.LOOK,
-    Measure.THIRD_SPEED: Cost.GEAR,
-    Measure.WITHOUT_CABLE: Cost.GEAR,
-    Measure.FREE_PROPELLER: Cost.GEAR,
-    Measure.CLEAN_HULL: Cost.DIVE,
-    Measure.DRAUGHT: Cost.LOOK,
-    Measure.FAST_CHANGE: Cost.RUN,
-}
+class Measure(StrEnum):
+    """What can be done to separate two effects, as it is advised, and what it costs."""
+
+    RECIPROCAL_RUN = 'a run on the reciprocal heading', Cost.RUN
+    ANOTHER_COURSE = 'a leg on another course', Cost.LEG
+    OTHER_SPEED = 'a run that begins or ends at another speed', Cost.RUN
+    ANOTHER_RUN = 'another run of the same ship', Cost.RUN
+    RADAR = 'radar or GNSS positions', Cost.GEAR
+    LOG = 'a speed log', Cost.GEAR
+    WIND = 'an anemometer (wind_apparent)', Cost.GEAR
+    DEPTH = 'an echo sounder (depth)', Cost.LOOK
+    DEEP_WATER = 'a run in deep water', Cost.PASSAGE
+    HEADING = 'a compass (heading)', Cost.LOOK
+    SHAFT = 'the shaft speed (shaft)', Cost.LOOK
+    RUDDER = 'the rudder angle (rudder)', Cost.LOOK
+    THIRD_SPEED = 'a third source of speed, GNSS beside log and radar', Cost.GEAR
+    WITHOUT_CABLE = 'a run without the cable', Cost.GEAR
+    FREE_PROPELLER = 'a run with the propeller turning freely', Cost.GEAR
+    CLEAN_HULL = 'a run after the hull is cleaned', Cost.DIVE
+    DRAUGHT = 'the draughts, read on both sides fore and aft', Cost.LOOK
+    FAST_CHANGE = 'a quick change of speed at a known time', Cost.RUN
+
+    cost: Cost
+
+    def __new__(cls, text: str, cost: Cost = Cost.LOOK) -> Measure:
+        member = str.__new__(cls, text)
+        member._value_, member.cost = text, cost
+        return member
 
 
 class Scope(StrEnum):
@@ -141,20 +121,19 @@ def _speed(ship: Ship) -> float:
     return float(ship.speed(1.0))
 
 
-def _length(ship: Ship) -> float:
-    return ship.length_m
-
-
 def _draught(ship: Ship) -> float:
     return ship.draught_m or math.nan
 
 
 # no lambdas: sizes are part of a diagnosis, which is sent from process to process
-WEIGHTS = Scale('weight of the ship', _weight)
-AREAS = Scale('V^(2/3)', _area)
-SPEEDS = Scale('sqrt(g L)', _speed)
-LENGTHS = Scale('L', _length)
-DRAUGHTS = Scale('draught', _draught)
+SCALES = (
+    ABSOLUTE,
+    Scale('weight of the ship', _weight),
+    Scale('V^(2/3)', _area),
+    Scale('sqrt(g L)', _speed),
+    Scale('L', attrgetter('length_m')),
+    Scale('draught', _draught),
+)
 
 
 @dataclass(frozen=True)
@@ -202,7 +181,6 @@ class Said:
     fades_s: float = declare(number(0.0, 1e12, 's'), 'after its date', default=math.inf)
 
 
-DENIES = Said()
 DAY_S = 86400.0
 _MEASURES = {each.name.lower(): each for each in Measure}
 

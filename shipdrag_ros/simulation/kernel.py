@@ -45,30 +45,14 @@ class SurgeLaw(NamedTuple):
 
 # what one column adds to the law; a wave's direction is a unit vector, its force and all else
 # per unit of the stated mass
-COLUMN = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            'speed_m_s',
-            'wind_east_m_s',
-            'wind_north_m_s',
-            'wave_m_s2',
-            'wave_east',
-            'wave_north',
-            'wave_encounter_s_m',
-            'current_east_m_s',
-            'current_north_m_s',
-            'change_east_m_s2',
-            'change_north_m_s2',
-            'change_from_s',
-            'run_down_s',
-            'residual_fraction',
-            'residual_decay_s',
-            'n_r_change',
-            'mass_fraction',
-        )
-    ]
+_OF_COLUMN = (
+    *('speed_m_s', 'wind_east_m_s', 'wind_north_m_s'),
+    *('wave_m_s2', 'wave_east', 'wave_north', 'wave_encounter_s_m'),
+    *('current_east_m_s', 'current_north_m_s'),
+    *('change_east_m_s2', 'change_north_m_s2', 'change_from_s'),
+    *('run_down_s', 'residual_fraction', 'residual_decay_s', 'n_r_change', 'mass_fraction'),
 )
+COLUMN = np.dtype([(name, np.float64) for name in _OF_COLUMN])
 
 # a stretch between two events; the thrust that is ordered is a fraction of the steady one,
 # turning_1_m the resistance of turning over u |u|; this and the yaw rate change evenly

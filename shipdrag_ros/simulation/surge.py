@@ -9,7 +9,7 @@ function of time (one leg between two events); effects add to both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,21 +17,12 @@ from numpy.typing import ArrayLike
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.simulation import terms
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.kernel import SurgeLaw, follow
 from shipdrag_ros.simulation.scenario import GaussMarkov, Scenario
-from shipdrag_ros.simulation.terms import (
-    acted,
-    columns_of,
-    edges_of,
-    extra_of,
-    law_of,
-    legs_of,
-    outside,
-    top_m_s,
-)
 
 _LULL = 0.1  # of the stall speed, within which a shaft stops
 _STALLS = 0.12  # of its free revs, at which the torque of a propeller is largest: B4-70, B6-80
@@ -103,16 +94,14 @@ class Truth:
         path = CubicHermiteSpline(self.time_s, self.position_m, self.velocity_over_ground_m_s)
         speed = np.interp(time_s, self.time_s, self.speed_through_water_m_s)
         velocity = [np.interp(time_s, self.time_s, v) for v in self.velocity_over_ground_m_s.T]
-        return Truth(
-            self.ship,
-            self.scenario,
-            time_s,
-            speed,
-            path(time_s),
-            np.column_stack(velocity),
-            self.scenario.heading(time_s),
-            _shaft_rad_s(self.ship, self.scenario, self.action, time_s, speed),
-            self.action,
+        return replace(
+            self,
+            time_s=time_s,
+            speed_through_water_m_s=speed,
+            position_m=path(time_s),
+            velocity_over_ground_m_s=np.column_stack(velocity),
+            heading_rad=self.scenario.heading(time_s),
+            shaft_rad_s=_shaft_rad_s(self.ship, self.scenario, self.action, time_s, speed),
         )
 
 
@@ -175,11 +164,11 @@ def simulate(
     'r(5 m/s) = 0.00678 m/s^2'
     """
     action = own_action(ship, scenario, reference_rad=reference_rad, effects=effects)
-    law = law_of(ship, scenario.speed_m_s)
-    columns = columns_of(ship, scenario, [action], speed_m_s=np.array([scenario.speed_m_s]))
-    scenario = acted(scenario, action)
+    law = terms.law_of(ship, scenario.speed_m_s)
+    [column] = terms.columns_of(ship, scenario, [action], speed_m_s=np.array([scenario.speed_m_s]))
+    scenario = terms.acted(scenario, action)
     changes = any(action.current_change_m_s)
-    edges = edges_of(scenario, also_s=[scenario.lead_in_s] if changes else [])
+    edges = terms.edges_of(scenario, also_s=[scenario.lead_in_s] if changes else [])
     steps = steps_of(ship, scenario, edges, step_s=step_s)
     pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges, edges[1:], steps)]
     time = np.concatenate([*pieces, [scenario.length_s]])
@@ -190,9 +179,9 @@ def simulate(
     path = np.empty((len(time), 5))
     follow(
         law,
-        columns[0],
-        extra_of(ship, law, [action])[0],
-        legs_of(ship, scenario, edges, steps),
+        column,
+        terms.extra_of(ship, law, [action])[0],
+        terms.legs_of(ship, scenario, edges, steps),
         gust,
         water,
         time,
@@ -237,7 +226,7 @@ def steps_of(
     if step_s is None:
         r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
         step_s = min(0.25, scenario.speed_m_s / r / 200.0)
-        if run_down_s := _run_down_s(ship):
+        if run_down_s := terms.run_down_s(ship, Action()):
             step_s = min(step_s, run_down_s / 40.0)
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
     longest = [_QUIET_STEP_S if start < quiet_s else step_s for start in edges[:-1]]
@@ -247,21 +236,18 @@ def steps_of(
     ]
 
 
-def _run_down_s(ship: Ship) -> float:
-    return ship.propulsion.run_down_s if ship.propulsion else 0.0
-
-
 def _disturbance(noise: GaussMarkov | None, time: Float64, rng: np.random.Generator) -> Float64:
     return np.zeros_like(time) if noise is None else noise.sample(time, rng)
 
 
 def _check_range(law: SurgeLaw, time: Float64, speed: Float64) -> None:
-    is_outside = outside(law, speed)
+    is_outside = terms.outside(law, speed)
     if np.any(is_outside):
         i = int(np.argmax(is_outside))
         raise SimulationError(
             f'the speed is {speed[i]:.4g} m/s at {time[i]:.6g} s, the baseline is tabulated for '
-            f'{law.low_m_s:.4g}..{top_m_s(law):.4g} m/s; shorten the record or extend the baseline'
+            f'{law.low_m_s:.4g}..{terms.top_m_s(law):.4g} m/s; shorten the record or extend the '
+            'baseline'
         )
 
 
@@ -281,8 +267,7 @@ def turning(speed_m_s: Float64, stall_m_s: Float64 | float) -> Float64:
 def _shaft_rad_s(
     ship: Ship, scenario: Scenario, action: Action, time: Float64, speed: Float64
 ) -> Float64:
-    run_down_s = max(_run_down_s(ship) + action.run_down_change_s, 0.0)
-    fraction = scenario.shaft_fraction(time, run_down_s=run_down_s)
+    fraction = scenario.shaft_fraction(time, run_down_s=terms.run_down_s(ship, action))
     if action.residual_fraction:
         residual = scenario.shaft_fraction(time, run_down_s=action.residual_decay_s)
         fraction += action.residual_fraction * (residual - fraction)

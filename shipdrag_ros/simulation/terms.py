@@ -19,6 +19,10 @@ from shipdrag_ros.simulation.scenario import Scenario
 
 _CELLS = 4000  # of the table of resistance; its error is far below that of any sensor
 _EXTRA_CELLS = 512  # of what effects add to it, which is smooth
+_AS_THEY_ARE = (
+    *('wave_encounter_s_m', 'residual_fraction', 'residual_decay_s'),
+    *('n_r_change', 'mass_fraction'),
+)
 _RANGE = 2.0  # times the steady speed: room for disturbances, and the cells stay fine
 
 
@@ -114,7 +118,6 @@ def columns_of(
     records['speed_m_s'] = speed_m_s
     records['change_from_s'] = scenario.lead_in_s
     per_s = 1.0 / scenario.duration_s if scenario.duration_s > 0.0 else 0.0
-    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
     east, north = scenario.current_m_s
     for record, action in zip(records, actions):
         record['wind_east_m_s'], record['wind_north_m_s'] = action.wind_m_s
@@ -123,17 +126,22 @@ def columns_of(
             record['wave_m_s2'] = wave / ship.mass_kg
             record['wave_east'] = action.wave_force_n[0] / wave
             record['wave_north'] = action.wave_force_n[1] / wave
-        record['wave_encounter_s_m'] = action.wave_encounter_s_m
         record['current_east_m_s'] = east + action.current_m_s[0]
         record['current_north_m_s'] = north + action.current_m_s[1]
         record['change_east_m_s2'] = action.current_change_m_s[0] * per_s
         record['change_north_m_s2'] = action.current_change_m_s[1] * per_s
-        record['run_down_s'] = max(run_down_s + action.run_down_change_s, 0.0)
-        record['residual_fraction'] = action.residual_fraction
-        record['residual_decay_s'] = action.residual_decay_s
-        record['n_r_change'] = action.n_r_change
-        record['mass_fraction'] = action.mass_fraction
+        record['run_down_s'] = run_down_s(ship, action)
+        for name in _AS_THEY_ARE:
+            record[name] = getattr(action, name)
     return records
+
+
+def run_down_s(ship: Ship, action: Action) -> float:
+    """
+    Return the time scale in which the thrust ends.
+    """
+    stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    return max(stated + action.run_down_change_s, 0.0)
 
 
 def acted(scenario: Scenario, action: Action) -> Scenario:

@@ -10,6 +10,7 @@ an effect of its own by an entry point of the group `shipdrag.effects`, `NAME = 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -240,25 +241,23 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
     SimulationError
         Naming every effect and parameter that cannot be simulated.
     """
-    problems: list[str] = []
     total, known = Action(), effects_of(frame.ship)
-    names = [effect.name for effect in stated]
-    for name in dict.fromkeys(names):
-        if names.count(name) > 1:
-            problems.append(f'{name} is given {names.count(name)} times, expected once')
-    there = [known[name] for name in dict.fromkeys(names) if name in known]
-    for one, other in combinations(there, 2):
-        if not one.goes_with(other):
-            problems.append(f'{one.name} and {other.name} cannot be there at the same time')
+    names = Counter(effect.name for effect in stated)
+    problems = [
+        f'{name} is given {count} times, expected once'
+        for name, count in names.items()
+        if count > 1
+    ]
+    problems += [
+        f'{one.name} and {other.name} cannot be there at the same time'
+        for one, other in combinations([known[name] for name in names if name in known], 2)
+        if not one.goes_with(other)
+    ]
     for item in stated:
-        if item.name not in known:
-            problems.extend(not_known(item, frame.ship))
-            continue
-        effect = known[item.name]
-        before = len(problems)
-        problems.extend(_problems(effect, item, frame))
-        if len(problems) == before:
-            total += effect.action(frame, *values_of(item, frame.ship).values())
+        wrong = [*_problems(item, frame)]
+        problems += wrong
+        if not wrong:
+            total += known[item.name].action(frame, *values_of(item, frame.ship).values())
     if total.mass_fraction <= -1.0 or 1.0 + float(frame.ship.n_r(0.0)) + total.n_r_change <= 0.0:
         problems.append(f'{", ".join(names)} leave the ship without inertia')
     if problems:
@@ -294,12 +293,14 @@ def not_known(stated: StatedEffect, ship: Ship) -> Iterator[str]:
             yield f'{stated.name}: parameter {key!r} is not known; known are {", ".join(names)}'
 
 
-def _problems(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[str]:
-    missing = effect.missing(frame.ship)
-    if missing:
+def _problems(stated: StatedEffect, frame: Frame) -> Iterator[str]:
+    effect = effects_of(frame.ship).get(stated.name)
+    if effect is not None and (missing := effect.missing(frame.ship)):
         yield f'{effect.name} needs {", ".join(missing)} in the ship file'
         return
     yield from not_known(stated, frame.ship)
+    if effect is None:
+        return
     for parameter in effect.parameters_of(frame.ship):
         given = stated.parameters.get(parameter.name)
         if given is None:
