@@ -17,8 +17,9 @@ import numpy as np
 
 from benchmarks._asked import asked
 from benchmarks.accuracy.trend_score import World, ship
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship.sections import Economics
-from shipdrag_ros.trend.hull_state import Growth, Mixture, Runs, Steps, search
+from shipdrag_ros.trend.hull_state import Growth, Runs, Steps, search
 from shipdrag_ros.trend.ship_trend import CleaningDate, cleaning_date
 
 YEARS = 5.0
@@ -49,18 +50,17 @@ def yearly(world: World, cleaning_usd: float) -> tuple[np.ndarray, np.ndarray]:
 def by_trend(runs: Runs, economics: Economics) -> CleaningDate | None:
     """Return when cleaning pays, as the trend has it."""
     found = search(runs, Steps(), Growth())
-    added = found.open.level(np.array([runs.years[-1]]))
-    return cleaning_date(economics, PER_UNIT, added, found.state.growth_since_last_step())
+    added = found.open.level(runs.years[-1:]).first
+    growth = found.state.growth_since_last_step().first
+    return cleaning_date(economics, PER_UNIT, added, growth)
 
 
 def by_line(runs: Runs, economics: Economics) -> CleaningDate | None:
     """Return when cleaning pays, by a straight line through all runs."""
     fit, covariance = np.polyfit(runs.years, runs.added, 1, cov=True)
     sd = np.sqrt(np.diag(covariance))
-    growth = Mixture(fit[:1], sd[:1])
-    return cleaning_date(
-        economics, PER_UNIT, Mixture(np.array([np.polyval(fit, runs.years[-1])]), sd[1:]), growth
-    )
+    added = Parameter(float(np.polyval(fit, runs.years[-1])), float(sd[1]))
+    return cleaning_date(economics, PER_UNIT, added, Parameter(float(fit[0]), float(sd[0])))
 
 
 def cleaned_at(world: World, economics: Economics, advice: object) -> float:

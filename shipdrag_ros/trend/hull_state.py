@@ -22,11 +22,13 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 
 LEVEL_SD = 0.4  # a hull when its first run is seen: from clean to heavily fouled
@@ -37,7 +39,7 @@ GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
 COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
 SEASON_SD = 0.005  # of a yearly wave: light, water and trade
 SCATTER = np.array([0.004, 0.008, 0.014, 0.022, 0.035, 0.06, 0.11])
-_SCATTER_MEDIAN, _SCATTER_LOG_SD = 0.03, 0.8
+_SCATTER_PRIOR = np.exp(-0.5 * (np.log(SCATTER / 0.03) / 0.8) ** 2)
 WANDER = np.array([0.0, 0.06, 0.18])  # growth per year, per square root of a year
 _WANDER_PRIOR = np.array([0.4, 0.35, 0.25])
 WALK = np.array([0.0, 0.015, 0.04])  # of the level, per square root of a year: growth in bursts
@@ -142,6 +144,11 @@ class Mixture:
     value: Float64
     sd: Float64
 
+    @property
+    def first(self) -> Parameter:
+        """The first of them."""
+        return Parameter(float(self.value[0]), float(self.sd[0]))
+
 
 @dataclass(frozen=True)
 class Functional:
@@ -195,9 +202,8 @@ class HullState:
     ) -> None:
         self.runs, self.steps, self.growth = runs, steps, growth
         self.outlier = np.zeros(len(runs)) if outlier is None else outlier
-        grid = itertools.product(SCATTER.tolist(), WANDER.tolist(), WALK.tolist())
-        self._settings = list(grid)
-        prior = itertools.product(_scatter_prior(), _WANDER_PRIOR.tolist(), _WALK_PRIOR.tolist())
+        self._settings = list(itertools.product(SCATTER.tolist(), WANDER.tolist(), WALK.tolist()))
+        prior = itertools.product(_SCATTER_PRIOR, _WANDER_PRIOR, _WALK_PRIOR)
         self._log_prior = np.log([math.prod(each) for each in prior])
         mean, self._basis = self._prior(runs.years, runs.covariates)
         self._residual = runs.added - mean
@@ -432,12 +438,6 @@ class HullState:
         return tightness, np.asarray(self._residual @ solved)
 
 
-def _scatter_prior() -> list[float]:
-    """Return the prior weight of each size of the scatter."""
-    apart = np.log(SCATTER / _SCATTER_MEDIAN) / _SCATTER_LOG_SD
-    return list(np.exp(-0.5 * apart**2))
-
-
 def _wander(one: Float64, other: Float64, wander: float, walk: float) -> Float64:
     """Return the covariance of integrated and of plain Brownian motion of these strengths."""
     first = np.minimum(one[:, None], other[None, :])
@@ -621,25 +621,23 @@ def search(runs: Runs, known: Steps, growth: Growth) -> Found:
         if probability < _DATED or year in taken:  # two at one time are one
             break
         taken.append(year)
-        state = HullState(runs, _with(known, taken), growth, outlier=state.outlier)
+        state = HullState(
+            runs, reduce(Steps.with_one, taken, known), growth, outlier=state.outlier
+        )
         more = OneMore(state)
     found = []
     least = _SURE
     for year in sorted(taken):
         others = [each for each in taken if each != year]
-        without = HullState(runs, _with(known, others), growth, outlier=state.outlier)
+        without = HullState(
+            runs, reduce(Steps.with_one, others, known), growth, outlier=state.outlier
+        )
         one = OneMore(without)
         near = np.abs(one.years - year) <= _NEAR_YEARS
         found.append(FoundStep(year, float(one.probability[near].sum())))
         if found[-1].probability < least:
             least, more = found[-1].probability, one
     return Found(state, tuple(found), more)
-
-
-def _with(known: Steps, taken: list[float]) -> Steps:
-    for year in taken:
-        known = known.with_one(year)
-    return known
 
 
 def _most_likely(more: OneMore) -> tuple[float, float]:

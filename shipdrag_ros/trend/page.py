@@ -112,14 +112,13 @@ def _runs(trend: ShipTrend, links: Links) -> display.Table:
     rows = []
     for point in reversed(trend.points):
         date, href = display.utc(point.time_ns), links.get((point.bag, point.time_ns))
-        loss = words.speed_lost(point.value)
-        known = bool(np.isfinite(point.value))
+        added = display.plus_minus(100.0 * point.value, 200.0 * point.sd)
         rows.append(
             (
                 date if href is None else display.Link(date, href),
                 point.bag,
-                display.plus_minus(100.0 * point.value, 200.0 * point.sd) if known else '-',
-                '-' if loss is None or not known else f'{100.0 * loss:.1f}',
+                added if np.isfinite(point.value) else '-',
+                words.speed_lost_percent(point.value),
                 point.reason or 'used',
             )
         )
@@ -215,7 +214,7 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
     axes.legend(loc='upper left')
 
 
-def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> display.Picture:
+def coastdown_curve(row: CoastdownRow) -> display.Picture:
     """
     Draw the resistance of one coastdown over that of the clean hull.
 
@@ -223,11 +222,8 @@ def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> dis
     ----------
     row
         Of the store's `coastdowns`.
-    known
-        Places of its grid where r is known.
-    mass_kg
-        Of the ship.
     """
+    known, mass_kg = _known(row), _mass_kg(row)
     unit, name = display.force_unit(mass_kg)
 
     def at_known(column: str) -> Float64:
@@ -406,7 +402,7 @@ def _curve(row: CoastdownRow) -> list[display.Section]:
     return [
         display.Section(
             'What she needed',
-            pictures=(coastdown_curve(row, known, _mass_kg(row)),),
+            pictures=(coastdown_curve(row),),
             tables=((caption, table),),
         )
     ]

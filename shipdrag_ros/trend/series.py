@@ -115,8 +115,12 @@ def series_of(
     with_baseline = [_at('clean_m_s2', row, speed) for row in rows]
     baseline = any(np.isfinite(value) for value in with_baseline)
     points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
-    points = _of_one_hull(points, [row['length_m'] for row in rows])
-    points = _dated(_each_once(points, rows))
+    for left_out in (_of_other_hulls, _copies, _of_wrong_clocks):
+        why = left_out(points, rows)
+        points = [
+            replace(point, reason=point.reason or why.get(number))
+            for number, point in enumerate(points)
+        ]
     masses = [row['displaced_volume_m3'] * row['water_density_kg_m3'] for row in rows]
     mass = float(np.median(masses)) if masses else np.nan
     if baseline:
@@ -207,59 +211,50 @@ def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Poi
     )
 
 
-def _of_one_hull(points: list[Point], lengths: Sequence[float]) -> list[Point]:
-    """Leave out runs of a ship of another length: two ships have one name."""
-    if not points:
-        return points
-    usual = float(np.median(lengths))
-    usual = min(lengths, key=lambda length: abs(length - usual))
-    return [
-        replace(
-            point,
-            reason=f'its ship file has a length of {length:g} m, most runs of this name have '
-            f'{usual:g} m: another ship; give each a name of her own',
-        )
-        if point.used and abs(length - usual) > _LENGTH_TOLERANCE * usual
-        else point
-        for point, length in zip(points, lengths)
-    ]
+def _of_other_hulls(points: list[Point], rows: Sequence[CoastdownRow]) -> dict[int, str]:
+    """Return the runs of a ship of another length: two ships have one name."""
+    lengths = [float(row['length_m']) for row in rows]
+    median = float(np.median(lengths)) if lengths else np.nan
+    usual = min(lengths, key=lambda length: abs(length - median), default=np.nan)
+    return {
+        number: f'its ship file has a length of {length:g} m, most runs of this name have '
+        f'{usual:g} m: another ship; give each a name of her own'
+        for number, length in enumerate(lengths)
+        if abs(length - usual) > _LENGTH_TOLERANCE * usual
+    }
 
 
-def _each_once(points: list[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
-    """Leave out what was recorded at the same time as another run: it is the same run."""
+def _copies(points: list[Point], rows: Sequence[CoastdownRow]) -> dict[int, str]:
+    """Return what was recorded at the same time as another run: it is the same run."""
     used = [number for number, point in enumerate(points) if point.used]
-    found = list(points)
-    for number, other in same_time([rows[each] for each in used]).items():
-        reason = f'recorded at the same time as {points[used[other]].bag}: one run, counted once'
-        found[used[number]] = replace(points[used[number]], reason=reason)
-    return found
+    return {
+        used[number]: f'recorded at the same time as {points[used[other]].bag}: one run, counted '
+        'once'
+        for number, other in same_time([rows[each] for each in used]).items()
+    }
 
 
-def _dated(points: list[Point]) -> list[Point]:
-    """Leave out the few runs that are years from most of the others: their clock was wrong."""
+def _of_wrong_clocks(points: list[Point], rows: Sequence[CoastdownRow]) -> dict[int, str]:
+    """Return the few runs that are years from most of the others: their clock was wrong."""
     used = [number for number, point in enumerate(points) if point.used]
     times = np.array([points[number].time_ns for number in used])
-    if len(times) < _MANY_RUNS:
-        return points
     groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > _ALONE_NS) + 1)
     most = max(groups, key=len)
-    if len(most) < _MOST_SHARED * len(times):  # a ship that coasts once in a year or two
-        return points
-    found = list(points)
+    # a ship that coasts once in a year or two has no season that most runs are in
+    if len(times) < _MANY_RUNS or len(most) < _MOST_SHARED * len(times):
+        return {}
+    found = {}
     for group in groups:
-        if group is most or len(group) > max(_FEW_SHARE * len(times), 1.0):
+        apart = np.abs(times[group][:, None] - times[most[[0, -1]]]).min(axis=1)
+        is_small = len(group) <= max(_FEW_SHARE * len(times), 1.0)
+        if group is most or not is_small or (len(group) > 1 and apart.min() < _FAR_NS):
             continue
-        ends = np.abs(times[group][:, None] - times[most[[0, -1]]])
-        if len(group) > 1 and ends.min() < _FAR_NS:
-            continue
-        for number in group.tolist():
-            time_ns, apart_ns = times[number], np.abs(times[number] - times[most[[0, -1]]]).min()
-            others = 'every other run' if len(group) == 1 else f'all but {len(group)} runs'
-            reason = (
-                f'its date, {day(int(time_ns))}, is {apart_ns / YEAR_NS:.1f} years from {others}: '
-                'a wrong clock'
+        others = 'every other run' if len(group) == 1 else f'all but {len(group)} runs'
+        for number, apart_ns in zip(group, apart):
+            found[used[number]] = (
+                f'its date, {day(int(times[number]))}, is {apart_ns / YEAR_NS:.1f} years from '
+                f'{others}: a wrong clock'
             )
-            found[used[number]] = replace(points[used[number]], reason=reason)
     return found
 
 

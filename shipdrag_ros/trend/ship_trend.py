@@ -16,15 +16,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
-from shipdrag_ros.trend.hull_state import (
-    FoundStep,
-    Growth,
-    HullState,
-    Mixture,
-    Runs,
-    Steps,
-    search,
-)
+from shipdrag_ros.trend.hull_state import FoundStep, Growth, HullState, Runs, Steps, search
 from shipdrag_ros.trend.series import YEAR_NS, CoastdownRow, Point, ShipSeries, series_of
 
 _DRAWS, _SEED = 4000, 1
@@ -75,7 +67,7 @@ def fuel_t_per_day(economics: Economics, effective_kw: float) -> float:
 
 
 def cleaning_date(
-    economics: Economics, usd_per_unit: float, since_cleaning: Mixture, growth: Mixture
+    economics: Economics, usd_per_unit: float, since_cleaning: Parameter, growth: Parameter
 ) -> CleaningDate | None:
     """
     Return when cleaning pays, or None where the data cannot carry a date.
@@ -99,8 +91,8 @@ def cleaning_date(
     sqrt(2 C g / c): the rule of optimal replacement under linear wear.
     """
     rng = np.random.default_rng(_SEED)
-    added = rng.normal(since_cleaning.value[0], since_cleaning.sd[0], _DRAWS)
-    rate = rng.normal(growth.value[0], growth.sd[0], _DRAWS)
+    added = rng.normal(since_cleaning.value, since_cleaning.sd, _DRAWS)
+    rate = rng.normal(growth.value, growth.sd, _DRAWS)
     if np.mean(rate > 0.0) < _SURE or usd_per_unit <= 0.0:
         return None
     rate = np.maximum(rate, 1e-4)
@@ -348,17 +340,15 @@ def ship_trend(
     found = search(runs, steps, growth or Growth())
     state, open_state = found.state, found.open
     shared = _shared_sd(used)
-    end = np.array([runs.years[-1]])
-    level = open_state.level(end)
-    now = Parameter(float(level.value[0]), float(np.hypot(level.sd[0], shared)))
+    level = open_state.level(runs.years[-1:]).first
+    now = Parameter(level.value, float(np.hypot(level.sd, shared)))
     kw = series.clean_force_n * series.reference_speed_m_s / 1000.0
     years = np.linspace(0.0, runs.years[-1], _CURVE_POINTS)
     curve = open_state.level(years)
-    slope = open_state.growth_per_year()
     result = ShipTrend(
         series,
         _events(state, once, found.steps, first_ns),
-        Parameter(float(slope.value[0]), float(slope.sd[0])),
+        open_state.growth_per_year().first,
         now,
         _times(now, kw),
         LevelCurve((first_ns + years * YEAR_NS).astype(np.int64), curve.value, curve.sd),
@@ -435,7 +425,7 @@ def _with_costs(result: ShipTrend, state: HullState, economics: Economics | None
     )
     result = replace(result, costs=costs, usd_per_unit=per_unit)
     since = _since_cleaning(result, state)
-    date = cleaning_date(economics, per_unit, since, state.growth_since_last_step())
+    date = cleaning_date(economics, per_unit, since, state.growth_since_last_step().first)
     if date is None:
         why = 'no date of a cleaning: growth and state are not known well enough for one'
         return replace(result, notes=(*result.notes, why))
@@ -446,7 +436,7 @@ def _times(figure: Parameter, unit: float) -> Parameter:
     return Parameter(figure.value * unit, figure.sd * unit)
 
 
-def _since_cleaning(result: ShipTrend, state: HullState) -> Mixture:
+def _since_cleaning(result: ShipTrend, state: HullState) -> Parameter:
     """Return what has been added since the last cleaning, or over the clean hull."""
     end = state.runs.years[-1]
     first_ns = result.series.used[0].time_ns
@@ -457,13 +447,11 @@ def _since_cleaning(result: ShipTrend, state: HullState) -> Mixture:
     ]
     if not cleanings:
         assert result.now is not None
-        return Mixture(np.array([result.now.value]), np.array([result.now.sd]))
+        return result.now
     after = (cleanings[-1].time_ns - first_ns) / YEAR_NS
     both = state.level(np.array([after, end]))
     # two times of one curve move together: their errors add at most
-    return Mixture(
-        np.array([both.value[1] - both.value[0]]), np.array([float(np.hypot(*both.sd))])
-    )
+    return Parameter(float(both.value[1] - both.value[0]), float(np.hypot(*both.sd)))
 
 
 def _from_sisters(alone: Sequence[ShipTrend], place: int) -> Growth | None:

@@ -32,30 +32,23 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
     rows = []
     for trend in trends:
         costs = trend.costs
-        money = (
-            'costs [USD a year]',
-            '-' if costs is None else amount(costs.usd_per_year),
-        )
-        power = (
-            'effective power [kW]',
-            '-' if trend.power_kw is None else _plus_minus(trend.power_kw, 1.0),
-        )
-        burdens = (money, power) if are_priced(trends) else (power, money)  # what ranks first
+        money = {'costs [USD a year]': '-' if costs is None else amount(costs.usd_per_year)}
+        power = {'effective power [kW]': _plus_minus(trend.power_kw, 1.0)}
         rows.append(
-            (
-                ('rank', '-' if trend.rank is None else f'{trend.rank}'),
-                ('ship', trend.series.name),
-                *burdens,
-                ('added now [%]', percent(trend.now)),
-                ('speed lost [%]', _speed_lost(trend)),
-                ('fuel [t/day]', '-' if costs is None else amount(costs.fuel_t_per_day)),
-                ('growth [% a year]', percent(trend.growth_per_year)),
-                ('cleaning pays from', _cleaning(trend)),
-                ('runs used', f'{len(trend.series.used)} of {len(trend.series.points)}'),
-            )
+            {
+                'rank': '-' if trend.rank is None else f'{trend.rank}',
+                'ship': trend.series.name,
+                **(money | power if are_priced(trends) else power | money),  # what ranks first
+                'added now [%]': percent(trend.now),
+                'speed lost [%]': speed_lost_percent(_added(trend)),
+                'fuel [t/day]': '-' if costs is None else amount(costs.fuel_t_per_day),
+                'growth [% a year]': percent(trend.growth_per_year),
+                'cleaning pays from': _cleaning(trend),
+                'runs used': f'{len(trend.series.used)} of {len(trend.series.points)}',
+            }
         )
-    head = tuple(name for name, _ in rows[0]) if rows else ('rank', 'ship')
-    return Table(head, tuple(tuple(cell for _, cell in row) for row in rows))
+    head = tuple(rows[0]) if rows else ('rank', 'ship')
+    return Table(head, tuple(tuple(row.values()) for row in rows))
 
 
 def ranked_by(trends: Sequence[ShipTrend]) -> str:
@@ -121,7 +114,7 @@ def speed_loss(trend: ShipTrend) -> str:
     Power goes about as the cube of the speed; it is not the measure of ISO 19030, which needs
     shaft power.
     """
-    loss = None if trend.now is None else speed_lost(trend.now.value)
+    loss = speed_lost(_added(trend))
     return '' if loss is None else f', about {loss:.1%} of speed lost at equal effective power'
 
 
@@ -158,8 +151,15 @@ def event_table(trend: ShipTrend) -> Table:
     )
 
 
-def _speed_lost(trend: ShipTrend) -> str:
-    loss = None if trend.now is None else speed_lost(trend.now.value)
+def _added(trend: ShipTrend) -> float:
+    return np.nan if trend.now is None else trend.now.value
+
+
+def speed_lost_percent(added: float) -> str:
+    """
+    Return the speed lost at equal effective power in percent; '-' where it cannot be said.
+    """
+    loss = speed_lost(added)
     return '-' if loss is None else f'{100.0 * loss:.1f}'
 
 
@@ -167,10 +167,12 @@ def percent(found: Parameter | None) -> str:
     """
     Return a share and two standard deviations in percent; '-' where not known.
     """
-    return '-' if found is None else _plus_minus(found, 100.0)
+    return _plus_minus(found, 100.0)
 
 
-def _plus_minus(found: Parameter, unit: float) -> str:
+def _plus_minus(found: Parameter | None, unit: float) -> str:
+    if found is None:
+        return '-'
     return f'{found.value * unit:.1f} ± {2.0 * found.sd * unit:.1f}'
 
 
@@ -182,23 +184,11 @@ def _cleaning(trend: ShipTrend) -> str:
 
 
 COLUMNS = (
-    'ship',
-    'time',
-    'bag',
-    'used',
-    'reason',
-    'reference_speed_m_s',
-    'added_resistance',
-    'added_resistance_sd',
-    'resistance_kn',
-    'resistance_kn_sd',
-    'effective_power_kw',
-    'effective_power_kw_sd',
-    'usd_per_year',
-    'usd_per_year_sd',
+    *('ship', 'time', 'bag', 'used', 'reason', 'reference_speed_m_s'),
+    *('added_resistance', 'added_resistance_sd', 'resistance_kn', 'resistance_kn_sd'),
+    *('effective_power_kw', 'effective_power_kw_sd', 'usd_per_year', 'usd_per_year_sd'),
     'speed_loss_at_equal_effective_power',
-    'hull_added_resistance',
-    'hull_added_resistance_sd',
+    *('hull_added_resistance', 'hull_added_resistance_sd'),
 )
 """One row a coastdown: shares of the clean hull's resistance; `hull_` is the trend there.
 
@@ -220,9 +210,8 @@ def rows(trends: Sequence[ShipTrend]) -> list[dict[str, Any]]:
         speed, clean_n = trend.series.reference_speed_m_s, trend.series.clean_force_n
         per_unit = np.nan if trend.costs is None else trend.usd_per_unit
         for point in trend.points:
-            hull: list[float | None] = [None, None]
-            if trend.curve is not None:
-                curve = trend.curve
+            hull = [np.nan, np.nan]
+            if (curve := trend.curve) is not None:
                 hull = [
                     float(np.interp(point.time_ns, curve.time_ns, each, np.nan, np.nan))
                     for each in (curve.value, curve.sd)

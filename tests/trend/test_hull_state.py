@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend import hull_state as change_points
 from shipdrag_ros.trend.hull_state import (
@@ -12,7 +13,6 @@ from shipdrag_ros.trend.hull_state import (
     LEVEL_SD,
     Growth,
     HullState,
-    Mixture,
     Runs,
     Steps,
     search,
@@ -174,10 +174,6 @@ PRICES = Economics(
 )
 
 
-def known(value, sd):
-    return Mixture(np.array([value]), np.array([sd]))
-
-
 def test_fuel_and_money():
     # 600 kW effective are 1000 kW brake: 180 kg an hour
     assert fuel_t_per_day(PRICES, 600.0) == pytest.approx(4.32)
@@ -186,17 +182,19 @@ def test_fuel_and_money():
 
 def test_the_date_is_the_one_of_least_cost_a_year():
     per_unit, growth = 1.0e6, 0.1
-    found = cleaning_date(PRICES, per_unit, known(0.0, 1e-6), known(growth, 1e-6))
+    found = cleaning_date(PRICES, per_unit, Parameter(0.0, 1e-6), Parameter(growth, 1e-6))
     interval = np.linspace(0.2, 3.0, 2000)
     cost = (PRICES.cleaning_usd + 0.5 * per_unit * growth * interval**2) / interval
     assert found.years == pytest.approx(interval[cost.argmin()], abs=0.01)
 
 
 def test_what_is_due_is_due_now():
-    found = cleaning_date(PRICES, 1.0e6, known(0.4, 0.01), known(0.1, 0.01))
+    found = cleaning_date(PRICES, 1.0e6, Parameter(0.4, 0.01), Parameter(0.1, 0.01))
     assert (found.years, found.latest) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize('growth', [known(0.05, 0.1), known(-0.05, 0.01), known(0.002, 0.0005)])
+@pytest.mark.parametrize(
+    'growth', [Parameter(0.05, 0.1), Parameter(-0.05, 0.01), Parameter(0.002, 0.0005)]
+)
 def test_no_date_where_the_data_cannot_carry_one(growth):
-    assert cleaning_date(PRICES, 1.0e6, known(0.0, 0.02), growth) is None
+    assert cleaning_date(PRICES, 1.0e6, Parameter(0.0, 0.02), growth) is None
