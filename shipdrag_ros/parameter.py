@@ -126,6 +126,11 @@ class Prior:
             case _:
                 return a + b * z
 
+    @property
+    def typical(self) -> float:
+        """A value that is no rarity; a choice has none."""
+        return self.at(0.0) or self.at(1.0)
+
     def moments(self) -> tuple[float, float]:
         """
         Return mean and sd.

@@ -278,11 +278,6 @@ class TermParameter:
             return self.bounds[0], self.bounds[-1]
         return -_MOST if self.ends[0] < 0.0 else 0.0, _MOST
 
-    @property
-    def typical(self) -> float:
-        """A size that is no rarity, as it is counted."""
-        return self.expected.at(0.0) or self.expected.at(1.0)
-
 
 def as_found(value: float, sd: float) -> Prior:
     """

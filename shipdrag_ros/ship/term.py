@@ -67,9 +67,9 @@ _MOST_PARAMETERS = 6
 _ALIKE = 1e-6  # relative
 _MOSTLY_SD = 2.0  # of a prior, that must be inside of the bounds
 _SIZES: tuple[Callable[[TermParameter], float], ...] = (
-    lambda each: each.typical if each.value is None else each.value,
+    lambda each: each.expected.typical if each.value is None else each.value,
     lambda each: max(each.within(1.0), key=abs),
-    lambda each: each.typical,
+    lambda each: each.expected.typical,
 )
 """Sizes that are judged; by the last, how it changes too."""
 

@@ -52,19 +52,6 @@ class RudderMachine:
     lag_s: float
 
 
-@dataclass(frozen=True)
-class AddedMasses:
-    """
-    The five inertial derivatives: surge, sway force and yaw moment by accelerations.
-    """
-
-    Xudot: float
-    Yvdot: float
-    Yrdot: float
-    Nvdot: float
-    Nrdot: float
-
-
 @dataclass(frozen=True, kw_only=True)
 class SteeredShip:
     """
@@ -80,7 +67,9 @@ class SteeredShip:
     mass, yaw_inertia
     gravity_centre
         Ahead of amidships.
-    rudder, inertial
+    rudder
+    inertial
+        Surge and sway forces and yaw moment by accelerations.
     viscous
         Forces on the hull and the rudder, by the names of `FORM`.
     multiples
@@ -100,7 +89,7 @@ class SteeredShip:
     yaw_inertia: float
     gravity_centre: float
     rudder: RudderMachine
-    inertial: AddedMasses
+    inertial: Mapping[str, float]
     viscous: Mapping[str, float]
     multiples: Mapping[str, str]
 
@@ -156,8 +145,7 @@ def mariner() -> SteeredShip:
     """
     file = files('shipdrag_ros').joinpath('data', 'mariner.yaml')
     data = load(file.read_text(encoding='utf-8'))
-    rudder, inertial = RudderMachine(**data.pop('rudder')), AddedMasses(**data.pop('inertial'))
-    return SteeredShip(rudder=rudder, inertial=inertial, **data)
+    return SteeredShip(rudder=RudderMachine(**data.pop('rudder')), **data)
 
 
 class Side(StrEnum):
@@ -573,9 +561,9 @@ def steer(
 def _hull(ship: SteeredShip) -> HullModel:
     added, lever = ship.inertial, ship.mass * ship.gravity_centre
     inertia = [
-        [ship.mass - added.Xudot, 0.0, 0.0],
-        [0.0, ship.mass - added.Yvdot, lever - added.Yrdot],
-        [0.0, lever - added.Nvdot, ship.yaw_inertia - added.Nrdot],
+        [ship.mass - added['Xudot'], 0.0, 0.0],
+        [0.0, ship.mass - added['Yvdot'], lever - added['Yrdot']],
+        [0.0, lever - added['Nvdot'], ship.yaw_inertia - added['Nrdot']],
     ]
     mobility = np.asarray(np.linalg.inv(inertia), np.float64)
     machine = ship.rudder

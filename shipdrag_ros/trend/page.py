@@ -8,7 +8,6 @@ import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -331,7 +330,7 @@ def _mass_kg(row: CoastdownRow) -> float:
     return float(row['displaced_volume_m3'] * row['water_density_kg_m3'])
 
 
-def _known(row: CoastdownRow) -> np.ndarray[Any, np.dtype[np.intp]]:
+def _known(row: CoastdownRow) -> Int64:
     """Return the places of the grid where r is known."""
     r = np.asarray(row['resistance_m_s2'], dtype=float)
     return np.flatnonzero(np.isfinite(r) & (r > 0.0))

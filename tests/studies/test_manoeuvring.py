@@ -51,7 +51,7 @@ def test_a_published_table_has_the_same_values():
     if not folder:
         pytest.skip('SHIPDRAG_DATA is not set')
     ship = mariner()
-    stated = {**ship.viscous, **vars(ship.inertial)}
+    stated = {**ship.viscous, **ship.inertial}
     with (Path(folder) / 'mariner_derivatives.csv').open(encoding='utf-8') as file:
         table = {
             row['derivative']: float(row['value']) * float(row['unit_factor'])
@@ -141,14 +141,14 @@ def rates(state, ordered):
         force[name[0]] += value * np.prod([of[letter] for letter in name[1:]])
     m, added, lever = SHIP.mass, SHIP.inertial, SHIP.mass * SHIP.gravity_centre
     inertia = [
-        [m - added.Yvdot, lever - added.Yrdot],
-        [lever - added.Nvdot, SHIP.yaw_inertia - added.Nrdot],
+        [m - added['Yvdot'], lever - added['Yrdot']],
+        [lever - added['Nvdot'], SHIP.yaw_inertia - added['Nrdot']],
     ]
     sway, yaw = np.linalg.solve(inertia, [force['Y'], force['N']])
     machine = SHIP.rudder
     ahead, cos, sin = U + du, np.cos(heading), np.sin(heading)
     return [
-        force['X'] / (m - added.Xudot) * speed**2 / L,
+        force['X'] / (m - added['Xudot']) * speed**2 / L,
         sway * speed**2 / L,
         yaw * speed**2 / L**2,
         ahead * cos - v * sin,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.errors import SensitivityError, ShipdragError
-from shipdrag_ros.parameter import Parameter, Prior, Shape
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship, TableAddedMass, TableBaseline
 from shipdrag_ros.simulation import STANDARD_SD, Action, Effect, Frame, Scenario, simulate_columns
@@ -379,24 +379,11 @@ def _flat(readings: Float64) -> Float64:
 
 def _usual_values(effect: Effect, ship: Ship) -> tuple[float, ...]:
     """Return a usual size of an effect."""
-    quantities = effect.parameters_of(ship)
-    usual = [_usual(quantity.prior) for quantity in quantities]
+    size, *others = effect.parameters_of(ship)
     return (
-        usual[0],
-        *(q.value if q.is_given else one for q, one in zip(quantities[1:], usual[1:])),
+        size.prior.typical,
+        *(other.value if other.is_given else other.prior.typical for other in others),
     )
-
-
-def _usual(prior: Prior) -> float:
-    match prior.shape:
-        case Shape.NORMAL:
-            return prior.first or prior.second
-        case Shape.HALF_NORMAL:
-            return prior.second
-        case Shape.UNIFORM:
-            return 0.5 * (prior.first + prior.second)
-        case _:
-            return prior.first
 
 
 _CHECK_FRACTION = 0.85  # of the speed, in the check

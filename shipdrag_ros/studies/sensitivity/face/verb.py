@@ -15,9 +15,9 @@ Options
 --ship FILE
     ship file with a baseline, in its place
 --manoeuvre NAME
-    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {KIND} or
-    {KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {KIND} from
-    {_FRACTION:g} of the highest speed of the baseline)
+    zigzag:ANGLE or turn:ANGLE [degrees of rudder]; with --ship {coasting.KIND} or
+    {coasting.KIND}:SPEED [m/s] (default: {_MANOEUVRE}; with --ship {coasting.KIND} from
+    {coasting.SPEED_FRACTION:g} of the highest speed of the baseline)
 --keep N
     how many to keep (default: {_KEEP} derivatives; with --ship those values of which 10 per cent
     move the record beyond its noise)
@@ -39,29 +39,14 @@ from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.manoeuvring import Motions, mariner, meaning, parse
-from shipdrag_ros.studies.sensitivity.coasting import (
-    KIND,
-    SPEED_FRACTION,
-    parse_coast,
-    study_coast,
-)
-from shipdrag_ros.studies.sensitivity.face import coasting
-from shipdrag_ros.studies.sensitivity.steering import (
-    APPROACH_S,
-    CONTROL_S,
-    Experiment,
-    Observations,
-    ReducedModelCheck,
-    SteeringStudy,
-    experiment,
-    study,
-)
+from shipdrag_ros.studies.sensitivity import coasting, steering
+from shipdrag_ros.studies.sensitivity.face import coasting as face
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def ranking_picture(found: SteeringStudy) -> Figure:
+def ranking_picture(found: steering.SteeringStudy) -> Figure:
     """
     Draw the mean losses of all derivatives, the largest first.
     """
@@ -71,7 +56,7 @@ def ranking_picture(found: SteeringStudy) -> Figure:
         count = len(found.selection.kept)
         for part, color, label in (
             (slice(0, count), BLUE, 'kept'),
-            (slice(count, None), coasting.PALE, 'set to 0'),
+            (slice(count, None), face.PALE, 'set to 0'),
         ):
             axis.barh(places[part], losses.mean[losses.order][part], color=color, label=label)
         axis.plot(
@@ -92,7 +77,7 @@ def ranking_picture(found: SteeringStudy) -> Figure:
     return figure
 
 
-def check_picture(found: SteeringStudy) -> Figure:
+def check_picture(found: steering.SteeringStudy) -> Figure:
     """
     Draw heading and rudder, speeds and yaw rate of the full and the reduced models.
     """
@@ -123,7 +108,7 @@ def check_picture(found: SteeringStudy) -> Figure:
     return figure
 
 
-def design_picture(shown: Experiment) -> Figure:
+def design_picture(shown: steering.Experiment) -> Figure:
     """
     Draw the losses of all derivatives in all manoeuvres as a map.
     """
@@ -154,8 +139,8 @@ LOSSES = (
     'u, v and r, times 1000'
 )
 CHECK = (
-    f'The check; rudder amidships for {APPROACH_S:g} s, then first to starboard, the helmsman '
-    f'looks every {CONTROL_S:g} s; differences over the whole manoeuvre'
+    f'The check; rudder amidships for {steering.APPROACH_S:g} s, then first to starboard, the '
+    f'helmsman looks every {steering.CONTROL_S:g} s; differences over the whole manoeuvre'
 )
 DESIGN = (
     'Which manoeuvre shows which derivative: loss of 10 per cent, times 1000. Partial '
@@ -171,7 +156,7 @@ _RANKING, _CHECKED, _SAILED = (
 )
 
 
-def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
+def shown(found: steering.SteeringStudy, sailed: steering.Experiment) -> Presentation:
     """
     Return what is printed, and shown on a page.
 
@@ -217,7 +202,7 @@ def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
     )
 
 
-def sentence(found: SteeringStudy) -> str:
+def sentence(found: steering.SteeringStudy) -> str:
     """
     Say what is kept.
     """
@@ -229,11 +214,11 @@ def sentence(found: SteeringStudy) -> str:
     )
 
 
-def notes(found: SteeringStudy) -> tuple[str, ...]:
+def notes(found: steering.SteeringStudy) -> tuple[str, ...]:
     """
     Say what was done, what the losses look like, and what the number kept means.
     """
-    root, mean = Observations.of(found.losses), Observations.of(found.mean_norms)
+    root, mean = steering.Observations.of(found.losses), steering.Observations.of(found.mean_norms)
     agree = 'the same' if found.norms_agree else 'not quite the same'
     ship, kept = found.ship, found.selection.kept
     after = sum(ship.multiples.get(name) in kept for name in found.selection.dropped)
@@ -257,7 +242,7 @@ def notes(found: SteeringStudy) -> tuple[str, ...]:
     )
 
 
-def loss_table(found: SteeringStudy) -> Table:
+def loss_table(found: steering.SteeringStudy) -> Table:
     """
     Show the losses, the most important derivative first.
     """
@@ -277,7 +262,7 @@ def loss_table(found: SteeringStudy) -> Table:
     )
 
 
-def check_table(found: SteeringStudy) -> Table:
+def check_table(found: steering.SteeringStudy) -> Table:
     """
     Show how close the reduced models come.
     """
@@ -306,7 +291,7 @@ def check_table(found: SteeringStudy) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _degrees(check: ReducedModelCheck, model: int) -> tuple[str, ...]:
+def _degrees(check: steering.ReducedModelCheck, model: int) -> tuple[str, ...]:
     over = [f'{value:.2f}' for value in np.degrees(check.overshoots_rad[model])]
     over += ['-'] * (2 - len(over))
     if model == 0:
@@ -321,7 +306,7 @@ def _degrees(check: ReducedModelCheck, model: int) -> tuple[str, ...]:
     )
 
 
-def design_table(shown: Experiment) -> Table:
+def design_table(shown: steering.Experiment) -> Table:
     """
     Show which manoeuvre makes which derivative visible.
     """
@@ -341,7 +326,7 @@ def design_table(shown: Experiment) -> Table:
 
 
 _MODELS = {'mariner': mariner}
-_MODEL, _MANOEUVRE, _KEEP, _FRACTION = 'mariner', 'zigzag:15', 24, SPEED_FRACTION
+_MODEL, _MANOEUVRE, _KEEP = 'mariner', 'zigzag:15', 24
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -366,14 +351,15 @@ def run(options: argparse.Namespace) -> int:
     if options.ship is None:
         model = _MODELS[options.model or _MODEL]()
         manoeuvre = parse(_MANOEUVRE if asked is None else asked)
-        steered = study(model, manoeuvre, keep=_KEEP if keep is None else keep)
-        sailed = experiment(model)
+        steered = steering.study(model, manoeuvre, keep=_KEEP if keep is None else keep)
+        sailed = steering.experiment(model)
         seen = shown(steered, sailed)
         document = {**steered.to_dict(), 'experiment': sailed.to_dict()}
     else:
         ship = Ship.load(options.ship)
-        coasted = study_coast(ship, parse_coast(ship, KIND if asked is None else asked), keep=keep)
-        seen, document = coasting.shown(coasted), coasted.to_dict()
+        coast = coasting.parse_coast(ship, coasting.KIND if asked is None else asked)
+        coasted = coasting.study_coast(ship, coast, keep=keep)
+        seen, document = face.shown(coasted), coasted.to_dict()
     show(output, seen, options.report)
     output.json(document)
     return 0
