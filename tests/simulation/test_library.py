@@ -35,8 +35,6 @@ from shipdrag_ros.simulation.declared import effects_in
 from shipdrag_ros.simulation.effects import (
     LIBRARY,
     action_of,
-    confounders,
-    discriminating_measurements,
     parse,
     using,
 )
@@ -174,19 +172,6 @@ def test_a_prior_lies_in_what_is_accepted(name):
         draws = [quantity.prior.draw(rng) for _ in range(500)]
         assert np.mean([quantity.accepts(value) for value in draws]) > 0.95
         assert all(np.isfinite(quantity.prior.log_density(value)) for value in draws)
-
-
-def test_whatever_looks_alike_does_so_both_ways_and_only_mass_is_never_told():
-    undecided = set()
-    for name in LIBRARY:
-        for other in confounders(name):
-            assert name in confounders(other)
-            assert set(discriminating_measurements(name, other)) == set(
-                discriminating_measurements(other, name)
-            )
-            if not discriminating_measurements(name, other):
-                undecided |= {name, other}
-    assert undecided == {'added_mass', 'displacement'}
 
 
 @EACH

@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import ShipdragError, SimulationError
-from shipdrag_ros.ship import (
-    Air,
-    Propulsion,
-    Ship,
-    StatedEffect,
-    TableBaseline,
-    Water,
-)
+from shipdrag_ros.ship import Air, Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STOP, EngineOrder, GaussMarkov, Scenario, Turn, simulate
 from tests.runs import CARGO
 from tests.simulation.conftest import N_R, quadratic
@@ -201,15 +194,6 @@ def test_a_model_ship_is_followed_in_its_own_time_scale():
     np.testing.assert_allclose(
         truth.speed_through_water_m_s[-1], fine.speed_through_water_m_s[-1], rtol=1e-6
     )
-
-
-def test_fresh_water_makes_a_lighter_ship_of_the_same_hull():
-    fresh = replace(AT_ONCE, water=Water(1000.0, 1.14e-6))
-    scenario = Scenario(speed_m_s=8.2, lead_in_s=1.0)
-    at_sea = simulate(AT_ONCE, scenario).speed_through_water_m_s[-1]
-    in_river = simulate(fresh, scenario).speed_through_water_m_s[-1]
-    assert at_sea != in_river
-    np.testing.assert_allclose(in_river, at_sea, rtol=0.02)
 
 
 def test_a_baseline_that_ends_above_rest_ends_the_simulation():

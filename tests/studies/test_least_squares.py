@@ -94,11 +94,13 @@ def test_refuses_what_cannot_be_fitted(columns: np.ndarray, values: np.ndarray, 
         least_squares(columns, values)
 
 
-@pytest.mark.parametrize('n', [1, 5, 127, 128, 129, 5000])
-def test_same_gram_matrix(n: int) -> None:
-    rows = np.random.default_rng(1).normal(size=(n, 6)) * 10.0 ** np.arange(6)
+@pytest.mark.parametrize(
+    ('n', 'k'), [(1, 6), (5, 6), (127, 6), (128, 6), (129, 6), (5000, 6), (700, 165)]
+)
+def test_same_gram_matrix(n: int, k: int) -> None:
+    rows = np.random.default_rng(1).normal(size=(n, k)) * 10.0 ** (np.arange(k) % 6)
     factor = triangle(rows)
-    assert factor.shape == (6, 6)
+    assert factor.shape == (k, k)
     np.testing.assert_array_equal(factor, np.triu(factor))
     size = np.linalg.norm(rows, axis=0)
     np.testing.assert_allclose(
@@ -117,12 +119,6 @@ def test_residual_sum_without_cancellation() -> None:
     data = design @ [1e7, 3e6] + noise
     factor = triangle(np.column_stack([design, data]))
     np.testing.assert_allclose(factor[2, 2] ** 2, noise @ noise, rtol=1e-8)
-
-
-def test_many_columns() -> None:
-    rows = np.random.default_rng(4).normal(size=(700, 165))
-    factor = triangle(rows)
-    np.testing.assert_allclose(factor.T @ factor, rows.T @ rows, rtol=0.0, atol=1e-10)
 
 
 def test_inverse() -> None:
@@ -165,7 +161,6 @@ def test_published_surface_degrees() -> None:
     )
     np.testing.assert_allclose(table.f[2], 1.85, rtol=5e-3)
     np.testing.assert_allclose(table.p[2], 0.09, rtol=2e-2)
-    assert table.plateau() == 1
     assert plateau_order(table) == 15
 
 

@@ -30,7 +30,7 @@ from shipdrag_ros.studies.residual.fit import (
     leave_hulls_out,
     with_residual,
 )
-from tests.studies.residual.conftest import RIVER_SHIP
+from tests.studies.residual.conftest import NAMES, RIVER_SHIP
 
 Fleet = Callable[[int, int], Hulls]
 Resistance = Callable[[Hulls], Float64]
@@ -71,9 +71,7 @@ def test_outside_is_refused_with_the_reason(fleet: Fleet, resistance: Resistance
     hulls = fleet(40, 4)
     noise = np.random.default_rng(5).normal(size=len(hulls))
     found = fit_residual(hulls, resistance(hulls) * (1.0 + 0.01 * noise), form='sirotina')
-    middle = Hulls.of(
-        'q', ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'), np.array([[7.8, 4.1, 0.835, 0.005, 0.14]])
-    )
+    middle = Hulls.of('q', NAMES, np.array([[7.8, 4.1, 0.835, 0.005, 0.14]]))
     (inside,) = found.predict(middle)
     assert inside.inside
     assert abs(inside.value - resistance(middle)[0]) < 3.0 * inside.sd
@@ -127,7 +125,7 @@ def test_power_of_the_guard(fleet: Fleet, resistance: Resistance) -> None:
         own = np.repeat(1.0 + 0.03 * rng.normal(size=20), 8)
         found = fit_residual(hulls, resistance(hulls) * own, form='sirotina')
         rows = rng.uniform([5.1, 2.1, 0.78, -0.02, 0.07], [10.4, 6.2, 0.89, 0.03, 0.23], (30, 5))
-        asked = Hulls.of('q', ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'), rows)
+        asked = Hulls.of('q', NAMES, rows)
         truth = resistance(asked)
         for each, value in zip(found.predict(asked), truth):
             is_bad = abs(each.value / value - 1.0) > 0.15
@@ -211,8 +209,7 @@ def test_notes_say_what_is_doubtful(fleet: Fleet, resistance: Resistance) -> Non
 
 
 def hull() -> Hulls:
-    names = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
-    return Hulls.of('one', names, np.array([[8.0, 4.5, 0.85, 0.01, 0.13]]))
+    return Hulls.of('one', NAMES, np.array([[8.0, 4.5, 0.85, 0.01, 0.13]]))
 
 
 def test_sakhnovsky() -> None:
@@ -259,11 +256,11 @@ def test_terms_in_words_are_the_columns(form: RegressionForm) -> None:
 
 
 ROW = np.array([[8.18, 4.0, 0.851, 0.15]])
-NAMES = ('L_B', 'B_T', 'C_B', 'Fr')
+RATIOS = ('L_B', 'B_T', 'C_B', 'Fr')
 
 
 def test_the_missing_ratio_follows() -> None:
-    hulls = Hulls.of('one', NAMES, ROW)
+    hulls = Hulls.of('one', RATIOS, ROW)
     np.testing.assert_allclose(hulls.slenderness, [(8.18**2 * 4.0 / 0.851) ** (1 / 3)], rtol=1e-14)
     assert hulls.lcb is None
     slender = np.column_stack([ROW[:, :2], hulls.slenderness, ROW[:, 3:]])
@@ -272,7 +269,7 @@ def test_the_missing_ratio_follows() -> None:
 
 
 def test_contradictions_are_counted() -> None:
-    names = (*NAMES, 'slenderness')
+    names = (*RATIOS, 'slenderness')
     rows = np.array([[8.18, 4.0, 0.851, 0.15, 6.80], [8.18, 4.0, 0.851, 0.15, 6.0]])
     assert Hulls.of('two', names, rows).contradictions == 1
 
@@ -280,7 +277,7 @@ def test_contradictions_are_counted() -> None:
 @settings(max_examples=30, deadline=None)
 @given(st.floats(5.0, 10.0), st.floats(2.0, 8.0), st.floats(0.5, 0.9), st.floats(0.8, 1.25))
 def test_moves_keep_the_ratios_consistent(l_b: float, b_t: float, c_b: float, by: float) -> None:
-    hulls = Hulls.of('one', NAMES, np.array([[l_b, b_t, c_b, 0.15]]))
+    hulls = Hulls.of('one', RATIOS, np.array([[l_b, b_t, c_b, 0.15]]))
     for moved in (hulls.moved(by, LONGER), hulls.moved(by, FLATTER), hulls.moved(by, FASTER)):
         volume_ratio = moved.L_B**2 * moved.B_T / moved.C_B
         np.testing.assert_allclose(moved.slenderness**3, volume_ratio, rtol=1e-12)

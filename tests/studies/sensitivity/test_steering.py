@@ -9,7 +9,6 @@ import pytest
 from shipdrag_ros.errors import SensitivityError
 from shipdrag_ros.studies.manoeuvring import FORM, Manoeuvre, mariner, steer, turn, zigzag
 from shipdrag_ros.studies.sensitivity.face import coasting
-from shipdrag_ros.studies.sensitivity.face import verb as steering
 from shipdrag_ros.studies.sensitivity.face import verb as words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
@@ -128,7 +127,7 @@ def names(labels) -> list[str]:
 
 
 def test_bars_of_kept_and_dropped_derivatives(steered):
-    axis = steering.ranking_picture(steered).axes[0]
+    axis = words.ranking_picture(steered).axes[0]
     shown = [label.split()[-1] for label in names(axis.get_yticklabels())]
     assert shown == list(steered.losses.ranking)
     assert names(axis.get_yticklabels())[0] == 'yaw moment by rudder  Nd'
@@ -138,7 +137,7 @@ def test_bars_of_kept_and_dropped_derivatives(steered):
 
 
 def test_three_models_in_four_panels(steered):
-    figure = steering.check_picture(steered)
+    figure = words.check_picture(steered)
     assert [len(axis.lines) for axis in figure.axes] == [3, 3, 3, 3]
     legend = names(figure.legends[0].get_texts())
     assert legend == ['full', '24 derivatives kept', '18 measurements kept']
@@ -148,7 +147,7 @@ def test_three_models_in_four_panels(steered):
 
 def test_a_map_with_a_dot_at_the_best_manoeuvre():
     shown = experiment(mariner(), (zigzag(10.0), turn(35.0)))
-    axis = steering.design_picture(shown).axes[0]
+    axis = words.design_picture(shown).axes[0]
     assert names(axis.get_yticklabels()) == ['zigzag:10', 'turn:35']
     dots = axis.lines[0].get_ydata()
     assert [shown.manoeuvres[int(i)] for i in dots] == list(shown.best)

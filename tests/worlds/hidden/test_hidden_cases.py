@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import time
 from collections import Counter
 from pathlib import Path
@@ -15,20 +14,14 @@ from benchmarks.worlds.hidden import cases
 from benchmarks.worlds.hidden.effect import Leg
 from benchmarks.worlds.hidden.sailing import Disturbance, World, coasting_m_s2, sail
 from shipdrag_ros.ship import Ship
+from tests.test_architecture import imports
 
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'hidden'
 
 
 @pytest.mark.parametrize('path', sorted(FOLDER.glob('*.py')), ids=lambda path: path.name)
 def test_nothing_is_imported_from_the_package(path: Path) -> None:
-    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0
-            names = [node.module or '']
-        assert not [name for name in names if name.partition('.')[0] == 'shipdrag_ros']
+    assert not [name for name in imports(path) if name.partition('.')[0] == 'shipdrag_ros']
 
 
 def test_there_are_enough_of_every_kind() -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import pytest
 from benchmarks.worlds.hidden_b import cases, hulls
 from benchmarks.worlds.hidden_b.voyage import sail
 from benchmarks.worlds.hidden_b.weather import Sinusoids, gusts
+from tests.test_architecture import imports
 
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'hidden_b'
 
@@ -30,14 +30,8 @@ def base():
 
 @pytest.mark.parametrize('path', sorted(FOLDER.glob('*.py')), ids=lambda path: path.name)
 def test_it_shares_no_code(path: Path) -> None:
-    for node in ast.walk(ast.parse(path.read_text())):
-        names = []
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [node.module or '']
-        for name in names:
-            assert not name.startswith(('shipdrag_ros', 'benchmarks.worlds.hidden.')), name
+    others = 'shipdrag_ros', 'benchmarks.worlds.hidden.'
+    assert not [name for name in imports(path) if name.startswith(others)]
 
 
 @pytest.mark.parametrize('drive', ['declutched', 'direct', 'electric', 'cpp', 'locked', 'folding'])

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from benchmarks.worlds.propulsion.drive import (
 from benchmarks.worlds.propulsion.motion import Hold, Orders, Surroundings, move
 from benchmarks.worlds.propulsion.score import INPUTS, score
 from benchmarks.worlds.propulsion.world import build
+from tests.test_architecture import imports
 
 FOLDER = Path(__file__).resolve().parents[3] / 'benchmarks' / 'worlds' / 'propulsion'
 DOORS = {
@@ -46,17 +46,12 @@ def glides():
 
 
 def test_shares_only_the_doors() -> None:
-    imported = set()
-    for path in FOLDER.glob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom):
-                imported.add(node.module)
-            elif isinstance(node, ast.Import):
-                imported |= {name.name for name in node.names}
-    ours = {name for name in imported if name and name.startswith('shipdrag_ros')}
+    imported = {name for path in FOLDER.glob('*.py') for name in imports(path)}
+    ours = {name.rpartition('.')[0] for name in imported if name.startswith('shipdrag_ros')}
+    assert ours
     assert ours <= DOORS
     others = ('benchmarks.worlds.hidden', 'benchmarks.accuracy.onset')
-    assert not any(name and name.startswith(others) for name in imported)
+    assert not any(name.startswith(others) for name in imported)
 
 
 @pytest.mark.skipif('SHIPDRAG_DATA' not in os.environ, reason='measured data are not here')
