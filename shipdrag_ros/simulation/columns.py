@@ -170,13 +170,7 @@ def simulate_columns(
             over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
     return Columns(
-        time,
-        speed,
-        position,
-        velocity,
-        log,
-        radar[:, :, None] * position,
-        radar * over_ground,
+        time, speed, position, velocity, log, radar[:, :, None] * position, radar * over_ground
     )
 
 

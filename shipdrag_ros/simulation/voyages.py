@@ -193,13 +193,7 @@ class PlannedShip:
 
 
 def plan_fleet(
-    pattern: Ship,
-    *,
-    ships: int,
-    months: float,
-    every_days: float,
-    seed: int,
-    sound: bool = False,
+    pattern: Ship, *, ships: int, months: float, every_days: float, seed: int, sound: bool = False
 ) -> tuple[PlannedShip, ...]:
     """
     Plan the runs of a fleet.

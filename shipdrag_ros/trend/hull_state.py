@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 
@@ -150,6 +151,18 @@ class Mixture:
         return Parameter(float(self.value[0]), float(self.sd[0]))
 
 
+Part = tuple[Float64, Float64, Float64]  # weights (k,) or one; means and variances (m, k) or (m,)
+
+
+def _mixed(parts: Iterable[Part]) -> Mixture:
+    """Return the moments of what is a mixture of normal parts."""
+    mean = second = np.zeros(1)
+    for weight, value, variance in parts:
+        mean = mean + np.dot(value, weight)
+        second = second + np.dot(value**2 + variance, weight)
+    return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
+
+
 @dataclass(frozen=True)
 class Functional:
     """
@@ -210,24 +223,29 @@ class HullState:
         self._noise = [runs.sd**2 + scatter**2 for scatter, _, _ in self._settings]
         self._precision = [np.zeros((0, 0))] * len(self._settings)
         log_posterior = np.full(len(self._settings), -np.inf)
-        solved = list(range(len(self._settings)))
+        solved: Sequence[int] = range(len(self._settings))
         for _ in range(_ROUNDS):
-            for number in solved:
-                log_posterior[number] = self._solve(number)
-            self._weigh(log_posterior)
+            self._solve(solved, log_posterior)
             before, self.outlier = self.outlier, self._outliers()
             if float(np.abs(self.outlier - before).max()) < 0.02:
                 break
             # what weighs nothing says nothing of outliers
             solved = np.flatnonzero(self.weights > _NEGLIGIBLE).tolist()
-        for number in range(len(self._settings)):
-            log_posterior[number] = self._solve(number)
-        self._weigh(log_posterior)
+        self._solve(range(len(self._settings)), log_posterior)
         self.scatter = float(
             self.weights @ np.array([scatter for scatter, _, _ in self._settings])
         )
 
-    def _solve(self, number: int) -> float:
+    def _solve(self, numbers: Sequence[int], log_posterior: Float64) -> None:
+        """Solve for some settings, set the weights of all, and the evidence."""
+        for number in numbers:
+            log_posterior[number] = self._solve_one(number)
+        top = log_posterior.max()
+        raw = np.exp(log_posterior - top)
+        self.log_evidence = float(top + np.log(raw.sum()))
+        self.weights = raw / raw.sum()
+
+    def _solve_one(self, number: int) -> float:
         """Solve for a setting under the present probabilities of outliers; return its log
         posterior, but for a constant.
         """
@@ -248,13 +266,6 @@ class HullState:
             - 0.5 * np.log(weight).sum()
             + self._log_prior[number]
         )
-
-    def _weigh(self, log_posterior: Float64) -> None:
-        """Set the weights of the settings, and the evidence."""
-        top = log_posterior.max()
-        raw = np.exp(log_posterior - top)
-        self.log_evidence = float(top + np.log(raw.sum()))
-        self.weights = raw / raw.sum()
 
     def _outliers(self) -> Float64:
         """Return how probable each run is an outlier, from what the others predict."""
@@ -343,13 +354,9 @@ class HullState:
 
     def _averaged(self, asked: Functional) -> Mixture:
         """Return the posterior of functionals, over all settings."""
-        mean = np.zeros(len(asked.columns))
-        second = np.zeros(len(asked.columns))
-        for number in np.flatnonzero(self.weights > _NEGLIGIBLE).tolist():
-            value, variance, _ = self.given(number, asked)
-            mean += self.weights[number] * value
-            second += self.weights[number] * (value**2 + variance)
-        return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
+        counting = np.flatnonzero(self.weights > _NEGLIGIBLE).tolist()
+        parts = ((self.weights[number], *self.given(number, asked)[:2]) for number in counting)
+        return _mixed(parts)
 
     def level(self, years: Float64) -> Mixture:
         """
@@ -546,21 +553,18 @@ class OneMore:
         down, up : (k, m)
             How much a jump at each place counts in each.
         """
-        mean = np.zeros(len(asked.columns))
-        second = np.zeros(len(asked.columns))
+        return _mixed(self._parts(asked, down, up))
+
+    def _parts(self, asked: Functional, down: Float64, up: Float64) -> Iterator[Part]:
         for number in np.flatnonzero(self._share > _UNLIKELY).tolist():
             value, variance, gain = self.state.given(number, asked)
-            mean += self._none[number] * value
-            second += self._none[number] * (value**2 + variance)
+            yield self._none[number], value, variance
             seen = gain @ self._after
             for kind, (size, _) in enumerate(self._kinds):
-                odds = self._odds[number, kind]
                 moves = (up if size > 0.0 else down) - seen
                 moved = value[:, None] + moves * self._mean[number, kind]
                 spread = variance[:, None] + moves**2 * self._variance[number, kind]
-                mean += moved @ odds
-                second += (moved**2 + spread) @ odds
-        return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
+                yield self._odds[number, kind], moved, spread
 
 
 @dataclass(frozen=True)

@@ -58,10 +58,7 @@ def write_trends(
 
 
 def fleet_text(
-    trends: Sequence[ShipTrend],
-    skipped: Sequence[tuple[str, str]],
-    *,
-    links: Links | None = None,
+    trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]], *, links: Links | None = None
 ) -> str:
     """
     Return the trends of a fleet as one page (HTML).
@@ -400,9 +397,7 @@ def _curve(row: CoastdownRow) -> list[display.Section]:
     caption = 'Resistance and effective power; ± is two standard deviations, of the run alone'
     return [
         display.Section(
-            'What she needed',
-            pictures=(coastdown_curve(row),),
-            tables=((caption, table),),
+            'What she needed', pictures=(coastdown_curve(row),), tables=((caption, table),)
         )
     ]
 

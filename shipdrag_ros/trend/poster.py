@@ -82,11 +82,7 @@ def poster(ship: Ship, rows: Sequence[Mapping[str, Any]]) -> Poster:
             time, distance, sigma = np.array(found).T
             steps.append(
                 SpeedStep(
-                    float(high),
-                    float(low),
-                    len(found),
-                    _band(time, sigma),
-                    _band(distance, sigma),
+                    float(high), float(low), len(found), _band(time, sigma), _band(distance, sigma)
                 )
             )
     return Poster(ship, tuple(int(row['time_ns']) for row in used), tuple(steps))

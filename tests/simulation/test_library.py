@@ -32,12 +32,7 @@ from shipdrag_ros.simulation import (
 )
 from shipdrag_ros.simulation import effects as library
 from shipdrag_ros.simulation.declared import effects_in
-from shipdrag_ros.simulation.effects import (
-    LIBRARY,
-    action_of,
-    parse,
-    using,
-)
+from shipdrag_ros.simulation.effects import LIBRARY, action_of, parse, using
 from tests.runs import CARGO
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,8 +14,7 @@ from shipdrag_ros.simulation.effect import Frame
 def _act(frame: Frame, force_n: float, side: float, wave_length_m: float) -> Action:
     frequency = sqrt(2.0 * pi * GRAVITY_M_S2 / wave_length_m)
     return Action(
-        wave_force_n=frame.earth(-side * force_n, 0.0),
-        wave_encounter_s_m=frequency / GRAVITY_M_S2,
+        wave_force_n=frame.earth(-side * force_n, 0.0), wave_encounter_s_m=frequency / GRAVITY_M_S2
     )
 
 

@@ -179,10 +179,7 @@ def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     )
     tail = np.cumsum((projected**2)[::-1])[::-1]
     table = OrderTable.of(
-        np.arange(1, basis.order + 1),
-        tail[1:],
-        rows=int(counts.sum()),
-        rounding=rounding(squares),
+        np.arange(1, basis.order + 1), tail[1:], rows=int(counts.sum()), rounding=rounding(squares)
     )
     row, trusted, notes = _choose(table, float(all(data.known_sigma for data in inputs)))
     order = int(table.coefficients[row])

@@ -70,9 +70,9 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
     yield _field('displaced_volume_m3', ship)
     if isinstance(base, CoefficientBaseline):
         yield _field('wetted_surface_m2', ship)
-    yield _field('density_kg_m3', ship, section='water')
+    yield _field('water.density_kg_m3', ship)
     if isinstance(base, CoefficientBaseline):
-        yield _field('kinematic_viscosity_m2_s', ship, section='water')
+        yield _field('water.kinematic_viscosity_m2_s', ship)
     n_r = float(ship.n_r(speed_m_s))
     # where coastdowns have shown the retardation, the error of n_r is no part of it
     counts = base is None or base.relative_sd_of == 'resistance'
@@ -80,20 +80,20 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
         'added_mass', n_r, ship.added_mass.sd / n_r if counts else np.nan, _added_mass
     )
     if ship.air is not None:
-        yield _field('frontal_area_m2', ship, section='air')
-        yield _field('drag_coefficient', ship, section='air')
+        yield _field('air.frontal_area_m2', ship)
+        yield _field('air.drag_coefficient', ship)
     if ship.propulsion is not None and ship.propulsion.run_down_s > 0.0:
         sd = ship.propulsion.sd / ship.propulsion.run_down_s
-        yield _field('run_down_s', ship, section='propulsion', sd=sd or np.nan)
+        yield _field('propulsion.run_down_s', ship, sd=sd or np.nan)
     if isinstance(base, CoefficientBaseline):
-        yield _field('form_factor', ship, section='baseline')
-        yield _field('correlation_allowance', ship, section='baseline')
+        yield _field('baseline.form_factor', ship)
+        yield _field('baseline.correlation_allowance', ship)
         yield Particular('baseline.C_V', np.nan, base.relative_sd.friction, _viscous)
         if any(base.wave_coefficient):
             wave = base.relative_sd.wave
-            yield _field('wave_coefficient', ship, section='baseline', sd=wave)
+            yield _field('baseline.wave_coefficient', ship, sd=wave)
     elif isinstance(base, TableBaseline):
-        yield _field('resistance_n', ship, section='baseline', sd=base.relative_sd)
+        yield _field('baseline.resistance_n', ship, sd=base.relative_sd)
     for effect in ship.effects:
         for name, stated in effect.parameters.items():
             sd = stated.sd / abs(stated.value) if stated.sd and stated.value else np.nan
@@ -101,22 +101,19 @@ def _listed(ship: Ship, speed_m_s: float) -> Iterator[Particular]:
             yield Particular(key, stated.value, sd, _effect(effect.name, name))
 
 
-def _field(name: str, ship: Ship, *, section: str = '', sd: float = np.nan) -> Particular:
+def _field(key: str, ship: Ship, *, sd: float = np.nan) -> Particular:
     """Return a number of the ship or of a section of hers, or all numbers of a table there."""
+    section, _, name = key.rpartition('.')
 
     def scaled(changed: Ship, factor: float) -> Ship:
-        if not section:
-            return replace(changed, **{name: factor * getattr(changed, name)})
-        part: Any = getattr(changed, section)
+        part: Any = getattr(changed, section) if section else changed
         value = getattr(part, name)
-        if isinstance(value, tuple):
-            value = tuple(factor * each for each in value)
-        else:
-            value *= factor
-        return replace(changed, **{section: replace(part, **{name: value})})
+        is_table = isinstance(value, tuple)
+        value = tuple(factor * each for each in value) if is_table else factor * value
+        part = replace(part, **{name: value})
+        return replace(changed, **{section: part}) if section else part
 
     value = getattr(getattr(ship, section) if section else ship, name)
-    key = f'{section}.{name}' if section else name
     return Particular(key, np.nan if isinstance(value, tuple) else float(value), sd, scaled)
 
 
@@ -199,11 +196,7 @@ class Coast:
         """
         speed = self.scenario.speed_m_s if speed_m_s is None else speed_m_s
         columns = simulate_columns(
-            ship,
-            self.scenario,
-            actions,
-            self.time_s,
-            speed_m_s=np.full(len(actions), speed),
+            ship, self.scenario, actions, self.time_s, speed_m_s=np.full(len(actions), speed)
         )
         place = columns.radar_position_m / POSITION_SD_M
         return np.concatenate([columns.log_m_s[..., None] / LOG_SD_M_S, place], axis=-1)

@@ -447,11 +447,7 @@ def _check(points: Float64, inputs: Sequence[str], levels: Sequence[int]) -> Non
 
 
 def fit_surface(
-    points: Float64,
-    values: Float64,
-    *,
-    inputs: Sequence[str],
-    max_degree: int = MAX_DEGREE,
+    points: Float64, values: Float64, *, inputs: Sequence[str], max_degree: int = MAX_DEGREE
 ) -> Surface:
     """
     Fit surfaces of growing degree and choose one.

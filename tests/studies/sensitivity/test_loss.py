@@ -9,13 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import SensitivityError
-from shipdrag_ros.studies.sensitivity.loss import (
-    CHANGES,
-    Losses,
-    Norm,
-    partial_contribution,
-    vary,
-)
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution, vary
 
 TIME = np.linspace(0.0, 2.0, 50)
 NAMES = ('size', 'rate', 'phase')
