@@ -77,16 +77,14 @@ class Observations:
 @dataclass(frozen=True)
 class ReducedModelCheck:
     """
-    A manoeuvre of the full and of a reduced model.
+    `CHECKED_BY` of the full and of a reduced model.
 
     Attributes
     ----------
-    manoeuvre
     full, reduced
         Their motions.
     """
 
-    manoeuvre: Manoeuvre
     full: Motions
     reduced: Motions
 
@@ -94,7 +92,7 @@ class ReducedModelCheck:
     def overshoots_rad(self) -> tuple[Float64, Float64]:
         """First and second, of the full and of the reduced model; fewer where there are fewer."""
         full, reduced = (
-            overshoots_rad(motion, self.manoeuvre)[:2] for motion in (self.full, self.reduced)
+            overshoots_rad(each, CHECKED_BY)[:2] for each in (self.full, self.reduced)
         )
         return full, reduced
 
@@ -151,7 +149,7 @@ class SteeringStudy:
             'loss': self.losses.to_dict(),
             **asdict(self.selection),
             'check': {
-                'manoeuvre': self.check.manoeuvre.name,
+                'manoeuvre': CHECKED_BY.name,
                 'overshoot_full_deg': np.degrees(full),
                 'overshoot_reduced_deg': np.degrees(reduced),
                 'rms_difference': self.check.rms_difference,
@@ -245,19 +243,17 @@ def respond(
     return vary(simulate, names, np.ones(len(names)), np.tile(changes, (len(names), 1)))
 
 
-def check(
-    ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHECKED_BY
-) -> ReducedModelCheck:
+def check(ship: SteeredShip, kept: Sequence[str]) -> ReducedModelCheck:
     """
-    Sail a manoeuvre without the derivatives that are not kept.
+    Sail a zigzag without the derivatives that are not kept.
 
     The helmsman looks every `CONTROL_S` after an approach of `APPROACH_S`, as in
     published figures.
     """
     reduced = np.where([name in kept for name in FORM], ship.values, 0.0)
     sets = np.array([ship.values, reduced])
-    both = steer(ship, manoeuvre, sets, control_s=CONTROL_S, approach_s=APPROACH_S)
-    return ReducedModelCheck(manoeuvre, both[0], both[1])
+    both = steer(ship, CHECKED_BY, sets, control_s=CONTROL_S, approach_s=APPROACH_S)
+    return ReducedModelCheck(both[0], both[1])
 
 
 def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStudy:

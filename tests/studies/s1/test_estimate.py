@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import perm
 
 import numpy as np
 import pytest
@@ -56,34 +57,25 @@ def exact_joint(
     scale = TimeScale.of(position.time_ns, speed.time_ns)
     half_s = Fraction(scale.span_ns, 2 * 10**9)
 
-    def rows(data: ScalarInput, derivative: int) -> list[tuple[list[Fraction], Fraction]]:
-        weight = 1 / Fraction(data.known_sigma)
-        result = []
-        for time_ns, value in zip(data.time_ns, data.value):
-            t = Fraction(2 * (int(time_ns) - scale.first_ns) - scale.span_ns, scale.span_ns)
-            if derivative:
-                row = [Fraction(0)] + [j * t ** (j - 1) / half_s for j in range(1, order)]
-            else:
-                row = [t**j for j in range(order)]
-            result.append(([weight * a for a in row], weight * Fraction(float(value))))
-        return result
+    def powers(t: Fraction, derivative: int) -> np.ndarray:
+        """Return a derivative of 1, t, t^2, .."""
+        row = [perm(j, derivative) * t ** max(j - derivative, 0) for j in range(order)]
+        return np.array(row) / half_s**derivative
 
-    data = rows(position, 0) + rows(speed, 1)
-    matrix = [
-        [sum(row[i] * row[j] for row, _ in data) for j in range(order)]
-        + [sum(row[i] * z for row, z in data)]
-        for i in range(order)
-    ]
+    rows = []
+    for data, derivative in ((position, 0), (speed, 1)):
+        weight = 1 / Fraction(data.known_sigma)
+        for time_ns, value in zip(data.time_ns.tolist(), data.value.tolist()):
+            t = Fraction(2 * (time_ns - scale.first_ns) - scale.span_ns, scale.span_ns)
+            rows.append(weight * np.append(powers(t, derivative), Fraction(value)))
+    design = np.array(rows)
+    matrix = design[:, :-1].T @ design
     for i in range(order):
-        matrix[i] = [a / matrix[i][i] for a in matrix[i]]
+        matrix[i] /= matrix[i, i]
         for k in range(order):
             if k != i:
-                matrix[k] = [a - matrix[k][i] * b for a, b in zip(matrix[k], matrix[i])]
-    p = [row[-1] for row in matrix]
-    speeds = [sum(j * p[j] * t ** (j - 1) for j in range(1, order)) / half_s for t in at]
-    accelerations = [
-        sum(j * (j - 1) * p[j] * t ** (j - 2) for j in range(2, order)) / half_s**2 for t in at
-    ]
+                matrix[k] -= matrix[k, i] * matrix[i]
+    speeds, accelerations = ([powers(t, d) @ matrix[:, -1] for t in at] for d in (1, 2))
     return speeds, accelerations
 
 

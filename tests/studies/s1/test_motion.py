@@ -40,21 +40,16 @@ def exact(
     times: list[Fraction], values: list[Fraction], order: int
 ) -> tuple[list[Fraction], list[Fraction]]:
     """Coefficients and sums of squared residuals in rational arithmetic."""
-    columns = [[Fraction(1)] * len(times)]
-    norms = [Fraction(len(times))]
-    for j in range(order - 1):
-        h = columns[j]
-        alpha = sum(t * a * a for t, a in zip(times, h)) / norms[j]
-        beta = norms[j] / norms[j - 1] if j else Fraction(0)
-        before = columns[j - 1] if j else h
-        columns.append([(t - alpha) * a - beta * b for t, a, b in zip(times, h, before)])
-        norms.append(sum((a * a for a in columns[-1]), Fraction(0)))
-    coefficients, sse, residual = [], [], values
-    for column, norm in zip(columns, norms):
-        p = sum(a * z for a, z in zip(column, values)) / norm
-        residual = [z - p * a for z, a in zip(residual, column)]
-        coefficients.append(p)
-        sse.append(sum((z * z for z in residual), Fraction(0)))
+    t, residual = np.array(times), np.array(values)
+    coefficients, sse = [], []
+    h, before, norm_before = t**0, 0 * t, Fraction(1)
+    for _ in range(order):
+        norm = h @ h
+        coefficients.append(h @ residual / norm)
+        residual = residual - coefficients[-1] * h
+        sse.append(residual @ residual)
+        alpha, beta = (t * h) @ h / norm, norm / norm_before
+        h, before, norm_before = (t - alpha) * h - beta * before, h, norm
     return coefficients, sse
 
 

@@ -175,7 +175,7 @@ def shown(found: steering.SteeringStudy, sailed: steering.Experiment) -> Present
         )
         yield _RANKING, ranking_picture(found), ranking
         checked = (
-            f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
+            f'{steering.CHECKED_BY.name} of the full and of the reduced models: lines that lie '
             'on each other show that what was left out is not missed.'
         )
         yield _CHECKED, check_picture(found), checked
@@ -278,7 +278,7 @@ def check_table(found: steering.SteeringStudy) -> Table:
         ),
     ]
     heads = (
-        found.check.manoeuvre.name,
+        steering.CHECKED_BY.name,
         'derivatives',
         'measurements',
         'overshoot 1 [deg]',
