@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -122,18 +123,17 @@ def table(found: Poster) -> Table:
     Show a line a step, with time and way from the highest speed on.
     """
     mass = found.ship.mass_kg
+    ways = partial(way, mass_kg=mass)
     rows, time, distance = [], 0.0, 0.0
     for each in found.steps:
         time, distance = time + each.time_s.median, distance + each.way_m.median
         rows.append(
             (
                 f'{ship_speed(each.from_m_s, mass)} to {ship_speed(each.to_m_s, mass)}',
-                f'{clock(each.time_s.median)} ({clock(each.time_s.low)} to '
-                f'{clock(each.time_s.high)})',
-                f'{way(each.way_m.median, mass)} ({way(each.way_m.low, mass)} to '
-                f'{way(each.way_m.high, mass)})',
+                '{} ({} to {})'.format(*map(clock, each.time_s)),
+                '{} ({} to {})'.format(*map(ways, each.way_m)),
                 clock(time),
-                way(distance, mass),
+                ways(distance),
                 f'{each.runs}',
             )
         )

@@ -16,7 +16,6 @@ from shipdrag_ros.samples import Float64
 
 FIRST_MONTHS_NS = 90 * 86_400_000_000_000
 YEAR_NS = 365.25 * 86_400e9
-_ALONE_NS = YEAR_NS
 _LENGTH_TOLERANCE = 0.02  # between ship files of one ship
 _MANY_RUNS = 5  # of fewer each may stand alone
 _FEW_SHARE = 0.1  # of all runs: so many may one wrong clock have dated, if ...
@@ -238,7 +237,7 @@ def _of_wrong_clocks(points: list[Point], rows: Sequence[CoastdownRow]) -> dict[
     """Return the few runs that are years from most of the others: their clock was wrong."""
     used = [number for number, point in enumerate(points) if point.used]
     times = np.array([points[number].time_ns for number in used])
-    groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > _ALONE_NS) + 1)
+    groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > YEAR_NS) + 1)
     most = max(groups, key=len)
     # a ship that coasts once in a year or two has no season that most runs are in
     if len(times) < _MANY_RUNS or len(most) < _MOST_SHARED * len(times):

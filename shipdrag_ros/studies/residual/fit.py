@@ -362,10 +362,7 @@ class ResidualFit:
         for text, wrong in self._wrong_trends(hulls):
             for i in np.flatnonzero(wrong).tolist():
                 reasons[i].append(f'against physics: resistance {text}, here it does not')
-        return [
-            Prediction(float(each), float(spread), tuple(why))
-            for each, spread, why in zip(value, sd, reasons)
-        ]
+        return Prediction.each(value, sd, reasons)
 
     def _wrong_trends(self, hulls: Hulls) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         for expected in EXPECTATIONS:

@@ -218,6 +218,16 @@ class Prediction:
     sd: float
     reasons: tuple[str, ...]
 
+    @classmethod
+    def each(
+        cls, values: Float64, sds: Float64, reasons: Sequence[Sequence[str]]
+    ) -> list[Prediction]:
+        """
+        Return predictions at several points.
+        """
+        rows = zip(values.tolist(), sds.tolist(), reasons)
+        return [cls(value, sd, tuple(why)) for value, sd, why in rows]
+
     @property
     def inside(self) -> bool:
         """The fit may be used here."""
@@ -399,12 +409,7 @@ class Surface:
         scaled = (points - self.polynomial.centre) / self.polynomial.half
         leverage = self.fit.leverage(monomials(scaled, self.polynomial.powers))
         sd = np.sqrt(self.fit.variance * (1.0 + leverage))
-        return [
-            Prediction(float(value), float(each), tuple(reasons))
-            for value, each, reasons in zip(
-                self.polynomial(points), sd, self.domain.reasons(points)
-            )
-        ]
+        return Prediction.each(self.polynomial(points), sd, self.domain.reasons(points))
 
     def source(self, name: str) -> str:
         """

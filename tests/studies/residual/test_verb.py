@@ -56,9 +56,12 @@ def test_json_to_the_letter(table: Path, tmp_path, capsys) -> None:
     assert not bad['inside']
     assert 'L_B 20 is outside' in bad['reasons'][0]
     assert 'NO: L_B 20' in shown.err
+    assert '40 hulls, 320 rows' in shown.err
+    assert 'Of 2 predictions 1 may be used' in shown.err
     text = page.read_text()
     assert text.count('data:image/svg+xml') == 2
     assert 'L_B 20 is outside' in text
+    assert '(10 C_B - 8.19)²' in text
 
 
 @pytest.mark.parametrize('form', ['sakhnovsky', 'auto'])

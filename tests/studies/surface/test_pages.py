@@ -71,19 +71,6 @@ def test_page_of_a_surface(variables: int, tmp_path: Path) -> None:
     assert all(note in text for note in found.notes)
 
 
-def test_page_of_a_regression(residual: tuple[ResidualFit, Float64], tmp_path: Path) -> None:
-    found, values = residual
-    page = tmp_path / 'page.html'
-    shown = words.shown(found, [REFUSED], values, target='c_R', source='models.csv')
-    show(Output(), shown, page)
-    text = page.read_text()
-    assert text.count('data:image/svg+xml') == 2
-    assert 'Of 1 predictions 0 may be used' in text
-    assert '20 hulls, 120 rows' in text
-    assert words.coefficients(found).rows[14][0] == '(10 C_B - 8.19)²'
-    assert words.domain(found).rows[3] == ('Fr', '0.1', '0.2')
-
-
 def test_hulls_that_others_leave_open_have_no_picture(residual, tmp_path):
     found, values = residual
     few = np.arange(len(values)) < 36
