@@ -231,10 +231,11 @@ def run_trend(options: argparse.Namespace) -> int:
         output.log(f'rows in {file}')
     _show_trends(output, trends, skipped)
     if options.report is not None:
-        from shipdrag_ros.trend.page import write_trends  # pictures take long to import
+        from shipdrag_ros.trend.page import fleet_text  # pictures take long to import
 
         links = None if options.pages is None else _write_pages(output, options)
-        write_trends(options.report, trends, skipped, links=links)
+        text = fleet_text(trends, skipped, links=links)
+        options.report.write_text(text, encoding='utf-8')
         output.log(f'report in {options.report}')
     output.json(Trends(tuple(trends), tuple(skipped)).to_dict())
     return 0

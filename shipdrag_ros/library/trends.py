@@ -136,10 +136,10 @@ class Trends(Shown):
         path
             HTML file; an existing one is replaced.
         """
-        from shipdrag_ros.trend.page import write_trends
+        from shipdrag_ros.trend.page import fleet_text
 
         with writing(path) as page:
-            write_trends(page, list(self.ships), list(self.skipped))
+            page.write_text(fleet_text(self.ships, self.skipped), encoding='utf-8')
 
     def _title(self) -> str:
         if not self.ships:

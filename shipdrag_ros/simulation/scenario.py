@@ -244,14 +244,10 @@ class Scenario:
             corners = (-self.lead_in_s, *turn.corners_s)
             if not all(early <= late for early, late in pairwise(corners)):
                 yield f'a turn is at {turn.corners_s}, expected ascending and within the record'
-        fractions = [value for order in self.orders for value in (order.shaft, order.thrust)]
+        fractions = [(order.shaft, order.thrust) for order in self.orders]
         if not np.all(np.isfinite(fractions)):
             yield f'orders are {self.orders!r}, expected finite fractions'
-        rates = [
-            value
-            for turn in self.turns
-            for value in (turn.rate_rad_s, turn.drag_area_m2, turn.rudder_rad)
-        ]
+        rates = [(turn.rate_rad_s, turn.drag_area_m2, turn.rudder_rad) for turn in self.turns]
         if not np.all(np.isfinite(rates)):
             yield f'turns are {self.turns!r}, expected finite values'
         for name in ('water_speed', 'gust_force'):

@@ -98,8 +98,6 @@ class LinearFit:
         Row i: the combination of scaled columns that belongs to `singular[i]`.
     rank
         How many combinations of the coefficients the data determine.
-    leverages : (n,)
-        Of the data.
     """
 
     coefficients: Float64
@@ -108,7 +106,6 @@ class LinearFit:
     singular: Float64
     directions: Float64
     rank: int
-    leverages: Float64
 
     @cached_property
     def sse(self) -> float:
@@ -228,7 +225,6 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
     factor = triangle(np.column_stack([scaled, residuals]))
     solved += root.T @ (left[:, :rank].T @ factor[:-1, -1])
     residuals = values - scaled @ solved
-    basis = scaled @ root.T
     return LinearFit(
         coefficients=solved / scale,
         residuals=residuals,
@@ -236,7 +232,6 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
         singular=singular,
         directions=directions,
         rank=rank,
-        leverages=np.sum(basis * basis, axis=1),
     )
 
 

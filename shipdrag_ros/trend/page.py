@@ -7,7 +7,6 @@ import json
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -40,21 +39,6 @@ _HOW = display.Section(
         '19030, which compares shaft power and so counts the propeller too.',
     ),
 )
-
-
-def write_trends(
-    path: Path,
-    trends: Sequence[ShipTrend],
-    skipped: Sequence[tuple[str, str]],
-    *,
-    links: Links | None = None,
-) -> None:
-    """
-    Write the trends of a fleet to an HTML file; an existing one is replaced.
-
-    The other parameters are those of `fleet_text`.
-    """
-    path.write_text(fleet_text(trends, skipped, links=links), encoding='utf-8')
 
 
 def fleet_text(

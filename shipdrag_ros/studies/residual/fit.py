@@ -348,7 +348,7 @@ class ResidualFit:
         sd = self.spread * np.sqrt(self.fit.variance * (1.0 + leverage))
         sd[is_open] = np.inf
         reasons = self.domain.reasons(self.form.place(hulls))
-        most = float(self.fit.leverages.max())
+        most = float(self.fit.leverage(self.form.columns(self.hulls)).max())
         for i, why in enumerate(reasons):
             if is_open[i]:
                 why.append(
@@ -434,17 +434,18 @@ def leave_hulls_out(
     """
     groups = hulls.groups()
     error, sd, leverage = (np.full(len(values), np.nan) for _ in range(3))
+    columns = form.columns(hulls)
     for number in range(groups.max() + 1):
         out = groups == number
         if out.all():
             continue
-        fit = least_squares(form.columns(hulls.take(~out)), values[~out])
-        columns = form.columns(hulls.take(out))
-        known = fit.undetermined(columns) <= OPEN
-        size = fit.leverage(columns)
-        error[out] = np.where(known, fit.predict(columns) - values[out], np.nan)
+        others, left_out = columns[~out], columns[out]
+        fit = least_squares(others, values[~out])
+        known = fit.undetermined(left_out) <= OPEN
+        size = fit.leverage(left_out)
+        error[out] = np.where(known, fit.predict(left_out) - values[out], np.nan)
         sd[out] = np.sqrt(fit.variance * (1.0 + size))
-        leverage[out] = size / fit.leverages.max()
+        leverage[out] = size / fit.leverage(others).max()
     return error, sd, leverage
 
 
