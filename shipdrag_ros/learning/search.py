@@ -35,7 +35,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.declared import TermParameter
 from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
-from shipdrag_ros.simulation.hydrodynamics import quadratic_n
+from shipdrag_ros.simulation.hydrodynamics import drag_n
 
 _FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds first
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
@@ -424,8 +424,7 @@ class _Judged:
         force = action.resistance_n(speed)
         if action.turns:  # one after the other
             areas = np.cumsum([turn.drag_area_m2 for turn in action.turns])
-            density = self.case.ship.water.density_kg_m3
-            force = quadratic_n(density, float(np.abs(areas).max()), speed)
+            force = drag_n(self.case.ship, float(np.abs(areas).max()), speed)
         return float(100.0 * np.max(np.abs(force) / self.case.ship.resistance_n(speed)))
 
     def _next_run(self, kinds: dict[str, float]) -> str:

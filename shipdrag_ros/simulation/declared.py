@@ -227,15 +227,6 @@ class _Acting:
         return share * self.at(inside, np.maximum(since_s, 0.0))
 
 
-def force_n(
-    term: LearntTerm, frame: effect.Frame, values: tuple[float, ...], speed_m_s: Float64
-) -> Float64:
-    """
-    Return the force of a term at speeds (n,), at the stop [N].
-    """
-    return _Acting(term.term.expression, term, frame, values).force_n(speed_m_s)
-
-
 def _act(term: LearntTerm, frame: effect.Frame, *values: float) -> Action:
     parts = zip(term.parts, term.units, strict=True)
     return Action.total(

@@ -46,14 +46,7 @@ def drag_n(ship: Ship, drag_area_m2: float, speed_m_s: Float64) -> Float64:
     """
     Return 0.5 rho A v^2 [N] in the water of a ship.
     """
-    return quadratic_n(ship.water.density_kg_m3, drag_area_m2, speed_m_s)
-
-
-def quadratic_n(density_kg_m3: float, drag_area_m2: float, speed_m_s: Float64) -> Float64:
-    """
-    Return 0.5 rho A v^2 [N].
-    """
-    return 0.5 * density_kg_m3 * drag_area_m2 * speed_m_s**2
+    return QuadraticDrag(drag_area_m2, ship.water.density_kg_m3).force_n(speed_m_s)
 
 
 @dataclass(frozen=True)
@@ -74,9 +67,9 @@ class QuadraticDrag:
 
     def force_n(self, speed_m_s: Float64) -> Float64:
         """
-        Return the drag at speeds of 0 or more; S2 (11).
+        Return 0.5 rho A v^2 [N] at speeds of 0 or more; S2 (11).
         """
-        return quadratic_n(self.density_kg_m3, self.drag_area_m2, speed_m_s)
+        return 0.5 * self.density_kg_m3 * self.drag_area_m2 * speed_m_s**2
 
 
 def _force_n(ship: Ship, speed_m_s: Float64) -> Float64:

@@ -14,7 +14,7 @@ from shipdrag_ros.learning import words
 from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.ship.term import LearntTerm
 from shipdrag_ros.simulation import Scenario
-from shipdrag_ros.simulation.declared import force_n
+from shipdrag_ros.simulation.declared import effect_of
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import using
 
@@ -55,8 +55,8 @@ def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
     assert (term.term.variable, term.term.shape) == ('speed', 'step')
     values = tuple(each.value for each in term.parameters.values())
     speed = np.linspace(1.5, 6.5, 60)
-    true = force_n(HIDDEN, FRAME, tuple(SIZES.values()), speed)
-    found = force_n(term, FRAME, values, speed)
+    true = effect_of(HIDDEN).action(FRAME, *SIZES.values()).resistance_n(speed)
+    found = effect_of(term).action(FRAME, *values).resistance_n(speed)
     # nine in ten of what it does to the ship are known
     assert np.sqrt(np.mean((found - true) ** 2)) < 0.2 * np.sqrt(np.mean(true**2))
 

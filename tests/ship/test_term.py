@@ -21,7 +21,7 @@ from shipdrag_ros.errors import EffectFileError, ShipFileError
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.ship.term import LearntTerm, read_folders
 from shipdrag_ros.simulation import Scenario, sense, simulate, simulate_columns, standard_sensors
-from shipdrag_ros.simulation.declared import force_n
+from shipdrag_ros.simulation.declared import effect_of
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, declared, find, parse, using
 from shipdrag_ros.simulation.hydrodynamics import friction_n
@@ -122,9 +122,10 @@ def test_a_term_acts_as_its_formula_says() -> None:
 
 def test_beyond_its_speeds_a_force_goes_on_as_the_square() -> None:
     ship, term = Ship.example(), LearntTerm.from_yaml(WEED)
-    inside, beyond = force_n(term, frame_of(ship), (0.002, 0.09), np.array([7.9, 15.8]))
+    [force_n] = effect_of(term).action(frame_of(ship), 0.002, 0.09).resistance
+    inside, beyond, at_rest = force_n(np.array([7.9, 15.8, 0.0]))
     assert beyond == pytest.approx(4.0 * inside)
-    assert force_n(term, frame_of(ship), (0.002, 0.09), np.array([0.0]))[0] == 0.0
+    assert at_rest == 0.0
 
 
 @pytest.mark.parametrize(('factor', 'power'), [('g*L', 0.0), ('u*sqrt(g*L)', 1.0), ('u**2', 2.0)])
@@ -136,7 +137,9 @@ term: {{channel: force, scope: hull, variable: speed, shape: power,
 parameters: {{A: {{value: 0.01, sd: 0}}}}
 """
     speed = np.array([4.0, 2.0, 1.0, 0.5, 0.0])
-    force = force_n(LearntTerm.from_yaml(text), frame_of(Ship.example()), (0.01,), speed)
+    held = effect_of(LearntTerm.from_yaml(text))
+    [force_n] = held.action(frame_of(Ship.example()), 0.01).resistance
+    force = force_n(speed)
     np.testing.assert_allclose(force, force[0] * (speed / 4.0) ** power, rtol=1e-6)
 
 
@@ -167,9 +170,9 @@ def test_a_heading_acts_as_the_same_heading_a_turn_on() -> None:
     term = LearntTerm.from_yaml(TURNED.replace('A*cos(psi) + B*sin(psi)', 'A*psi + B'))
     ship, speed = Ship.example(), np.array([2.0, 5.0])
     before, after = (
-        force_n(
-            term, Frame(ship, Scenario(speed_m_s=5.0, heading_rad=psi), 0.0), (2e-4, 1e-4), speed
-        )
+        effect_of(term)
+        .action(Frame(ship, Scenario(speed_m_s=5.0, heading_rad=psi), 0.0), 2e-4, 1e-4)
+        .resistance_n(speed)
         for psi in (0.5, 0.5 + math.tau)
     )
     np.testing.assert_allclose(after, before)
@@ -462,9 +465,8 @@ def test_any_value_of_a_key_passes_or_is_a_plain_error(key: str, value: Any) -> 
         term = LearntTerm.from_yaml(stream.getvalue())
     except EffectFileError:
         return
-    assert np.isfinite(
-        force_n(term, frame_of(Ship.example()), (0.001, 0.09), np.array([2.0]))
-    ).all()
+    acting = effect_of(term).action(frame_of(Ship.example()), 0.001, 0.09)
+    assert np.isfinite(acting.resistance_n(2.0))
 
 
 def test_a_cut_or_turned_file_passes_or_is_a_plain_error() -> None:
