@@ -48,11 +48,14 @@ def coasted(
     hidden = [parse(text) for text in effects]
     truth = simulate(ship, scenario, effects=hidden, reference_rad=reference_rad)
     sensors = standard_sensors(rate_hz=rate_hz, noise=noise, inputs=inputs)
-    block = sense(truth, sensors, seed=seed, start_ns=start_ns)
+    return CoastRun(name, cut(sense(truth, sensors, seed=seed, start_ns=start_ns), lead_in_s))
+
+
+def cut(block: Block, lead_in_s: float) -> Window:
+    """Return what a record holds from a time of it on, with the record before that."""
     first = int(block.stamp_ns.min())
     stop_ns = first + round(lead_in_s * 1e9)
-    window = Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=first)
-    return CoastRun(name, window)
+    return Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=first)
 
 
 def write_run(

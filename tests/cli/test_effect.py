@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -198,14 +199,19 @@ def test_the_terms_in_use_are_attached_to_a_recording(weedy: Path) -> None:
 
 
 def test_a_fleet_names_it_and_does_a_bag_again_for_it(weedy: Path, tmp_path, capsys) -> None:
-    line = ['fleet', str(weedy.parent), '-o', str(tmp_path / 'store'), '--workers', '1', '--json']
+    bags = tmp_path / 'bags'
+    bags.mkdir()
+    line = ['simulate', '--ship', str(SHIP), '-o', str(bags / 'steady.mcap'), '--lead-in', '60']
+    assert main([*line, '--duration', '1']) == 0
+    line = ['fleet', str(bags), '-o', str(tmp_path / 'store'), '--workers', '1', '--json']
     assert main(line) == 0
+    shutil.copy(weedy, bags)
     named = []
     for _ in range(2):
         capsys.readouterr()
         assert main([*line, *EFFECTS]) == 0
         named.append(json.loads(capsys.readouterr().out)['new'])
-    assert named == [1, 0]
+    assert named == [2, 0]  # the steady one anew
     rows = read_coastdowns(tmp_path / 'store').to_pylist()
     assert {row['verdict'] for row in rows} == {'named'}
     assert all('weed' in str(row['effects']) for row in rows)

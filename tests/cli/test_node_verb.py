@@ -4,18 +4,14 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 import yaml
 
 from shipdrag_ros.cli import main
-
-SHIPDRAG = Path(sys.executable).with_name('shipdrag')
-LIMIT_S = 240.0
+from tests.processes import Process
 
 
 @pytest.mark.parametrize('verb', ['node', 'demo'])
@@ -47,55 +43,28 @@ def test_a_bad_ship_file_is_told_before_ros_starts(tmp_path, capsys) -> None:
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def node_log(tmp_path: Path, ship: Path, *ros_arguments: str) -> str:
-    """Start the node, end it by a signal once it records, and return what it said."""
+@pytest.mark.parametrize('changed', [False, True])
+def test_the_command_line_holds_over_a_parameter_file_and_ros_args(ship_file, tmp_path, changed):
+    """The file as it is has no ship file and records into '.'."""
     pytest.importorskip('rclpy')
-    log = tmp_path / 'log'
-    line = [SHIPDRAG, 'node', '--ship', ship, '--out', tmp_path / 'bags', '--ros-args']
-    with log.open('w') as file:
-        node = subprocess.Popen(
-            [*line, *ros_arguments],
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-        )
-    try:
-        end_s = time.monotonic() + LIMIT_S
-        while 'active; recording to' not in log.read_text():
-            assert node.poll() is None, log.read_text()
-            assert time.monotonic() < end_s
-            time.sleep(0.1)
-        node.send_signal(signal.SIGINT)
-        assert node.wait(timeout=LIMIT_S) == 0
-    finally:
-        node.kill()
-        node.wait()
-    return log.read_text()
-
-
-@pytest.mark.parametrize(
-    ('changed', 'said'),
-    [
-        ({}, False),  # the file as it is: no ship file, recordings into '.'
-        ({'ship_file': 'another.yaml', 'output_directory': 'elsewhere'}, True),
-    ],
-)
-def test_the_command_line_holds_over_a_parameter_file(ship_file, tmp_path, changed, said):
     tree = yaml.safe_load((ROOT / 'config' / 'parameters.yaml').read_text())
-    tree['/**']['ros__parameters'] |= {**changed, 'froude_min': 0.07}
+    more = {'output_directory': 'elsewhere'} if changed else {}
+    tree['/**']['ros__parameters'] |= {**more, 'froude_min': 0.07}
     file = tmp_path / 'parameters.yaml'
     file.write_text(yaml.safe_dump(tree))
-    log = node_log(tmp_path, ship_file, '--params-file', str(file))
+    line = ['node', '--ship', ship_file, '--out', tmp_path / 'bags', '--ros-args']
+    line += ['--params-file', file, *(['-p', 'ship_file:=another.yaml'] if changed else [])]
+    node = Process(tmp_path / 'log', '-m', 'shipdrag_ros.cli', *line)
+    try:
+        node.wait_for('active; recording to')
+        assert node.stop(signal.SIGINT) == 0
+    finally:
+        node.kill()
+    log = (tmp_path / 'log').read_text()
     assert f"ship_file='{ship_file}'" in log
     assert f"output_directory='{tmp_path / 'bags'}'" in log
     assert 'froude_min=0.07' in log  # the rest of the file holds
     assert list((tmp_path / 'bags').iterdir()) == []  # nothing was heard
-    line = f"ship_file 'another.yaml' of {file} is not used: --ship says '{ship_file}'"
-    assert (line in log) == said
-    assert ("output_directory 'elsewhere'" in log) == said
-
-
-def test_the_command_line_holds_over_what_follows_ros_args(ship_file: Path, tmp_path) -> None:
-    log = node_log(tmp_path, ship_file, '-p', 'ship_file:=another.yaml')
-    assert f"ship_file='{ship_file}'" in log
-    assert "ship_file 'another.yaml' of -p is not used" in log
+    said = f"ship_file 'another.yaml' of -p is not used: --ship says '{ship_file}'"
+    assert (said in log) == changed
+    assert (f"output_directory 'elsewhere' of {file} is not used" in log) == changed

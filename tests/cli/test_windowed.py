@@ -41,20 +41,13 @@ def test_a_bag_may_carry_its_window(tmp_path: Path) -> None:
         ('a.mcap@1:x', "the window '1:x' is not START:END in s"),
         ('a.mcap@1:nan', 'is not START:END'),
         ('@1:2', 'is not START:END'),
+        *((f'{__file__}@{window}', 'is not START:END in s') for window in ('', '10', 'START')),
     ],
 )
 def test_a_wrong_window_is_named(text: str, said: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError) as error:
         windowed_bag(text)
     assert said in str(error.value)
-
-
-@pytest.mark.parametrize('window', ['', '10', 'START'])
-def test_a_window_without_an_end_is_named(window: str, tmp_path: Path) -> None:
-    there = tmp_path / 'a.mcap'
-    there.touch()
-    with pytest.raises(argparse.ArgumentTypeError, match='is not START:END in s'):
-        windowed_bag(f'{there}@{window}')
 
 
 def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> None:
@@ -70,13 +63,17 @@ def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> No
     ]
 
 
-def test_watch_plays_the_part_that_is_given(coastdown_bag: Path) -> None:
+def test_watch_plays_the_part_that_is_given_and_says_what_holds_for_it(coastdown_bag, tmp_path):
+    bag, sheet = shutil.copy(coastdown_bag, tmp_path / 'own.mcap'), tmp_path / 'run.yaml'
+    sheet.write_text('facts: [calm]\n')
     parser = argparse.ArgumentParser()
     watch.add_arguments(parser)
-    options = parser.parse_args([f'{coastdown_bag}@400:460', str(coastdown_bag)])
+    options = parser.parse_args([f'{bag}@400:460', str(bag)])
     part, whole = open_parts(options.bags, Output(), remap={})
-    with watch._source(options, None, [], Output(), []) as (source, _):
+    notes = ['before']
+    with watch._source(options, None, [], Output(), notes) as (source, _):
         player = source.player()
+    assert notes[:2] == ['before', f'{bag}: {sheet} holds for this run']
     assert player is not None
     assert (player['start_s'], player['end_s']) == tuple(each // 10**9 for each in part.span_ns)
     assert whole.span_ns[0] + 400 * 10**9 == part.span_ns[0]

@@ -71,7 +71,7 @@ def of(kind, events):
 
 @pytest.mark.parametrize(
     ('sensors', 'within_s'),
-    [((LOG,), 10.0), ((LOG, SHAFT), 5.0), ((TRACK, COMPASS), 10.0), ((LOG, TRACK), 5.0)],
+    [((TRACK, COMPASS), 10.0), ((LOG, TRACK), 5.0)],  # others: test_onset.py
 )
 def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s) -> None:
     block = record(sensors=sensors, seed=1)
@@ -90,14 +90,6 @@ def wandering(time_s, seed: int):
         angle = 2.0 * np.pi * time_s / period_s
         off += np.outer(np.sin(angle), part[0]) + np.outer(np.cos(angle), part[1])
     return off
-
-
-@pytest.mark.parametrize('sensors', [(LOG,), (LOG, SHAFT)])
-def test_less_power_is_no_coastdown_and_is_named(ship, record, sensors) -> None:
-    orders = (EngineOrder(0.0, shaft=0.7, thrust=0.49),)
-    events = events_of(ship, record(sensors=sensors, seed=1, orders=orders))
-    assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]
-    assert {each.reason for each in of(NotCoastdown, events)} == {Dismissal.SETTLED}
 
 
 @pytest.mark.parametrize('sensors', [(LOG,), (LOG, SHAFT)])
@@ -144,17 +136,6 @@ def test_fixes_on_another_mark_are_no_turn_and_no_end(ship, record, at_s) -> Non
         in_time = abs(ended.start_ns - START_NS - 905 * S) < 10 * S
         whole += in_time and ended.ended_by is EndedBy.RECORD_END
     assert whole >= 3  # with fixes of 10 m, a stop after a slow-down may look as likely
-
-
-def test_positions_are_believed_beside_a_log_that_says_nothing_true(ship, record) -> None:
-    block = record(sensors=(LOG, TRACK), seed=3)
-    is_log = block.channel == Channel.SPEED_THROUGH_WATER
-    value = block.value.copy()
-    value[is_log, 0] = np.random.default_rng(1).uniform(0.5, 6.0, int(is_log.sum()))
-    events = events_of(ship, replace(block, value=value))
-    (ended,) = [each for each in of(EndedCoastdown, events) if not each.withdrawn]
-    assert abs(ended.start_ns - START_NS - 900 * S) < 30 * S
-    assert ended.end_ns > START_NS + 1500 * S
 
 
 def test_a_log_that_shows_tenths_of_a_knot_shows_no_manoeuvre(ship, record) -> None:

@@ -37,7 +37,7 @@ def cargo_fixture() -> Ship:
     return SHIP
 
 
-@pytest.fixture(scope='package')
+@pytest.fixture(scope='package', name='found')
 def in_a_current() -> DiagnosisResult:
     """A run with a current, that the ship file does not have."""
     run = coasted('current=0.4', name='<outward>', lead_in_s=1800.0, coast_s=1500.0)

@@ -16,7 +16,6 @@ from shipdrag_ros.diagnosis.known import Facts
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.decision import NONE, Verdict
 from shipdrag_ros.inference.rows import LOG, POSITION
@@ -28,7 +27,7 @@ from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standar
 from shipdrag_ros.simulation.effects import LIBRARY, parse
 from shipdrag_ros.simulation.surge import turning
 from tests.runs import CARGO as SHIP
-from tests.runs import coasted
+from tests.runs import coasted, cut
 
 PARAMETERS = Parameters()
 
@@ -141,6 +140,7 @@ def test_what_two_runs_share_is_named_and_sharper_than_by_one() -> None:
     found = diagnose(runs, SHIP, PARAMETERS)
     assert found.verdict is Verdict.NAMED
     assert [each.name for each in found.effects] == ['current']
+    assert found.would_decide == ()  # nothing is advised any more
     size = found.effects[0].parameters['along_track_m_s']
     assert abs(size.value - 0.3) < 3.0 * size.sd
     assert found.after is not None
@@ -193,9 +193,7 @@ def test_an_error_of_the_log_that_swings_is_in_the_log(cargo: Ship) -> None:
     swing = 1.0 + 0.05 * np.sin(2.0 * np.pi * after / 200.0)
     of_log = block.channel == FIRST
     block = replace(block, value=np.where(of_log, swing, 1.0)[:, None] * block.value)
-    window = Window.from_block(
-        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
-    )
+    window = cut(block, 900.0)
     found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
     assert (found.verdict, found.unnamed > 0.9) == (Verdict.UNKNOWN, True)
     assert found.where is not None
@@ -206,9 +204,7 @@ def test_latitude_and_longitude_are_in_the_scale_of_the_earth(cargo: Ship) -> No
     scenario = Scenario(speed_m_s=7.0, lead_in_s=900.0, duration_s=900.0)
     truth = simulate(cargo, scenario, effects=[parse('radar_scale=0.08')])
     block = sense(truth, standard_sensors(), seed=2)
-    window = Window.from_block(
-        block, START_NS + 900 * 10**9, int(block.stamp_ns.max()), before_ns=START_NS
-    )
+    window = cut(block, 900.0)
     of_earth = replace(window, geodetic=frozenset({'position'}))
     for given, may in ((window, True), (of_earth, False)):
         found = diagnose([CoastRun('run', given)], cargo, Parameters(), advise=False)
@@ -253,12 +249,7 @@ def test_where_a_free_shaft_stops_makes_nothing_less_likely(cargo: Ship, stall_m
     value = block.value.copy()
     steady = np.median(value[shaft & (time_s < 900.0), 0])
     value[after, 0] = 0.55 * steady * speed / 8.0 * turning(speed, stall_m_s)
-    window = Window.from_block(
-        replace(block, value=value),
-        START_NS + 900 * 10**9,
-        int(block.stamp_ns.max()),
-        before_ns=START_NS,
-    )
+    window = cut(replace(block, value=value), 900.0)
     found = diagnose([CoastRun('run', window)], cargo, Parameters(), advise=False)
     assert found.verdict is Verdict.NONE
     assert found.nothing > 0.9
@@ -276,11 +267,7 @@ def test_the_first_that_was_heard_is_used_and_what_the_other_reads_is_said(cargo
     block = replace(block, value=off * block.value)
     if not first_heard:
         block = block[block.channel != FIRST]
-    stop_ns = START_NS + 900 * 10**9
-    window = Window.from_block(
-        block, stop_ns, int(block.stamp_ns.max()), before_ns=int(block.stamp_ns.min())
-    )
-    run = CoastRun('run', window)
+    run = CoastRun('run', cut(block, 900.0))
     (seen,), notes = observed([run], cargo, Parameters(), lambda *_: None)
     assert set(seen.rows.kind.tolist()) == {LOG, POSITION}
     if first_heard:

@@ -76,18 +76,12 @@ def learnt(count: int, seed: int = 1) -> LearntBaseline:
 
 
 def test_covers_the_truth() -> None:
-    # 8 seeds of 5 runs each, 2 parts: a t of 4 degrees of freedom, which 5 runs give, is within
-    # 2 sd in 88 %, and fewer than 11 of 16 then come by chance in 1 %
-    away = []
-    for seed in range(8):
-        found = learnt(5, seed)
-        away.append((found.factors - TRUE) / np.sqrt(np.diag(found.covariance)))
-    assert int((np.abs(away) < 2.0).sum()) >= 11
-    assert (
-        0.5 * SCATTER
-        < np.median([learnt(5, seed).shared.scatter for seed in range(8)])
-        < 2 * SCATTER
-    )
+    # 4 seeds of 5 runs each, 2 parts: a t of 4 degrees of freedom, which 5 runs give, is within
+    # 2 sd in 88 %, and fewer than 5 of 8 then come by chance in 1 %
+    found = [learnt(5, seed) for seed in range(4)]
+    away = [(each.factors - TRUE) / np.sqrt(np.diag(each.covariance)) for each in found]
+    assert int((np.abs(away) < 2.0).sum()) >= 5
+    assert 0.5 * SCATTER < np.median([each.shared.scatter for each in found]) < 2 * SCATTER
 
 
 def test_the_ship_file_holds_what_was_learnt() -> None:

@@ -36,7 +36,7 @@ from shipdrag_ros.simulation import (
 from shipdrag_ros.simulation.effects import find
 from shipdrag_ros.simulation.surge import turning
 from tests.runs import CARGO as SHIP
-from tests.runs import coasted
+from tests.runs import coasted, cut
 
 
 def test_the_speed_of_a_run_is_its_own_and_the_law_reaches_over_all(seen_of, cargo):
@@ -302,9 +302,7 @@ def test_an_anemometer_that_is_wrong_by_its_sd_is_no_other_speed(cargo, gain, tu
     scenario = Scenario(speed_m_s=8.0, lead_in_s=600.0, duration_s=1200.0, heading_rad=0.7)
     inputs = ('speed_through_water', 'wind_apparent')
     block = sense(simulate(cargo, scenario), standard_sensors(inputs=inputs), seed=3)
-    first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
-    window = Window.from_block(block, START_NS + 600 * 10**9, last, before_ns=first)
-    stop = Stop(first, 600.0, 0.7, 8.0)
+    window, stop = cut(block, 600.0), Stop(int(block.stamp_ns.min()), 600.0, 0.7, 8.0)
     times = np.arange(0.0, 1800.0, 10.0)
     right = Context.of(window, cargo, times, stop)
     ahead, port = block.value[block.channel == Channel.WIND_APPARENT, :2].T
@@ -312,10 +310,7 @@ def test_an_anemometer_that_is_wrong_by_its_sd_is_no_other_speed(cargo, gain, tu
     value = block.value.copy()
     value[block.channel == Channel.WIND_APPARENT, 0] = cos * ahead - sin * port
     value[block.channel == Channel.WIND_APPARENT, 1] = cos * port + sin * ahead
-    wrong_window = Window.from_block(
-        replace(block, value=value), START_NS + 600 * 10**9, last, before_ns=first
-    )
-    wrong = Context.of(wrong_window, cargo, times, stop)
+    wrong = Context.of(cut(replace(block, value=value), 600.0), cargo, times, stop)
     away = wrong.whitener @ (wrong.value - right.value)
     # one standard deviation of one unknown
     assert float(away @ away) < 1.5
@@ -328,15 +323,12 @@ def _shaft_of(cargo: Ship, after: Callable[[Float64, Float64], Float64]) -> tupl
     ship = replace(cargo, baseline=baseline, propulsion=Propulsion(2.0, 0.5))
     truth = simulate(ship, Scenario(speed_m_s=8.0, lead_in_s=610.0, duration_s=5000.0))
     block = sense(truth, standard_sensors(inputs=('speed_through_water', 'shaft')), seed=3)
-    first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
     shaft = block.channel == Channel.SHAFT
     after_s = (block.stamp_ns[shaft] - START_NS) * 1e-9 - 610.0
     part = np.interp(after_s + 610.0, truth.time_s, truth.speed_through_water_m_s) / 8.0
     value = block.value.copy()
     value[shaft, 0] = 11.0 * np.where(after_s > 0.0, after(after_s, part), 1.0)
-    window = Window.from_block(
-        replace(block, value=value), START_NS + 610 * 10**9, last, before_ns=first
-    )
+    window, first = cut(replace(block, value=value), 610.0), int(block.stamp_ns.min())
     return Context.of(window, ship, _TIMES, Stop(first, 610.0, 0.0, 8.0)), truth
 
 
@@ -366,7 +358,6 @@ def test_rows_of_the_shaft_hold_no_reading_from_before_its_fall(cargo: Ship) -> 
 def test_a_run_that_ends_before_the_shaft_has_fallen_has_no_row_of_it(cargo: Ship) -> None:
     scenario = Scenario(speed_m_s=8.0, lead_in_s=600.0, duration_s=20.0)
     block = sense(simulate(cargo, scenario), standard_sensors(), seed=3)
-    first, last = int(block.stamp_ns.min()), int(block.stamp_ns.max())
-    window = Window.from_block(block, START_NS + 600 * 10**9, last, before_ns=first)
-    found = Context.of(window, cargo, np.arange(0.0, 621.0, 10.0), Stop(first, 600.0, 0.0, 8.0))
+    stop = Stop(int(block.stamp_ns.min()), 600.0, 0.0, 8.0)
+    found = Context.of(cut(block, 600.0), cargo, np.arange(0.0, 621.0, 10.0), stop)
     assert len(found.at_shaft) == 0

@@ -35,11 +35,6 @@ from tests.runs import CARGO as SHIP
 
 
 @pytest.fixture
-def found(in_a_current: DiagnosisResult) -> DiagnosisResult:
-    return in_a_current
-
-
-@pytest.fixture
 def words(found: DiagnosisResult) -> DiagnosisResult:
     """Without what takes time to draw."""
     return replace(found, traces=(), estimates=())

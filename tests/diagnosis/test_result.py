@@ -13,11 +13,6 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult
 LEAD_IN_S, COAST_S, CURRENT_M_S = 1800.0, 1500.0, 0.4  # of the run
 
 
-@pytest.fixture
-def found(in_a_current: DiagnosisResult) -> DiagnosisResult:
-    return in_a_current
-
-
 def test_each_quantity_is_held_against_the_model(found: DiagnosisResult) -> None:
     (trace,) = found.traces
     assert trace.name == '<outward>'

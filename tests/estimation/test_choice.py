@@ -21,9 +21,9 @@ from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
 from tests.runs import CARGO as SHIP
+from tests.runs import cut
 
 PARAMETERS = Parameters()
-STOP_NS = START_NS + 900 * 10**9
 
 
 @pytest.fixture(scope='module')
@@ -32,8 +32,7 @@ def window() -> Window:
     scenario = Scenario(speed_m_s=6.0, lead_in_s=900.0, duration_s=900.0)
     truth = simulate(SHIP, scenario, effects=[parse('log_scale=-0.3')])
     sensors = standard_sensors(rate_hz=1.0, noise=0.3, inputs=('speed_through_water', 'position'))
-    block = sense(truth, sensors, seed=2)
-    return Window.from_block(block, STOP_NS, int(block.stamp_ns.max()), before_ns=START_NS)
+    return cut(sense(truth, sensors, seed=2), 900.0)
 
 
 def test_the_band_holds_the_truth_where_the_log_is_doubted_and_it_is_said(window: Window) -> None:
@@ -130,8 +129,7 @@ def test_a_log_beside_a_radar_in_a_wrong_scale_is_not_blamed_alone() -> None:
     scenario = Scenario(speed_m_s=8.2, lead_in_s=900.0, duration_s=900.0)
     effects = [StatedEffect('radar_scale', {'factor': Parameter(0.06)})]
     block = sense(simulate(SHIP, scenario, effects=effects), standard_sensors(), seed=3)
-    stop_ns = START_NS + 900 * 10**9
-    window = Window.from_block(block, stop_ns, stop_ns + 900 * 10**9, before_ns=START_NS)
+    window = cut(block, 900.0)
     of_radar = estimate_final(window, SHIP, Parameters())
     of_earth = replace(window, geodetic=frozenset({'position'}))
     of_gnss = estimate_final(of_earth, SHIP, Parameters())
@@ -167,10 +165,9 @@ def test_a_log_that_is_wrong_beside_a_fix_is_said(effect, parameter, what) -> No
         sense(simulate(SHIP, scenario, effects=each), standard_sensors(), seed=3)
         for each in ([], effects)
     )
-    stop_ns, said = START_NS + 900 * 10**9, []
+    said = []
     for block in (sound, wrong):
-        window = Window.from_block(block, stop_ns, stop_ns + 900 * 10**9, before_ns=START_NS)
-        of_earth = replace(window, geodetic=frozenset({'position'}))
+        of_earth = replace(cut(block, 900.0), geodetic=frozenset({'position'}))
         notes = estimate_final(of_earth, SHIP, Parameters()).notes
         said.append([note for note in notes if f'speed_through_water: {what}' in note])
     assert not said[0]
@@ -214,10 +211,8 @@ def test_a_log_that_lags_is_no_current(steady_s: float) -> None:
     truth = simulate(FERRY, scenario, effects=[parse('log_lag=8')])
     inputs = ('speed_through_water', 'position')
     block = sense(truth, standard_sensors(rate_hz=1.0, noise=1.0, inputs=inputs), seed=1)
-    stop_ns = START_NS + round((steady_s + 9.0) * 1e9)  # found late, as the log shows it late
-    end_ns = int(block.stamp_ns.max())
-    window = Window.from_block(block, stop_ns, end_ns, before_ns=START_NS)
-    found = estimate_final(window, FERRY, Parameters())
+    # found late, as the log shows it late
+    found = estimate_final(cut(block, steady_s + 9.0), FERRY, Parameters())
     assert found.current_m_s is not None
     assert abs(found.current_m_s) < 0.04  # 0.06 to 0.09 where the log is taken at its word
 
@@ -235,8 +230,7 @@ def sailed(*channels: Channel, seed: int = 1) -> Block:
 
 
 def window_of(block: Block) -> Window:
-    stop_ns = START_NS + round(LEAD_S * 1e9)
-    return Window.from_block(block, stop_ns, stop_ns + round(COAST_S * 1e9), before_ns=START_NS)
+    return cut(block, LEAD_S)
 
 
 def mean_sigma(block: Block) -> float:
@@ -284,10 +278,8 @@ def test_a_log_that_is_off_beside_two_sound_sources_is_named_and_spoils_nothing(
         each = np.array([score(case, ship, seed) for seed in range(3)])
         assert each[:, 0].mean() < 0.4 * alone
         assert each[:, 2].min() > 0.9
-    stop_ns = START_NS + 1800 * 10**9
     block = readings(Case('', 2, 1, off=True), ship, 0)
-    window = Window.from_block(block, stop_ns, stop_ns + 1500 * 10**9, before_ns=START_NS)
-    found = estimate_final(window, ship, PARAMETERS)
+    found = estimate_final(cut(block, 1800.0), ship, PARAMETERS)
     (said,) = (note for note in found.notes if 'speed_through_water reads' in note)
     assert 4.0 < float(said.split('reads ')[1].split(' ')[0]) < 6.0
     assert set(found.samples) == {'speed_through_water', 'speed_through_water_2', 'position'}

@@ -221,12 +221,6 @@ def test_every_parameter_changes_something(coast: Any, ship: Ship) -> None:
         assert not same_bits(base, estimate(cut, ship, parameters))
 
 
-def test_auto_is_this_estimator(coast: Any, ship: Ship) -> None:
-    cut = window(coast.block(100))
-    assert estimate(cut, ship, Parameters()).estimator == 'one'
-    assert estimate(cut, ship, Parameters(estimator='s1_joint')).estimator == 's1_joint'
-
-
 @both
 def test_what_holds_no_coastdown_is_refused(coast: Any, ship: Ship, estimator: Estimator) -> None:
     block = coast.block(500)

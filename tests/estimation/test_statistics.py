@@ -173,14 +173,6 @@ def test_no_input_and_no_second_run_makes_it_worse() -> None:
     assert found[:, -1].mean() > found[:, 0].mean()
 
 
-def test_gains_are_those_of_the_same_case() -> None:
-    # the second set gains 1 and 3 on the first, the third nothing on the second
-    (first, of_first), (second, of_second) = gains(np.array([[0.0, 1.0, 1.0], [10.0, 13.0, 13.0]]))
-    assert first == pytest.approx(2.0)
-    assert of_first == pytest.approx(2.0)
-    assert (second, of_second) == (0.0, 0.0)
-
-
 READINGS, GOOD, BAD = 500, 0.05, 0.3
 SD = np.where(np.arange(READINGS) % 2 == 0, GOOD, BAD)
 STATED_RUNS = 20  # seeds 0..19

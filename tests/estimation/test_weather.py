@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import summary
 from shipdrag_ros.parameter import Parameter
@@ -17,8 +17,9 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.ship.facts import parse_fact
-from shipdrag_ros.simulation import START_NS, Scenario, Sensor, sense, simulate
+from shipdrag_ros.simulation import Scenario, Sensor, sense, simulate
 from tests.runs import CARGO as SHIP
+from tests.runs import cut
 
 BARE = replace(SHIP, baseline=None)
 SPEEDS = np.array([3.0, 5.0, 7.0])
@@ -49,10 +50,7 @@ def coast(
         sensors.append(Sensor(channel=Channel.WIND_APPARENT, rate_hz=0.5, sd=0.3))
         sensors.append(Sensor(channel=Channel.DEPTH, rate_hz=0.2, sd=0.3))
     block = sense(simulate(SHIP, scenario, effects=effects), sensors, seed=seed)
-    stop_ns = START_NS + round(LEAD_S * 1e9)
-    end_ns = stop_ns + round(COAST_S * 1e9)
-    window = Window.from_block(block, stop_ns, end_ns, before_ns=START_NS)
-    return estimate_final(window, ship, Parameters())
+    return estimate_final(cut(block, LEAD_S), ship, Parameters())
 
 
 def off(found: Estimate, *, calm: bool) -> tuple[Float64, Float64]:

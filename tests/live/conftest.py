@@ -4,10 +4,6 @@
 from __future__ import annotations
 
 import os
-import re
-import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,8 +15,8 @@ import pytest
 
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.serve import listen, server_of
+from tests.processes import START_S, Process
 
-START_S = 240.0  # the first start of a machine compiles the kernels
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 
 
@@ -79,39 +75,6 @@ def view(browser: Any) -> Iterator[Callable[..., Viewer]]:
         assert viewer.problems == []
 
 
-class Process:
-    """A program, its log, and its end."""
-
-    def __init__(self, log: Path, *line: str | Path, **environment: str) -> None:
-        self._log = log
-        with log.open('w') as file:
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', *line],
-                stdin=subprocess.DEVNULL,
-                stdout=file,
-                stderr=subprocess.STDOUT,
-                env=os.environ | environment,
-            )
-
-    def wait_for(self, pattern: str) -> str:
-        """Return the first group of a pattern once it stands in the log."""
-        end_s = time.monotonic() + START_S
-        while (found := re.search(pattern, self._log.read_text())) is None:
-            assert self._process.poll() is None, self._log.read_text()
-            assert time.monotonic() < end_s, self._log.read_text()
-            time.sleep(0.05)
-        return found[1] if found.groups() else found[0]
-
-    def stop(self) -> int:
-        self._process.send_signal(signal.SIGTERM)
-        return self._process.wait(timeout=200.0)
-
-    def kill(self) -> None:
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
-
-
 @pytest.fixture
 def start(tmp_path, own_domain):
     """A function that starts a module of the package on a domain of this test's own."""
@@ -121,6 +84,7 @@ def start(tmp_path, own_domain):
     def run(*line: str | Path) -> Process:
         process = Process(
             tmp_path / f'log{len(started)}',
+            '-m',
             *line,
             ROS_DOMAIN_ID=str(domain),
             ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
 
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.watch import fleet_pages
@@ -52,9 +51,3 @@ def test_without_a_store_there_is_no_fleet(serving: Any) -> None:
         answer = get(f'{url}fleet')
     assert answer.status_code == 404
     assert '--store' in answer.text
-
-
-def test_where_the_fleet_is_is_said_at_once(start: Any, fleet_store: Path) -> None:
-    pytest.importorskip('rclpy')
-    watch = start('shipdrag_ros.cli', 'watch', '--port', '0', '--store', fleet_store)
-    assert get(watch.wait_for(r'the fleet: (\S+)')).status_code == 200

@@ -4,18 +4,14 @@
 from __future__ import annotations
 
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import main
 from shipdrag_ros.live.app import LivePage
-from shipdrag_ros.live.source import BagSource, NodeSource
+from shipdrag_ros.live.source import NodeSource
 from shipdrag_ros.messages.topics import ERROR, STALE, WARN, Health, Status
 
-SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 SCREENS = {1920: 1080, 1024: 768, 390: 844}
 LETTERS_PX = {1920: 60.0, 1024: 42.0, 390: 26.0}
 ACTION_PX = {1920: 26.0, 1024: 19.0, 390: 17.0}
@@ -96,21 +92,3 @@ def test_before_there_is_anything_to_show(serving, view, level, text):
             if level is not None:
                 source.hear(health(level, text))  # still there
             assert_sound(viewer.page, width)
-
-
-def test_with_a_curve_a_verdict_and_a_list(serving: Any, view: Any, tmp_path: Path) -> None:
-    bag = tmp_path / 'a recording with quite a long name, 2026-06-01.mcap'
-    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--speed', '8', '--seed', '1']
-    assert main([*line, '--lead-in', '400', '--duration', '400', '--effect', 'fouling=0.5']) == 0
-    source = BagSource(open_runs([bag]), speed=1000.0)
-    try:
-        with serving(LivePage(source)) as url:
-            viewer = view(url)
-            viewer.wait_for('#headline', 'RECORD ENDS')
-            viewer.wait_for('#verdict', 'What would decide')
-            for width in SCREENS:
-                assert_sound(viewer.page, width)
-            viewer.page.click('#units')
-            assert_sound(viewer.page, 390)
-    finally:
-        source.close()

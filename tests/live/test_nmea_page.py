@@ -12,7 +12,8 @@ from typing import Any
 
 import pytest
 import yaml
-from pynmeagps.nmeahelpers import calc_checksum
+
+from tests.sources.log_samples import sentence
 
 pytest.importorskip('rclpy')
 
@@ -63,8 +64,7 @@ class Talker:
                     continue
                 due_s += 1.0
                 for each in self.sentences:
-                    text = f'${each}*{calc_checksum(each)}\r\n'
-                    line.sendto(text.encode(), ('127.0.0.1', self.port))
+                    line.sendto(f'{sentence(each)}\r\n'.encode(), ('127.0.0.1', self.port))
 
     def close(self) -> None:
         self._ended.set()
@@ -111,7 +111,7 @@ def test_what_instruments_say_by_nmea_is_what_a_mate_reads(start, view, talker, 
     viewer.wait_for('#checks', '120 m, at least 41 m')
     for name in ('Wind', 'Depth', 'Rudder', 'Course'):
         assert 'yes' in checklist(viewer)[name], checklist(viewer)
-    assert '1.0 Hz' in viewer.text('#inputs')
+    viewer.wait_for('#inputs', '1.0 Hz')
 
     # one clock: the headline counts to where it says that the record is ready
     said = viewer.wait_for('#headline', 'of 1 min')

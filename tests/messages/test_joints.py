@@ -277,6 +277,7 @@ def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(little: bool) ->
                 np.array([len(giant)]),
                 np.zeros(1, np.int64),
             )
+            decode(RUDDER, [giant], [0])
             alone = decode(SHAFT, [giant], [0])
             assert decoded.unreadable == (alone.unreadable,)
             assert same_bits(decoded.block, alone.block)

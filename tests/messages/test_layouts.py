@@ -237,19 +237,6 @@ def test_a_message_reads_the_same_alone_and_behind_others(source, data):
         assert found.tobytes() == single.tobytes(), field
 
 
-def test_a_giant_length_is_malformed_and_nothing_is_read_beyond() -> None:
-    for little in (True, False):
-        order = 'little' if little else 'big'
-        message = reference.message(types.JOINT_STATE, 1, '', [0.5] * 8)
-        good = reference.serialize(types.JOINT_STATE, message, little_endian=little)
-        for at in range(12, len(good) - 3, 4):
-            giant = good[:at] + (2**32 - 1).to_bytes(4, order) + good[at + 4 :]
-            decode(Source('rudder', types.JOINT_STATE), [giant], [0])
-        giant = good[:12] + (2**32 - 1).to_bytes(4, order) + good[16:]
-        decoded = decode(Source('rudder', types.JOINT_STATE), [giant], [0])
-        assert decoded.unreadable == {Unreadable.MALFORMED: 1}
-
-
 def test_messages_may_lie_anywhere_in_a_buffer_and_at_any_alignment() -> None:
     source = Source('position', types.POINT)
     payloads = [

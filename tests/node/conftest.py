@@ -7,6 +7,7 @@ import gc
 import os
 import resource
 import signal
+import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ import pytest
 import yaml
 
 from tests.node import forked
+from tests.sources.log_samples import sentence
 
 START_S = 400.0  # the first start of a machine compiles the kernels
 ANSWER_S = 200.0  # of a machine that has much else to do
@@ -26,7 +28,7 @@ class NodeProcess:
     """
     `coastdown_node` in a process of its own.
 
-    `tests/cli/test_node_verb.py` and `tests/peers` start it as a user does.
+    `tests/peers` start it as a user does.
     """
 
     def __init__(self, directory: Path, arguments: list[str], *, fresh: bool = False) -> None:
@@ -330,3 +332,38 @@ def peer() -> Iterator[Peer]:
 def diagnostics(peer: Peer) -> Diagnostics:
     """What the node says about itself."""
     return Diagnostics(peer)
+
+
+class Instruments:
+    """A multiplexer that speaks over UDP."""
+
+    def __init__(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(('127.0.0.1', 0))
+            self.port = probe.getsockname()[1]
+        self.source = f'udp://127.0.0.1:{self.port}'
+        self.sent: list[str] = []
+        self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def say(self, *lines: str) -> None:
+        for line in lines:
+            self._line.sendto(line.encode() + b'\r\n', ('127.0.0.1', self.port))
+            self.sent.append(line)
+
+    def until(self, condition: Any, peer: Any, *contents: str) -> None:
+        """Repeat sentences, their number at the end of a field of no meaning, until it is so."""
+        end = time.monotonic() + 200.0
+        while not condition():
+            assert time.monotonic() < end
+            self.say(*(sentence(content) for content in contents))
+            peer.spin_for(0.1)
+
+    def close(self) -> None:
+        self._line.close()
+
+
+@pytest.fixture
+def instruments() -> Iterator[Instruments]:
+    it = Instruments()
+    yield it
+    it.close()

@@ -22,7 +22,7 @@ from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.topics import AHEAD
+from shipdrag_ros.messages.topics import AHEAD, OK
 from shipdrag_ros.node import background as compiling_module
 from shipdrag_ros.node.background import (
     COMPILER,
@@ -98,20 +98,17 @@ def result_of(diagnosing: Diagnosing) -> DiagnosisStatus:
     return status
 
 
-@pytest.mark.parametrize(
-    ('settings', 'ship', 'state', 'reason'),
-    [
-        ({'diagnose': False}, SHIP_FILE, 'off', 'the parameter diagnose is false'),
-        ({}, None, 'impossible', 'states no `baseline`'),
-        ({}, SHIP_FILE, 'none yet', 'none yet'),
-    ],
-)
-def test_node_says_whether_it_can_diagnose(start_node, diagnostics, settings, ship, state, reason):
-    chosen = {} if ship is None else {'ship_file': str(ship)}
-    start_node(**chosen, **settings, record=False)
-    status = diagnostics.wait_for('diagnosis', reason)
-    assert values(status)['state'] == state
-    assert status.level == b'\x00'
+def test_whether_it_can_diagnose_is_said(start_node, diagnostics) -> None:
+    start_node(ship_file=str(SHIP_FILE), diagnose=False, record=False)
+    told = diagnostics.wait_for('diagnosis', 'the parameter diagnose is false')
+    assert (values(told)['state'], told.level) == ('off', b'\x00')
+    for ship, state, reason in (
+        (replace(SHIP, baseline=None), 'impossible', 'states no `baseline`'),
+        (SHIP, 'none yet', 'none yet'),
+    ):
+        status = diagnosis_status(Diagnosing(ship, PARAMETERS, enabled=True).status)
+        assert (status.values['state'], status.level) == (state, OK)
+        assert reason in status.message
 
 
 def test_node_names_what_is_missing_as_the_verb_does(start_node, peer, diagnostics, tmp_path):

@@ -165,20 +165,3 @@ def test_silence_ends_a_coastdown_by_the_clock(start_node, peer, diagnostics, tm
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     result = assert_replayed(bag, at_least=10)
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.SILENCE]
-
-
-def test_recording_starts_mid_run_and_a_reset_is_replayed(start_node, peer, diagnostics, tmp_path):
-    node = start_node(record=False, **PARAMETERS)
-    block = record()
-    peer.player.connect(block)
-    begun, again = until(block, LEAD_IN_S + 200.0), until(block, LEAD_IN_S + 300.0)
-    peer.player.play(block[:begun], speed=SPEED)
-    assert peer.trigger('start_recording').success
-    peer.player.play(block[begun:again], speed=SPEED)
-    assert peer.trigger('reset').success
-    peer.player.play(block[again:], speed=SPEED)
-    diagnostics.wait_for('input heading', '0', value='rate [Hz]')  # all has been heard
-    assert node.stop() == 0
-    (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    result = assert_replayed(bag, at_least=20)
-    assert result.coastdowns[0].ended_by is EndedBy.RESET

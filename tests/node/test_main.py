@@ -6,9 +6,6 @@ from __future__ import annotations
 import io
 import json
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +13,7 @@ import pytest
 
 from shipdrag_ros.messages.topics import Health, Status
 from shipdrag_ros.node.main import line, show
+from tests.processes import Process
 from tests.recorded import attachments, rows, summary
 
 rclpy = pytest.importorskip('rclpy')
@@ -34,8 +32,6 @@ FIGURES = {
 
 from shipdrag_ros.node.main import main  # noqa: E402
 from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
-
-START_S = 240.0
 
 
 @pytest.mark.parametrize(
@@ -105,27 +101,21 @@ def test_without_an_input_it_leaves_no_file(start_node: Any, tmp_path: Path) -> 
     assert list((tmp_path / 'bags').iterdir()) == []
 
 
-def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> None:
+def test_starts_from_a_call_with_any_path(tmp_path, ship_file, monkeypatch) -> None:
     ship = ship_file.rename(tmp_path / "ship: 'no 1' #.yaml")
     code = (
         'import sys; from shipdrag_ros.node.main import run\n'
         f'sys.exit(run({str(ship)!r}, "123", settings={{"keep_days": 2.0}}, '
         'ros_arguments=["-p", "window_s:=600", "-p", "keep_days:=1.0"]))'
     )
-    log = tmp_path / 'log'
-    with (
-        log.open('w') as file,
-        subprocess.Popen(
-            [sys.executable, '-c', code], cwd=tmp_path, stdout=file, stderr=subprocess.STDOUT
-        ) as process,
-    ):
-        end = time.monotonic() + START_S
-        while 'active;' not in log.read_text():
-            assert time.monotonic() < end
-            time.sleep(0.1)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(30.0) == 0
-    said = log.read_text()
+    monkeypatch.chdir(tmp_path)
+    node = Process(tmp_path / 'log', '-c', code)
+    try:
+        node.wait_for('active;')
+        assert node.stop(signal.SIGINT) == 0
+    finally:
+        node.kill()
+    said = (tmp_path / 'log').read_text()
     assert f'recording to {tmp_path / "123"}' in said
     assert 'window_s=600.0' in said
     assert 'keep_days=2.0' in said

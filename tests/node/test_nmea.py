@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.node.conftest import values
+from tests.node.conftest import Instruments, values
 from tests.recorded import rows
 from tests.sources.log_samples import sentence
 
@@ -24,41 +24,6 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 
 SPEED_TYPE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
-
-
-class Instruments:
-    """A multiplexer that speaks over UDP."""
-
-    def __init__(self) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(('127.0.0.1', 0))
-            self.port = probe.getsockname()[1]
-        self.source = f'udp://127.0.0.1:{self.port}'
-        self.sent: list[str] = []
-        self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-
-    def say(self, *lines: str) -> None:
-        for line in lines:
-            self._line.sendto(line.encode() + b'\r\n', ('127.0.0.1', self.port))
-            self.sent.append(line)
-
-    def until(self, condition: Any, peer: Any, *contents: str) -> None:
-        """Repeat sentences, their number at the end of a field of no meaning, until it is so."""
-        end = time.monotonic() + 200.0
-        while not condition():
-            assert time.monotonic() < end
-            self.say(*(sentence(content) for content in contents))
-            peer.spin_for(0.1)
-
-    def close(self) -> None:
-        self._line.close()
-
-
-@pytest.fixture
-def instruments() -> Any:
-    it = Instruments()
-    yield it
-    it.close()
 
 
 def test_what_is_heard_is_used_recorded_and_replayed(

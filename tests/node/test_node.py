@@ -396,6 +396,7 @@ def test_nobody_on_the_network_chooses_files_or_clock(start_node, peer, tmp_path
     secret = tmp_path / 'secret.yaml'
     secret.write_text('password: hunter2\n')
     paths = {'ship_file': str(secret), 'output_directory': '/tmp/elsewhere', 'nmea': 'tcp://a:1'}
+    paths |= {'keep_days': 1.0, 'keep_bytes': 10**9, 'path_roots': '/tmp'}
     node = start_node()
     assert 'read-only while configured' in refusals(use_sim_time=True)[0]
     refusals(**paths)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from pathlib import Path
@@ -14,13 +13,12 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from pynmeagps.nmeahelpers import calc_checksum
-
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
-from tests.node.conftest import values
+from tests.node.conftest import Instruments, values
+from tests.sources.log_samples import sentence
 
 PREFERRED = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 PLAIN = 'geometry_msgs/msg/TwistStamped'
@@ -46,9 +44,16 @@ def preferred(speed_m_s: float) -> bytes:
 class Driver:
     """A publisher of its own context, which sends at a rate until it is closed."""
 
-    def __init__(self, peer: Any, type_name: str, message: Any, rate_hz: float) -> None:
+    def __init__(
+        self,
+        peer: Any,
+        type_name: str,
+        message: Any,
+        rate_hz: float,
+        name: str = 'speed_through_water',
+    ) -> None:
         self._peer = type(peer)()
-        publisher = self._peer.advertise('/speed_through_water', type_name)
+        publisher = self._peer.advertise(f'/{name}', type_name)
         self._ended = threading.Event()
 
         def send() -> None:
@@ -66,57 +71,54 @@ class Driver:
         self._peer.close()
 
 
-@pytest.mark.parametrize('first', ['gone', 'silent', 'no number'])
-def test_a_peer_of_another_type_that_was_there_first_does_not_keep_an_input(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path, first: str
+def test_peers_of_another_type_that_were_there_first_keep_no_input(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
+    """One is gone, one is silent, one sends no number: each on an input of its own."""
     node = start_node()
-    other = type(peer)()
-    early = other.advertise('/speed_through_water', PREFERRED)
-    diagnostics.wait_for(PART, PREFERRED, value='type')
-    if first == 'gone':
-        other.close()
-    elif first == 'no number':
-        bad = Driver(peer, PREFERRED, lambda _: preferred(float('nan')), 2.0)
-    late = Driver(peer, PLAIN, twist, 10.0)
+    inputs = ('speed_through_water', 'speed_through_water_2', 'speed_through_water_3')
+    gone, silent = type(peer)(), type(peer)()
+    gone.advertise(f'/{inputs[0]}', PREFERRED)
+    silent.advertise(f'/{inputs[1]}', PREFERRED)
+    bad = Driver(peer, PREFERRED, lambda _: preferred(float('nan')), 2.0, inputs[2])
+    for each in inputs:
+        diagnostics.wait_for(f'input {each}', PREFERRED, value='type')
+    gone.close()
+    late = [Driver(peer, PLAIN, twist, 10.0, each) for each in inputs]
     try:
-        diagnostics.wait_for(PART, PLAIN, value='type')
-        peer.spin_until(lambda: int(values(diagnostics.of(PART)).get('used', '0')) >= 20)
+        for each in inputs:
+            diagnostics.wait_for(f'input {each}', PLAIN, value='type')
+
+        def used(name: str) -> int:
+            return int(values(diagnostics.of(f'input {name}')).get('used', '0'))
+
+        peer.spin_until(lambda: min(map(used, inputs)) >= 20)
     finally:
-        late.close()
-        if first == 'no number':
-            bad.close()
-        if first != 'gone':
-            del early
-            other.close()
+        for driver in (*late, bad):
+            driver.close()
+        silent.close()
     assert node.stop() == 0
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     (run,) = open_runs([bag])
     result = replay(run)
-    assert result.inputs['speed_through_water'].used >= 20
+    assert min(result.inputs[each].used for each in inputs) >= 20
     assert result.recorded.first_difference is None
 
 
 def test_a_sentence_a_second_does_not_shadow_a_topic_at_10_hz(
-    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+    start_node: Any, peer: Any, diagnostics: Any, instruments: Instruments, tmp_path: Path
 ) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        port = probe.getsockname()[1]
-    node = start_node(nmea=f'udp://127.0.0.1:{port}')
+    node = start_node(nmea=instruments.source)
     ended = threading.Event()
 
     def talk() -> None:
-        text = 'IIVHW,,T,,M,10.0,N,,K'
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
-            while not ended.wait(1.0):
-                sentence = f'${text}*{calc_checksum(text)}\r\n'
-                line.sendto(sentence.encode(), ('127.0.0.1', port))
+        while not ended.wait(1.0):
+            instruments.say(sentence('IIVHW,,T,,M,10.0,N,,K'))
 
     talking = threading.Thread(target=talk)
     talking.start()
     try:
-        diagnostics.wait_for(PART, f'NMEA udp://127.0.0.1:{port}', value='fed by')
+        diagnostics.wait_for(PART, f'NMEA {instruments.source}', value='fed by')
         driver = Driver(peer, PLAIN, twist, 10.0)
         try:
             node.wait_for_log('speed_through_water: now from a topic, no longer from NMEA')
@@ -149,11 +151,11 @@ def test_a_flood_on_one_input_delays_no_other(start_node, peer, diagnostics, tmp
             ground.publish(message.payload)
             peer.spin_for(0.1)
 
-    sail(4.0)
+    sail(2.0)
     calm = len(sent)
     flood = Driver(peer, PLAIN, twist, 20_000.0)
     try:
-        sail(10.0)
+        sail(6.0)
         diagnostics.wait_for(PART, 'over 1000 a second')
     finally:
         flood.close()

@@ -13,7 +13,7 @@ import yaml
 
 from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, parameters_file
+from shipdrag_ros.node.settings import KEYS, NodeSettings, parameters_file
 from shipdrag_ros.parameters import Parameters
 
 ROOT = Path(__file__).parents[2]
@@ -68,17 +68,6 @@ def test_paths_stay_inside_their_roots(tmp_path: Path) -> None:
     ):
         with pytest.raises(ParameterError, match=f'{name}: .*outside of path_roots'):
             settings(**fits | {name: str(path), 'path_roots': roots}).paths()
-
-
-def test_no_path_or_line_can_be_set_over_a_service() -> None:
-    assert {
-        'ship_file',
-        'output_directory',
-        'nmea',
-        'keep_days',
-        'keep_bytes',
-        'path_roots',
-    } == START_ONLY
 
 
 def test_the_launch_file_parses_and_sets_known_parameters() -> None:

@@ -283,12 +283,13 @@ def hear(
     fault: str,
     *,
     within_s: int = 130,
+    from_s: int = 0,
     current_m_s: float = 0.0,
 ) -> tuple[int | None, bool]:
     """
     Sail for 7 min, stop the engine, glide for 6: when not green, was the stop found?
 
-    Where it must be not green before she stops, that is looked at closely.
+    Where it must be not green before she stops, that is looked at closely from a time on.
     """
     closely_s = within_s + 15 if within_s < 420 else 0
     node = bench.node(ros=('-p', 'use_sim_time:=true', '-p', 'record:=false'))
@@ -302,7 +303,8 @@ def hear(
         clock = Clock()
         clock.clock.sec = 1_700_000_000 + second
         bench.peer.clock.publish(clock)
-        closely = named is None and second < closely_s  # /diagnostics comes once a second
+        # /diagnostics comes once a second
+        closely = named is None and from_s <= second < closely_s
         bench.peer.spin(0.25 if closely else 0.02)
         true = coasting(second - 420.0) + 0.02 * math.sin(0.2 * second)
         way += true + current_m_s
@@ -327,7 +329,9 @@ def hear(
     return named, found
 
 
-def nonsense(bench: Bench, *faults: str, doubted: str, beside: str, within_s: int = 80) -> Found:
+def nonsense(
+    bench: Bench, *faults: str, doubted: str, beside: str, within_s: int = 80, from_s: int = 0
+) -> Found:
     """Return what becomes of faults of one source while another is sound."""
     said, good = [], True
     for fault in faults:
@@ -335,7 +339,7 @@ def nonsense(bench: Bench, *faults: str, doubted: str, beside: str, within_s: in
         bench.peer = Stranger()
         # that it stands still is known after `frozen_s`: 3 m/s may be a current of 2 before
         limit_s = 130 if fault == 'constant' else within_s
-        named, found = hear(bench, doubted, beside, fault, within_s=limit_s)
+        named, found = hear(bench, doubted, beside, fault, within_s=limit_s, from_s=from_s)
         good = good and named is not None and named <= limit_s
         good = good and found
         said.append(

@@ -177,7 +177,7 @@ def test_a_log_that_says_nothing_is_named_and_what_is_sound_finds_the_stop(tmp_p
     bench = Bench(tmp_path)
     try:
         good, text = nonsense(
-            bench, 'random', doubted='speed_through_water', beside='speed_over_ground'
+            bench, 'random', doubted='speed_through_water', beside='speed_over_ground', from_s=45
         )
     finally:
         bench.close()

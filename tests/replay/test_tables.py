@@ -71,14 +71,6 @@ def test_coastdowns_are_a_line_each(run: RunResult) -> None:
     assert run.table() == cells.coastdowns_table([run])
 
 
-def test_a_record_without_coastdown_says_so(run: RunResult) -> None:
-    none = replace(run, coastdowns=(), steady_lead_s=345.0)
-    (line,) = none.summary()
-    assert line.startswith('No coastdown found: longest steady sailing 345 s')
-    assert none.table().rows == ()
-    assert run.summary()[0].startswith('At ')
-
-
 def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:
     failed = replace(run.coastdowns[0], estimate=None, failure='too short')
     both = replace(run, coastdowns=(failed, *run.coastdowns))
