@@ -10,10 +10,11 @@ is made compact in the same way: its name holds a whole file at every moment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import zstandard
@@ -42,7 +43,13 @@ from shipdrag_ros.bags.records import (
     unpack_zstd,
     walk,
 )
-from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes, sync_directory
+from shipdrag_ros.bags.writer import (
+    CHUNK_RANGE,
+    RecordWriter,
+    as_bytes,
+    attachment,
+    sync_directory,
+)
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.progress import PartDone
 
@@ -84,7 +91,11 @@ class Recovery:
 
 
 def recover(
-    source: Path, output: Path, *, progress: PartDone = lambda done, total: None
+    source: Path,
+    output: Path,
+    *,
+    attachments: Mapping[str, str] = MappingProxyType({}),
+    progress: PartDone = lambda done, total: None,
 ) -> Recovery:
     """
     Save every whole message of a bag.
@@ -96,6 +107,8 @@ def recover(
     output
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
+    attachments
+        Text by name, in place of what is attached in the source.
     progress
         Called with bytes done, and in all, of each file.
 
@@ -110,12 +123,14 @@ def recover(
             f'{str(source)!r} holds {len(bags)} bags; recover each by itself: '
             f'{", ".join(bag.name for bag in bags)}'
         )
-    with _salvaged(bags[0], output, progress) as salvage:
+    with _salvaged(bags[0], output, progress, without=attachments.keys()) as salvage:
         sound, doubtful, damages = salvage.sound, salvage.doubtful, salvage.damages
         if not salvage.records:
             raise BagError(
                 f'{str(source)!r} holds no record of MCAP, nothing can be saved; give a .mcap file'
             )
+        for name, text in attachments.items():
+            sound.writer.add(attachment(name, text))
         sound.publish()
         if doubtful.used:
             doubtful.publish()
@@ -166,11 +181,15 @@ def compact(path: Path, *, messages: int) -> None:
 
 @contextmanager
 def _salvaged(
-    bag: BagFiles, output: Path, progress: PartDone = lambda done, total: None
+    bag: BagFiles,
+    output: Path,
+    progress: PartDone = lambda done, total: None,
+    *,
+    without: Collection[str] = (),
 ) -> Iterator[_Salvage]:
     """Save what can be saved of a bag, into files that vanish unless they are published."""
     with _Salvaged(output) as sound, _Salvaged(output.with_suffix('.quarantine.mcap')) as doubtful:
-        salvage = _Salvage(sound, doubtful, bag, progress)
+        salvage = _Salvage(sound, doubtful, bag, progress, without)
         for file in bag.files:
             salvage.take(file)
         yield salvage
@@ -287,7 +306,12 @@ class _Salvage:
     """One pass over the files of a bag."""
 
     def __init__(
-        self, sound: _Salvaged, doubtful: _Salvaged, bag: BagFiles, progress: PartDone
+        self,
+        sound: _Salvaged,
+        doubtful: _Salvaged,
+        bag: BagFiles,
+        progress: PartDone,
+        without: Collection[str],
     ) -> None:
         self.damages = DamageList()
         self.bytes_read = 0
@@ -297,6 +321,7 @@ class _Salvage:
         self.doubtful = doubtful
         self._bag = bag
         self._progress = progress
+        self._without = without  # names of attachments
         self._declared = FileSummary()
         for warning in bag.warnings:
             self.damages.add(0, 'file', DamageKind.MISSING, warning)
@@ -386,7 +411,7 @@ class _Salvage:
                 self._forget()
             case Header():
                 self.sound.profile = self.doubtful.profile = record.profile
-            case Attachment() | Metadata():
+            case Attachment() | Metadata() if record.name not in self._without:
                 bag.once(record)
 
     def _message(self, content: bytes, offset: int, bag: _Salvaged) -> None:

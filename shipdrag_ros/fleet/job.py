@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
+from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.diagnose import with_whole_glides
@@ -158,14 +159,10 @@ def _digest(files: Sequence[Path]) -> str:
 
 
 def _recording(files: Sequence[Path]) -> str:
-    from shipdrag_ros.bags.mcap_file import McapFile
-    from shipdrag_ros.bags.writer import METADATA
-
     try:
-        about = McapFile(files[0]).contents.metadata.get(METADATA, {})
+        return McapFile(files[0]).contents.recording.get('recording_id', '')
     except BagError:
         return ''  # the job will say so
-    return str(about.get('recording_id', ''))
 
 
 UNNAMED = 'unnamed'

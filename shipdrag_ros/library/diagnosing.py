@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarli
 from shipdrag_ros.errors import DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.library.replaying import Listener, refuse_two_ships
+from shipdrag_ros.library.replaying import Listener, refuse_mixed, ship_in
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (
@@ -32,7 +32,6 @@ from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
     SHIP_FILE,
     StopTime,
-    refuse_without_input,
     ship_of,
     told_beside,
 )
@@ -85,8 +84,7 @@ def diagnose_runs(
         If neither a coastdown nor the log and the track can be examined, or an earlier
         diagnosis is of another ship, of later runs or of one of these.
     """
-    if given is None:
-        refuse_two_ships((run, None) for run, _ in runs)
+    refuse_mixed(runs, given)
     windowed = any(window is not None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
     if (
@@ -233,6 +231,7 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
+    refuse_mixed(runs, given)
     seen = _found(listener, runs, given, progress)
     for line in seen.warnings:  # a diagnosis has them among its notes
         listener.log(line)
@@ -291,17 +290,14 @@ def _found(
     estimates: list[Estimate] = []
     own: list[Ship | None] = []
     warnings: list[str] = []
-    ship, parameters = given, None
-    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), None)
+    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0].run)
+    ship, parameters = ship_of(owner, given), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
-        refuse_without_input(each)
-        ship = ship_of(owner or each, ship)
-        sheet, where = sheet_of(each, listener.log)
-        was = sheet.of(ship, subject=where)
+        told, sheet = ship_in(each, ship, facts, listener.log)
+        was = replace(told, facts=ship.facts)
         of_run = None if was == ship else was
-        told = replace(was, facts=overriding(ship.facts, sheet.facts, facts))
         own.append(of_run)
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
         result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
@@ -325,7 +321,6 @@ def _found(
             seen.append(_OfRun([run(*one) for one in _named(each.name, windows)]))
         else:
             seen.append(_of_run(result, windows, run))
-    assert ship is not None
     assert parameters is not None
     return _Coastdowns(
         [coast for one in seen for coast in one.coasts],

@@ -29,7 +29,7 @@ from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime
+from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, attached_ship
 from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
@@ -221,10 +221,7 @@ class Record(Shown):
     @property
     def ship(self) -> Ship | None:
         """The ship given, or the one attached to the first run; None: not known."""
-        text = self.runs[0].attachments.get(SHIP_FILE)
-        if self.given is not None or text is None:
-            return self.given
-        return Ship.from_yaml(text, subject=f'{self.runs[0].name}: {SHIP_FILE}')
+        return self.given or attached_ship(self.runs[0])
 
     @property
     def truth(self) -> TrueCurve | None:
@@ -254,6 +251,8 @@ class Record(Shown):
         """
         Write a record of one run as a bag, which `read` and the command line take.
 
+        A ship that was given for it is attached.
+
         Raises
         ------
         BagError
@@ -265,7 +264,7 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        self.runs[0].save(out)
+        self.runs[0].save(out, {} if self.given is None else {SHIP_FILE: self.given.to_yaml()})
         return out
 
     def _lines(self) -> Sequence[str]:

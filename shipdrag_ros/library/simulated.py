@@ -31,6 +31,9 @@ from shipdrag_ros.simulation.effects import find, parse, terms, values_of
 SPEED_FRACTION = 0.8
 """Of the highest speed of the baseline: where a simulation begins."""
 
+LONGEST_S = 1e6
+"""Of the record before the stop, and from it on."""
+
 _FIRST_YEAR, _LAST_YEAR = 1980, 2037  # the stamp of a message has 31 bits of seconds
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _AT_ONCE = 1000  # messages between two looks at the progress
@@ -90,6 +93,11 @@ def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
     SimulationError
         If the settings ask for something impossible.
     """
+    for name in ('lead_in_s', 'duration_s'):
+        if getattr(settings, name) > LONGEST_S:
+            raise SimulationError(
+                f'{name} is {getattr(settings, name):g}, expected at most {LONGEST_S:g}'
+            )
     scenario = Scenario(
         speed_m_s=settings.speed_m_s,
         lead_in_s=settings.lead_in_s,

@@ -374,11 +374,18 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     """
     Return the ship that is given, else the one attached to a bag.
     """
-    if given is not None:
-        return given
-    if SHIP_FILE not in run.attachments:
+    ship = given or attached_ship(run)
+    if ship is None:
         raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
-    return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
+    return ship
+
+
+def attached_ship(run: Run) -> Ship | None:
+    """
+    Return the ship whose file is attached to a bag, if one is.
+    """
+    text = run.attachments.get(SHIP_FILE)
+    return None if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
 
 
 def recorded_parameters(run: Run) -> Parameters:

@@ -23,7 +23,7 @@ import numpy as np
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.contents import Contents
-from shipdrag_ros.bags.mcap_file import BagFiles, is_bag
+from shipdrag_ros.bags.mcap_file import METADATA, BagFiles, is_bag
 from shipdrag_ros.bags.message_index import Messages
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.run import BATCH
@@ -41,7 +41,6 @@ from shipdrag_ros.samples import (
     in_arrival_order,
 )
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import Format, Job, best_of, head_of
 from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of, new_bag
 
@@ -299,19 +298,12 @@ class LogRun(Run):
         """The files that it was made of."""
         return self._sources
 
-    def save(self, out: Path) -> None:
+    def save(self, out: Path, attachments: Mapping[str, str]) -> None:
         """
-        Write the run as a bag.
-
-        Raises
-        ------
-        BagError
-            If the disk does not take it.
+        Write the run as a bag, see `Run.save`.
         """
-        own = self._log.attachments
-        with new_bag(
-            out, {k: text for k, text in self.attachments.items() if k not in own}
-        ) as bag:
+        known, own = {**self.attachments, **attachments}, self._log.attachments
+        with new_bag(out, {k: text for k, text in known.items() if k not in own}) as bag:
             self._log.copy_to(bag)
 
 

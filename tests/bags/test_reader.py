@@ -17,7 +17,7 @@ from rosbags.rosbag2 import CompressionMode
 from shipdrag_ros.bags import BagWriter, Compression, ResetMark, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message
+from shipdrag_ros.messages import EncodedMessage, EventKind, EventNote, encode, event_message
 from shipdrag_ros.samples import Block, Channel, concatenate
 from tests.bags.conftest import assert_same, foreign, read_samples, rosbag2
 
@@ -205,13 +205,19 @@ def test_resets_are_read_at_their_place(tmp_path: Path, block: Block) -> None:
                 mark = event_message(
                     EventNote(EventKind.RESET_REQUEST, message.log_ns, f'reason {i}')
                 )
-                bag.write(mark.topic, mark.type, mark.payload, log_ns=message.log_ns, publish_ns=0)
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
+                bag.put(
+                    EncodedMessage(
+                        mark.topic, mark.type, mark.payload, log_ns=message.log_ns, publish_ns=0
+                    )
+                )
+            bag.put(
+                EncodedMessage(
+                    message.topic,
+                    message.type,
+                    message.payload,
+                    log_ns=message.log_ns,
+                    publish_ns=message.publish_ns,
+                )
             )
     (run,) = open_runs([tmp_path / 'a.mcap'])
     first, reset, second, again, third = run.inputs()
@@ -231,7 +237,7 @@ def test_outputs_of_two_nodes_are_told_and_not_mixed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for node in ('/a', '/b'):
             mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'), node=node)
-            bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+            bag.put(EncodedMessage(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5))
     (run,) = open_runs([tmp_path / 'a.mcap'])
     assert run.node is None
     assert list(run.outputs()) == []
@@ -330,7 +336,7 @@ def test_attachments_outputs_and_damage(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         bag.attach('ship.yaml', 'é')
         mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'))
-        bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+        bag.put(EncodedMessage(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5))
     content = (tmp_path / 'a.mcap').read_bytes()
     (tmp_path / 'a.mcap').write_bytes(content[:-20])
     (run,) = open_runs([tmp_path / 'a.mcap'])

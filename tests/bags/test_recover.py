@@ -28,6 +28,7 @@ from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.records import MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.samples import Block, Channel, concatenate
 from tests.bags.conftest import as_chunk, as_record, assert_same, read_samples, rosbag2
 
@@ -267,7 +268,11 @@ def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path, damag
     with BagWriter(path) as bag:
         for number in range(1500):
             payload = rng.randbytes(64_000)
-            bag.write('/cloud', 'std_msgs/msg/String', payload, log_ns=number, publish_ns=number)
+            bag.put(
+                EncodedMessage(
+                    '/cloud', 'std_msgs/msg/String', payload, log_ns=number, publish_ns=number
+                )
+            )
     if damaged:
         with path.open('r+b') as file:
             file.seek(48 * MIB)

@@ -27,7 +27,14 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.errors import BagError, SimulationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.run_down import RunDown
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
+from shipdrag_ros.messages import (
+    EncodedMessage,
+    EventKind,
+    EventNote,
+    encode,
+    event_message,
+    types,
+)
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
@@ -185,7 +192,11 @@ def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, shi
                 effort=np.empty(0),
             )
             payload = types.serialize(types.JOINT_STATE, message)
-            bag.write('/shaft', types.JOINT_STATE, payload, log_ns=i * 10**9, publish_ns=i * 10**9)
+            bag.put(
+                EncodedMessage(
+                    '/shaft', types.JOINT_STATE, payload, log_ns=i * 10**9, publish_ns=i * 10**9
+                )
+            )
     (run,) = open_runs([tmp_path / 'a.mcap'])
     counts = replay(run, ship=ship).inputs['shaft']
     assert counts == InputCounts(10, 9 * 4 + 10, {'surplus_joint': 10, 'nan': 4})

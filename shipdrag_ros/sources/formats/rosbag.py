@@ -25,14 +25,13 @@ import zstandard
 from rosbags.rosbag1 import Reader
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.bags.mcap_file import unpacked_file
+from shipdrag_ros.bags.mcap_file import METADATA, unpacked_file
 from shipdrag_ros.bags.records import DamageKind, DamageList
 from shipdrag_ros.bags.run import unpacked_message
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
 from shipdrag_ros.messages.topics import TOPICS
-from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
