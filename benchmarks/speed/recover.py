@@ -290,11 +290,7 @@ def memory(sizes_mb: tuple[int, ...], folder: Path) -> None:
         with BagWriter(path) as bag:
             for number in range(size_mb * 10**6 // PAYLOAD_BYTES):
                 payload, ns = rng.randbytes(PAYLOAD_BYTES), START_NS + number * 10**6
-                bag.put(
-                    EncodedMessage(
-                        '/cloud', 'std_msgs/msg/String', payload, log_ns=ns, publish_ns=ns
-                    )
-                )
+                bag.put(EncodedMessage('/cloud', 'std_msgs/msg/String', payload, ns, ns))
         for state in ('sound', 'damaged'):
             if state == 'damaged':
                 with path.open('r+b') as file, mmap(file.fileno(), 0) as content:

@@ -33,7 +33,7 @@ from shipdrag_ros.messages import (
 )
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import Block, concatenate
 
 WindowSpan = tuple[float, float]
 
@@ -236,8 +236,6 @@ class Run:
         kinds = {
             each.compression or 'none' for part in self.parts for each in part.contents.segments
         }
-        if self.paths != tuple(part.path for part in self.parts):
-            return 'none'  # they are those of a bag made for the moment
         return ', '.join(sorted(kinds)) or 'none'
 
     @property
@@ -262,7 +260,7 @@ class Run:
         out
             File to make.
         attachments
-            Text by name, in place of what is attached.
+            Text by name, which counts for what is attached.
 
         Raises
         ------
@@ -443,6 +441,12 @@ class RunSamples:
         for messages in self._run.messages(keys, start_ns=start_ns, end_ns=end_ns):
             for first in range(0, len(messages), BATCH):
                 yield from self._items(messages[first : first + BATCH], sources)
+
+    def block(self) -> Block:
+        """
+        Return all samples, without the marks.
+        """
+        return concatenate([item for item in self if isinstance(item, Block)])
 
     def _items(self, messages: Messages, sources: tuple[Source, ...]) -> Iterator[Block | Mark]:
         """Cut at the marks."""

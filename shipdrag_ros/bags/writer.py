@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from enum import Enum
 from fcntl import LOCK_EX, LOCK_NB, flock
@@ -440,3 +440,31 @@ class BagWriter(RecordWriter):
         schema = mcap.Schema(id=0, name=type_name, encoding='ros2msg', data=text)
         self._channels[key] = self.declare(channel, schema)
         return self._channels[key]
+
+
+@contextmanager
+def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
+    """
+    Open a bag to write into; where that fails, none is left.
+
+    Parameters
+    ----------
+    out
+        MCAP file to make.
+    attachments
+        Text by name, a ship file for instance.
+
+    Raises
+    ------
+    BagError
+        If the bag cannot be made.
+    """
+    writer = BagWriter(out)
+    try:
+        with writer:
+            for name, text in attachments.items():
+                writer.attach(name, text)
+            yield writer
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise

@@ -178,7 +178,7 @@ class BagJob(NamedTuple):
     sources
         The parts of one recording; of most bags, one.
     content_hash
-        What the rows depend on, see `local.content_hash`.
+        What the rows depend on, see `content_hash`.
     learnt
         Terms beside those of the ship file.
     """

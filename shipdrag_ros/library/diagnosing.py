@@ -32,6 +32,7 @@ from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
     SHIP_FILE,
     StopTime,
+    refuse_without_input,
     ship_of,
     told_beside,
 )
@@ -290,6 +291,8 @@ def _found(
     estimates: list[Estimate] = []
     own: list[Ship | None] = []
     warnings: list[str] = []
+    for run, _ in runs:
+        refuse_without_input(run)
     owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0].run)
     ship, parameters = ship_of(owner, given), None
     for each, window in runs:
@@ -316,15 +319,11 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-        run = partial(CoastRun, facts=sheet.facts, ship=of_run)
-        if ship.baseline is None:
-            seen.append(_OfRun([run(*one) for one in _named(each.name, windows)]))
-        else:
-            seen.append(_of_run(result, windows, run))
+        seen.append(_of_run(result, windows, partial(CoastRun, facts=sheet.facts, ship=of_run)))
     assert parameters is not None
     return _Coastdowns(
         [coast for one in seen for coast in one.coasts],
-        [glide for one in seen for glide in one.whole] if any(one.more for one in seen) else [],
+        [glide for one in seen for glide in one.whole] if any(one.notes for one in seen) else [],
         tuple(note for one in seen for note in one.notes),
         ship,
         parameters,
@@ -336,10 +335,9 @@ def _found(
 
 
 class _OfRun(NamedTuple):
-    """Coastdowns of a bag; whether it has more of a glide; the glides, and what these are."""
+    """Coastdowns of a bag; its glides, and what these are where they are more than those."""
 
     coasts: list[CoastRun]
-    more: bool = False
     whole: Sequence[CoastRun] = ()
     notes: tuple[str, ...] = ()
 
@@ -349,12 +347,14 @@ def _of_run(
     windows: Sequence[tuple[EndedCoastdown, Window]],
     run: Callable[[str, Window], CoastRun],
 ) -> _OfRun:
-    """Look for glides that are more than the coastdowns of a bag."""
+    """Look for glides that are more than the coastdowns of a bag; by a baseline alone."""
     bag = result.run.name
     coasts = [run(*one) for one in _named(bag, windows)]
+    if result.ship.baseline is None:
+        return _OfRun(coasts)
     if not windows:
         missed = [run(bag, each) for each in dismissed_glides(result)]
-        return _OfRun([], bool(missed), missed, (f'{bag}: {DISMISSED}',) if missed else ())
+        return _OfRun([], missed, (f'{bag}: {DISMISSED}',) if missed else ())
     whole: list[CoastRun] = []
     notes: list[str] = []
     glide_end_ns = 0
@@ -366,7 +366,7 @@ def _of_run(
         if glide is not None:
             notes.append(f'{coast.name}: {coastdown.disturbed or NOT_ALL}')
             glide_end_ns = glide.end_ns
-    return _OfRun(coasts, glide_end_ns > 0, whole, tuple(notes))
+    return _OfRun(coasts, whole, tuple(notes))
 
 
 def _named(

@@ -244,8 +244,7 @@ class Record(Shown):
         """
         Return all that was measured, in order of arrival, plausible or not.
         """
-        items = (item for run in self.runs for item in run.inputs())
-        return concatenate([item for item in items if isinstance(item, Block)])
+        return concatenate([run.inputs().block() for run in self.runs])
 
     def save(self, path: str | PathLike[str]) -> Path:
         """
@@ -354,6 +353,14 @@ def ship_of(ship: ShipGiven) -> Ship | None:
     return ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
 
 
+def is_frame(source: object) -> bool:
+    """
+    Say whether a source has named columns.
+    """
+    # of its type: a lazy frame would look at its data to tell its columns
+    return hasattr(type(source), 'columns') and hasattr(source, '__getitem__')
+
+
 @says_it_in_python
 def read(
     source: Any,
@@ -422,17 +429,20 @@ def read(
     >>> sd.read(frame, ship=ship, columns={'speed_through_water': 'log:kn'}, time='t')
     <Record: a ship without a name, 1 run, 1200 messages>
     """
-    from shipdrag_ros.library.logs import is_frame
-
     given = ship_of(ship)
     alone = isinstance(source, str | PathLike) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
-    sources = [each if is_frame(each) else _path(each) for each in several]
-    bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
+    bags: list[Path] = []
+    others: list[Any] = []
+    for each in several:
+        path = None if is_frame(each) else _path(each)
+        if path is not None and is_bag(path):
+            bags.append(path)
+        else:
+            others.append(path or each)
     runs = open_runs(bags, remap=remap) if bags else []
     if given is None:
         refuse_two_ships((run, None) for run in runs)
-    others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
         given_for_logs = {'columns': columns, 'time': time, 'rate_hz': rate_hz, 'options': options}
         idle = [f'{name}=' for name, value in given_for_logs.items() if value is not None]

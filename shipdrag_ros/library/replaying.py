@@ -196,14 +196,12 @@ def replay_run(
                 progress=progress,
             )
         )
+    warnings = list(result.warnings)
     if stop is not None:
-        beside = told_beside(each, stop, (one.start_ns for one in result.coastdowns))
-        listener.log(f'{each.name}: {beside}')
-        result = replace(result, warnings=(*result.warnings, beside))
+        warnings.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+        listener.log(f'{each.name}: {warnings[-1]}')
     if not result.coastdowns:
-        astern = _astern(each, result.ship)
-        if astern:
-            result = replace(result, warnings=(*result.warnings, astern))
+        warnings.append(_astern(each, result.ship))
     if window is not None:
         for coastdown in result.coastdowns:
             if coastdown.estimate is None:
@@ -211,10 +209,8 @@ def replay_run(
                     f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
                     f'{coastdown.failure}'
                 )
-        beyond = _beyond(each, window[1])
-        if beyond:
-            result = replace(result, warnings=(*result.warnings, beyond))
-    return result
+        warnings.append(_beyond(each, window[1]))
+    return replace(result, warnings=tuple(filter(None, warnings)))
 
 
 def _astern(run: Run, ship: Ship) -> str:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, tzinfo
 from pathlib import Path
@@ -221,34 +220,6 @@ def key_of(channel: Channel) -> tuple[str, str]:
     Return topic and type that samples of a channel have in a bag.
     """
     return f'/{channel.input}', input_type(channel)
-
-
-@contextmanager
-def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
-    """
-    Open a bag to write into; where that fails, none is left.
-
-    Parameters
-    ----------
-    out
-        MCAP file to make.
-    attachments
-        Text by name, a ship file for instance.
-
-    Raises
-    ------
-    BagError
-        If the bag cannot be made.
-    """
-    writer = BagWriter(out)
-    try:
-        with writer:
-            for name, text in attachments.items():
-                writer.attach(name, text)
-            yield writer
-    except BaseException:
-        out.unlink(missing_ok=True)
-        raise
 
 
 _ISO = re.compile(

@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.messages import encode, types
-from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from tests.runs import write_run
 
 START_NS = 1_700_000_000_000_000_000
@@ -83,11 +83,6 @@ def sample_bag(tmp_path_factory: pytest.TempPathFactory, block: Block) -> bytes:
         bag.attach('ship.yaml', 'name: x\n')
         bag.write_samples(block[:200])
     return path.read_bytes()
-
-
-def read_samples(run: Any) -> Block:
-    """Join the blocks among what a run gives."""
-    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
 
 
 def assert_same(one: Block, other: Block) -> None:

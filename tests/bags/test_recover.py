@@ -30,7 +30,7 @@ from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import as_chunk, as_record, assert_same, read_samples, rosbag2
+from tests.bags.conftest import as_chunk, as_record, assert_same, rosbag2
 
 WriteBag = Callable[..., Path]
 MIB = 1 << 20
@@ -48,7 +48,7 @@ def test_a_directory_of_rosbag2(tmp_path: Path, block: Block, mode: CompressionM
     # not 0600, as temporary files are: the group may read it
     assert stat.S_IMODE(Path(result.output).stat().st_mode) == 0o640
     (run,) = open_runs([result.output])
-    assert_same(read_samples(run), block[:300])
+    assert_same(run.inputs().block(), block[:300])
     # cut off, as a loss of power leaves it
     (file,) = source.glob('*.mcap*')
     file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
@@ -104,7 +104,7 @@ def test_a_split_bag_is_joined_and_each_damage_names_its_file(tmp_path, write_ba
     # the same topic of three files is one channel
     assert len({topic.topic for topic in run.topics}) == len(run.topics)
     whole = concatenate([block[:100], block[200:300]])
-    assert set(whole.receive_ns) <= set(read_samples(run).receive_ns)
+    assert set(whole.receive_ns) <= set(run.inputs().block().receive_ns)
 
 
 def test_several_bags_are_not_joined(tmp_path: Path, write_bag: WriteBag, block: Block) -> None:
@@ -268,11 +268,7 @@ def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path, damag
     with BagWriter(path) as bag:
         for number in range(1500):
             payload = rng.randbytes(64_000)
-            bag.put(
-                EncodedMessage(
-                    '/cloud', 'std_msgs/msg/String', payload, log_ns=number, publish_ns=number
-                )
-            )
+            bag.put(EncodedMessage('/cloud', 'std_msgs/msg/String', payload, number, number))
     if damaged:
         with path.open('r+b') as file:
             file.seek(48 * MIB)
@@ -370,7 +366,7 @@ def test_chunks_of_two_files_whose_numbers_meet_keep_their_topics(tmp_path: Path
     recover(folder, tmp_path / 'c.mcap')
     assert check([tmp_path / 'c.mcap'])[0].sound
     (run,) = open_runs([tmp_path / 'c.mcap'])
-    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    block = run.inputs().block()
     for place, channel in enumerate((Channel.DEPTH, Channel.SPEED_THROUGH_WATER)):
         assert np.all(block.value[block.channel == channel, 0] == 5.0 + place)
         assert np.sum(block.channel == channel) == 2000

@@ -143,13 +143,7 @@ def test_closing_twice_is_harmless_and_an_exception_keeps_what_is_written(tmp_pa
     (message,) = encode(Block.of(Channel.SHAFT, [5], [1.0]))
     with pytest.raises(RuntimeError, match='stop'), BagWriter(path) as bag:  # noqa: PT012
         bag.put(
-            EncodedMessage(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=6,
-                publish_ns=message.publish_ns,
-            )
+            EncodedMessage(message.topic, message.type, message.payload, 6, message.publish_ns)
         )
         raise RuntimeError('stop')
     bag.close()
@@ -159,8 +153,6 @@ def test_closing_twice_is_harmless_and_an_exception_keeps_what_is_written(tmp_pa
 def test_a_stamp_before_1970_is_no_obstacle(tmp_path: Path) -> None:
     (message,) = encode(Block.of(Channel.SHAFT, [-5], [1.0]))
     with BagWriter(tmp_path / 'a.mcap') as bag:
-        bag.put(
-            EncodedMessage(message.topic, message.type, message.payload, log_ns=6, publish_ns=-5)
-        )
+        bag.put(message._replace(log_ns=6, publish_ns=-5))
     (row,) = rows(tmp_path / 'a.mcap')
     assert (row.publish_ns, row.payload) == (0, message.payload)

@@ -119,28 +119,6 @@ def test_a_directory_of_rosbag2_is_one_bag(tmp_path: Path) -> None:
     ]
 
 
-def test_the_run_file_of_each_bag(tmp_path: Path) -> None:
-    touch(tmp_path / 'many' / 'a.mcap', tmp_path / 'many' / 'b.mcap', tmp_path / 'one' / 'c.mcap')
-    (tmp_path / 'many' / 'a.mcap.run.yaml').write_text('of a')
-    (tmp_path / 'many' / 'run.yaml').write_text('of nobody')
-    (tmp_path / 'one' / 'run.yaml').write_text('of c')
-    touch(tmp_path / 'two' / 'd_000.mcap', tmp_path / 'two' / 'd_001.mcap')
-    (tmp_path / 'two' / 'run.yaml').write_text('of d')
-    (tmp_path / 'none').mkdir()
-    (tmp_path / 'none' / 'run.yaml').write_text('of no bag')
-    found = find([str(tmp_path)])
-    assert {each.bag: each.run for each in found.sources} == {
-        'many/a.mcap': 'of a',
-        'many/b.mcap': '',
-        'one/c.mcap': 'of c',
-        'two/d_000.mcap': 'of d',
-        'two/d_001.mcap': 'of d',
-    }
-    (note,) = found.notes
-    assert note.startswith("'many/run.yaml' lies beside 2 bags and is used for none of them")
-    assert [each.may_be_part for each in found.sources] == [False, False, False, True, True]
-
-
 def test_the_store_is_not_searched(tmp_path: Path) -> None:
     touch(
         tmp_path / 'a.mcap', tmp_path / 'store' / 'deep' / 'b.mcap', tmp_path / 'store2' / 'c.mcap'

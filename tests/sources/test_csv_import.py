@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.replay import replay
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import (
@@ -61,7 +61,7 @@ def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> dic
 def samples(path: Path) -> Block:
     (run,) = open_runs([path])
     assert run.warnings == ()
-    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    return run.inputs().block()
 
 
 _PAIR = '{}\n' + ''.join(f'{t},{54.1 + 1e-5 * t:.5f},{7.9 + 1e-5 * t:.5f}\n' for t in range(9))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.csv.importer import FORMAT
 from shipdrag_ros.sources.log import Log
@@ -28,7 +28,7 @@ def read(folder: Path, header: str, rows: Iterable[str]) -> tuple[Block, str]:
     path.write_text('\n'.join([header, *rows]) + '\n')
     shown: list[list[str]] = []
     (run,) = read_any([path], show=shown.append)
-    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    block = run.inputs().block()
     return block, '\n'.join(shown[0])
 
 
