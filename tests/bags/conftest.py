@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +105,14 @@ def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NO
                 )
             writer.write(connections[message.topic], message.log_ns, message.payload)
     return path
+
+
+def listed(folder: Path, files: Sequence[str]) -> None:
+    """Write the metadata of rosbag2 over files."""
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
+        f'  relative_file_paths: {list(files)}\n  compression_mode: ""\n'
+    )
 
 
 def foreign(path: Path, block: Block, **options: Any) -> Path:

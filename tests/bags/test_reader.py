@@ -19,7 +19,7 @@ from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage, EventKind, EventNote, encode, event_message
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import assert_same, foreign, rosbag2
+from tests.bags.conftest import assert_same, foreign, listed, rosbag2
 
 WriteBag = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
@@ -166,11 +166,7 @@ def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(tmp_path, block: B
     (run,) = open_runs([folder])
     assert_same(run.inputs().block(), block[:220])
     assert 'metadata.yaml is missing' in run.warnings[0]
-    files = [f'split_{i}.mcap' for i in range(12)]
-    (folder / 'metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        f'  relative_file_paths: {files}\n  compression_mode: ""\n'
-    )
+    listed(folder, [f'split_{i}.mcap' for i in range(12)])
     (run,) = open_runs([folder])
     assert_same(run.inputs().block(), block[:220])
     assert run.warnings == ('split_11.mcap is listed in metadata.yaml and is not there',)
@@ -179,10 +175,7 @@ def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(tmp_path, block: B
 def test_a_split_bag_may_hold_files_of_another_tool(write_bag: WriteBag, block: Block) -> None:
     own = write_bag('a.mcap', block[:100])
     foreign(own.with_name('b.mcap'), block[:0])
-    own.with_name('metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        '  relative_file_paths: [a.mcap, b.mcap]\n'
-    )
+    listed(own.parent, ['a.mcap', 'b.mcap'])
     (run,) = open_runs([own.parent])
     assert [path.name for path in run.paths] == ['a.mcap', 'b.mcap']
     assert_same(run.inputs().block(), block[:100])

@@ -68,7 +68,7 @@ def test_an_existing_file_is_not_overwritten(ship_file, tmp_path, capsys):
 
 def test_a_run_that_cannot_be_used_is_named(bags, steady_bag, ship_file, tmp_path, capsys):
     slow, out = tmp_path / 'slow.yaml', tmp_path / 'learnt.yaml'
-    known = TableBaseline((0.0, 1.0, 3.0), (0.0, 1e4, 9e4))
+    known = TableBaseline((0.0, 1.0, 3.0), (0.0, 1e4, 9e4), 0.02)
     slow.write_text(replace(Ship.load(ship_file), baseline=known).to_yaml())
     for bag, ship, why in (
         (steady_bag, ship_file, 'no coastdown was found in'),

@@ -369,18 +369,13 @@ def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -
         ('depth=d:kn', "no unit 'kn' here"),
         ('position=x:m,y:deg', 'both columns in deg'),
         ('position=x:deg,y:m', 'both columns in deg'),
+        ('t:min', "no unit 'min' here; units are ms, ns, s, us"),
+        ('', 'expected COLUMN'),
     ],
 )
-def test_maps_that_say_nothing(text: str, expected: str) -> None:
+def test_maps_and_times_that_say_nothing(text: str, expected: str) -> None:
     with pytest.raises(ImportDataError, match=expected):
-        parse_input(text)
-
-
-def test_times_that_say_nothing() -> None:
-    with pytest.raises(ImportDataError, match="no unit 'min' here; units are ms, ns, s, us"):
-        parse_time('t:min')
-    with pytest.raises(ImportDataError, match='expected COLUMN'):
-        parse_time('')
+        (parse_time if text in ('t:min', '') else parse_input)(text)
 
 
 @pytest.mark.parametrize(
