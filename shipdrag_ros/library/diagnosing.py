@@ -293,7 +293,7 @@ def _found(
     warnings: list[str] = []
     for run, _ in runs:
         refuse_without_input(run)
-    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0].run)
+    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0][0])
     ship, parameters = ship_of(owner, given), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
