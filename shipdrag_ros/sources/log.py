@@ -27,6 +27,9 @@ LIMIT_NS = 2**31 * SECOND_NS
 BASE_NS = 946_684_800 * SECOND_NS
 """2000-01-01, where times that are no dates begin."""
 
+DATE_FROM_NS = 100_000_000 * SECOND_NS
+"""A count of less, which is before March 1973, is no time since 1970."""
+
 UNDATED = 'The log has no fix that gives the date; its times count from 2000-01-01.'
 
 ATTACHMENT = 'import.yaml'
