@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.library.record import is_frame
 from shipdrag_ros.library.shown import in_python
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
@@ -31,6 +30,14 @@ FRAME = 'frame'
 _ROWS = 1 << 14  # at a time
 INDEX = 'time'
 """Column of a frame's own dates, where its index has no name."""
+
+
+def is_frame(source: object) -> bool:
+    """
+    Say whether a source has named columns.
+    """
+    # of its type: a lazy frame would look at its data to tell its columns
+    return hasattr(type(source), 'columns') and hasattr(source, '__getitem__')
 
 
 class FrameTable(LogTable):

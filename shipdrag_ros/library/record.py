@@ -353,14 +353,6 @@ def ship_of(ship: ShipGiven) -> Ship | None:
     return ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
 
 
-def is_frame(source: object) -> bool:
-    """
-    Say whether a source has named columns.
-    """
-    # of its type: a lazy frame would look at its data to tell its columns
-    return hasattr(type(source), 'columns') and hasattr(source, '__getitem__')
-
-
 @says_it_in_python
 def read(
     source: Any,
@@ -429,6 +421,8 @@ def read(
     >>> sd.read(frame, ship=ship, columns={'speed_through_water': 'log:kn'}, time='t')
     <Record: a ship without a name, 1 run, 1200 messages>
     """
+    from shipdrag_ros.library.logs import is_frame
+
     given = ship_of(ship)
     alone = isinstance(source, str | PathLike) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
