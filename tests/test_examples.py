@@ -21,7 +21,7 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main, parser, verbs
 from shipdrag_ros.fleet.store import Store
-from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
+from shipdrag_ros.samples import INPUTS, Block, Channel
 from tests.sources import log_samples
 from tests.studies.residual.conftest import RIVER_SHIP
 
@@ -277,7 +277,7 @@ def test_the_columns_that_the_help_shows_are_read_as_it_says(folder: Path, capsy
 
 def samples_of(bag: str) -> Block:
     (opened,) = open_runs([Path(bag)])
-    return concatenate([item for item in opened.inputs() if isinstance(item, Block)])
+    return opened.inputs().block()
 
 
 def values(bag: str) -> list[list[float]]:

@@ -105,7 +105,7 @@ def finished(path: Path, messages: Iterable[EncodedMessage]) -> None:
     with BagWriter(path) as bag:
         for each in messages:
             times = {'log_ns': each.log_ns, 'publish_ns': each.publish_ns}
-            bag.write(each.topic, each.type, each.payload, **times)
+            bag.put(EncodedMessage(each.topic, each.type, each.payload, **times))
 
 
 def write(options: dict[str, Any]) -> Sound:
@@ -290,7 +290,7 @@ def memory(sizes_mb: tuple[int, ...], folder: Path) -> None:
         with BagWriter(path) as bag:
             for number in range(size_mb * 10**6 // PAYLOAD_BYTES):
                 payload, ns = rng.randbytes(PAYLOAD_BYTES), START_NS + number * 10**6
-                bag.write('/cloud', 'std_msgs/msg/String', payload, log_ns=ns, publish_ns=ns)
+                bag.put(EncodedMessage('/cloud', 'std_msgs/msg/String', payload, ns, ns))
         for state in ('sound', 'damaged'):
             if state == 'damaged':
                 with path.open('r+b') as file, mmap(file.fileno(), 0) as content:

@@ -45,6 +45,9 @@ _SEGMENT_BYTES = 1 << 20
 _NOT_USED = 'read from its beginning, without an index'
 
 
+RECORDING = 'shipdrag_ros'
+"""Name of the metadata record that says which recording a file is part of."""
+
 DECLARED = (mcap.Schema, mcap.Channel)
 INDEXES = (mcap.ChunkIndex, mcap.AttachmentIndex, mcap.MetadataIndex)
 
@@ -191,6 +194,11 @@ class Contents:
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
     segments: list[mcap.ChunkIndex] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+
+    @property
+    def recording(self) -> Mapping[str, str]:
+        """Version, id and part of the recording; nothing of another tool's."""
+        return self.metadata.get(RECORDING, {})
 
 
 class _BadIndexError(Exception):

@@ -16,7 +16,7 @@ import sys
 from collections import deque
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -260,6 +260,12 @@ def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
     return unpacked
 
 
+METADATA = 'metadata.yaml'
+"""Of rosbag2, beside the files that make up a bag."""
+
+PART = re.compile(r'_\d{3,}(_\d+)?(?=\.mcap)')
+"""In the name of a file of a recording of the node."""
+
 _SUFFIXES = ('.mcap', '.mcap.zstd')
 
 
@@ -281,7 +287,7 @@ class BagFiles:
     name: str
     files: tuple[Path, ...]
     message_compression: str = ''
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
 
 
 def is_bag(path: Path) -> bool:
@@ -290,7 +296,7 @@ def is_bag(path: Path) -> bool:
 
     What is not there is a bag too, so that the error is that of a bag.
     """
-    if path.is_dir() or path.name == 'metadata.yaml':
+    if path.is_dir() or path.name == METADATA:
         folder = path if path.is_dir() else path.parent
         return not any(folder.glob('*.db3*')) or any(folder.glob('*.mcap*'))
     if not path.is_file() or path.name.endswith(_SUFFIXES):
@@ -310,18 +316,18 @@ def locate(path: Path) -> list[BagFiles]:
     """
     if not path.exists():
         raise BagError(f'{str(path)!r} does not exist; give the path of a bag or a log')
-    if path.name == 'metadata.yaml':
+    if path.name == METADATA:
         path = path.parent
     if not path.is_dir():
         return [BagFiles(str(path), (path,))]
-    if (path / 'metadata.yaml').exists():
+    if (path / METADATA).exists():
         return [_rosbag2(path)]
     return _without_metadata(path)
 
 
 def _rosbag2(path: Path) -> BagFiles:
-    where = str(path / 'metadata.yaml')
-    about = _metadata(path / 'metadata.yaml')
+    where = str(path / METADATA)
+    about = _metadata(path / METADATA)
     storage = about.get('storage_identifier')
     packed = str(about.get('compression_format') or '')
     listed = about.get('relative_file_paths') or []

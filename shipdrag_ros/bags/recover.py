@@ -10,10 +10,11 @@ is made compact in the same way: its name holds a whole file at every moment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import zstandard
@@ -42,7 +43,13 @@ from shipdrag_ros.bags.records import (
     unpack_zstd,
     walk,
 )
-from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter, as_bytes, sync_directory
+from shipdrag_ros.bags.writer import (
+    CHUNK_RANGE,
+    RecordWriter,
+    as_bytes,
+    attachment,
+    sync_directory,
+)
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.progress import PartDone
 
@@ -84,7 +91,11 @@ class Recovery:
 
 
 def recover(
-    source: Path, output: Path, *, progress: PartDone = lambda done, total: None
+    source: Path,
+    output: Path,
+    *,
+    attachments: Mapping[str, str] = MappingProxyType({}),
+    progress: PartDone = lambda done, total: None,
 ) -> Recovery:
     """
     Save every whole message of a bag.
@@ -96,6 +107,8 @@ def recover(
     output
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
+    attachments
+        Text by name, added behind those of the source; of two of a name the last counts.
     progress
         Called with bytes done, and in all, of each file.
 
@@ -116,6 +129,8 @@ def recover(
             raise BagError(
                 f'{str(source)!r} holds no record of MCAP, nothing can be saved; give a .mcap file'
             )
+        for name, text in attachments.items():
+            sound.writer.add(attachment(name, text))
         sound.publish()
         if doubtful.used:
             doubtful.publish()

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import IO
 
 from shipdrag_ros.bags.contents import contents_of
+from shipdrag_ros.bags.mcap_file import PART
 from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC, Buffer
 from shipdrag_ros.bags.recover import SUFFIX
 from shipdrag_ros.display import printable
@@ -34,7 +35,7 @@ SHARE = 0.5  # of the disk, where nobody has said how much
 _LEFT = re.escape(SUFFIX)
 # a part, or what a compaction left of it
 _NAME = re.compile(
-    rf'(\.(?=.*{_LEFT}))?(?P<recording>coastdown_\d{{8}}T\d{{6}}Z)_\d{{3,}}(_\d+)?\.mcap'
+    rf'(\.(?=.*{_LEFT}))?(?P<recording>coastdown_\d{{8}}T\d{{6}}Z){PART.pattern}\.mcap'
     rf'(?P<left>{_LEFT}(\.part)?)?'
 )
 _BLOCK_BYTES = 4096  # what even an empty file costs

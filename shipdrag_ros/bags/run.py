@@ -20,7 +20,6 @@ from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.recover import recover
-from shipdrag_ros.bags.writer import METADATA
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.messages import (
     OUTPUT_TOPICS,
@@ -34,7 +33,7 @@ from shipdrag_ros.messages import (
 )
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import Block, concatenate
 
 WindowSpan = tuple[float, float]
 
@@ -65,7 +64,7 @@ def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) 
     runs: dict[str, tuple[BagFiles, list[McapFile]]] = {}
     for bag in [bag for path in paths for bag in locate(Path(path))]:
         parts = [McapFile(file) for file in bag.files]
-        about = parts[0].contents.metadata.get(METADATA, {})
+        about = parts[0].contents.recording
         if len(parts) == 1 and 'recording_id' in about:
             recording = runs.setdefault(f'id {about["recording_id"]}', (bag, []))
             recording[1].extend(parts)
@@ -76,11 +75,11 @@ def open_runs(paths: Iterable[Path], *, remap: Mapping[str, str] | None = None) 
 
 def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[McapFile]]:
     """Sort the parts of a recording by their number."""
-    if len(parts) < 2 or any(METADATA not in part.contents.metadata for part in parts):
+    if len(parts) < 2 or not all(part.contents.recording for part in parts):
         return bag, parts
     numbered: dict[int, McapFile] = {}
     for part in parts:
-        text = part.contents.metadata[METADATA].get('part', '0')
+        text = part.contents.recording.get('part', '0')
         number = int(text) if text.isdecimal() else 0
         if number in numbered:
             raise BagError(
@@ -237,14 +236,12 @@ class Run:
         kinds = {
             each.compression or 'none' for part in self.parts for each in part.contents.segments
         }
-        if self.paths != tuple(part.path for part in self.parts):
-            return 'none'  # they are those of a bag made for the moment
         return ', '.join(sorted(kinds)) or 'none'
 
     @property
     def software(self) -> str | None:
         """Version of this package that recorded it; None if it was another tool."""
-        return self.parts[0].contents.metadata.get(METADATA, {}).get('version')
+        return self.parts[0].contents.recording.get('version')
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -254,20 +251,29 @@ class Run:
             found += (f'{part.path.name}: {warning}' for warning in part.contents.warnings)
         return tuple(found)
 
-    def save(self, out: Path) -> None:
+    def save(self, out: Path, attachments: Mapping[str, str]) -> None:
         """
         Copy the one file of the run, unpacked where rosbag2 has packed it.
+
+        Parameters
+        ----------
+        out
+            File to make.
+        attachments
+            Text by name, which counts for what is attached.
 
         Raises
         ------
         BagError
             If the disk does not take it.
         """
-        if self._message_compression or self.parts[0].path.suffix == '.zstd':
-            recover(Path(self.name), out)
+        new = {k: text for k, text in attachments.items() if self.attachments.get(k) != text}
+        path = self.parts[0].path
+        if new or self._message_compression or path.suffix == '.zstd':
+            recover(Path(self.name) if self._message_compression else path, out, attachments=new)
             return
         with disk_errors(out, 'written'):
-            shutil.copyfile(self.parts[0].path, out)
+            shutil.copyfile(path, out)
 
     def part(self, start_s: float, end_s: float) -> Run:
         """
@@ -435,6 +441,12 @@ class RunSamples:
         for messages in self._run.messages(keys, start_ns=start_ns, end_ns=end_ns):
             for first in range(0, len(messages), BATCH):
                 yield from self._items(messages[first : first + BATCH], sources)
+
+    def block(self) -> Block:
+        """
+        Return all samples, without the marks.
+        """
+        return concatenate([item for item in self if isinstance(item, Block)])
 
     def _items(self, messages: Messages, sources: tuple[Source, ...]) -> Iterator[Block | Mark]:
         """Cut at the marks."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from enum import Enum
 from fcntl import LOCK_EX, LOCK_NB, flock
@@ -29,7 +29,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
 from shipdrag_ros import __version__
-from shipdrag_ros.bags.contents import DECLARED, INDEXES, FileSummary, key_of
+from shipdrag_ros.bags.contents import DECLARED, INDEXES, RECORDING, FileSummary, key_of
 from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError, disk_errors
@@ -37,8 +37,6 @@ from shipdrag_ros.messages import OUTPUT_TOPICS, EncodedMessage, encode, types
 from shipdrag_ros.samples import Block, Int64
 
 PROFILE = 'ros2'
-METADATA = 'shipdrag_ros'
-"""Name of the metadata record that says which recording a file is part of."""
 LIBRARY = f'shipdrag_ros {__version__}'
 
 # as rosbag2 writes it; a player needs it to latch the topic again
@@ -379,7 +377,7 @@ class BagWriter(RecordWriter):
         super().__init__(path, compression=compression, chunk_bytes=chunk_bytes)
         self._channels: dict[tuple[str, str], int] = {}
         about = {'version': __version__, 'recording_id': recording_id or uuid4().hex}
-        self.add(mcap.Metadata(METADATA, {**about, 'part': str(part)}))
+        self.add(mcap.Metadata(RECORDING, {**about, 'part': str(part)}))
         for name, text in attachments.items():
             self.attach(name, text)
 
@@ -388,41 +386,6 @@ class BagWriter(RecordWriter):
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
         self.add(attachment(name, text))
-
-    def register(self, topic: str, type_name: str) -> None:
-        """
-        Make a topic known before its first message, or without any.
-
-        Raises
-        ------
-        BagError
-            If the definition of the type is not known.
-        """
-        self._channel(topic, type_name)
-
-    def write(
-        self, topic: str, type_name: str, payload: bytes, *, log_ns: int, publish_ns: int
-    ) -> None:
-        """
-        Write one message.
-
-        Parameters
-        ----------
-        topic, type_name
-            Full names, `/shaft` and `sensor_msgs/msg/JointState` for instance.
-        payload
-            CDR bytes.
-        log_ns
-            Time of arrival [ns since the epoch].
-        publish_ns
-            Time of measurement [ns since the epoch].
-
-        Raises
-        ------
-        BagError
-            If the type is not known or the file cannot be written.
-        """
-        self.put(EncodedMessage(topic, type_name, payload, log_ns, publish_ns))
 
     def write_samples(self, block: Block) -> None:
         """
@@ -438,12 +401,25 @@ class BagWriter(RecordWriter):
 
     def put(self, message: EncodedMessage) -> None:
         """
-        Write one message that is ready.
+        Write one message.
+
+        Raises
+        ------
+        BagError
+            If the type is not known or the file cannot be written.
         """
-        number = self._channel(message.topic, message.type)
+        number = self.register(message.topic, message.type)
         self.add_content(number, content_of(number, message), log_ns=message.log_ns)
 
-    def _channel(self, topic: str, type_name: str) -> int:
+    def register(self, topic: str, type_name: str) -> int:
+        """
+        Make a topic known, at its first message or before; return the number of its channel.
+
+        Raises
+        ------
+        BagError
+            If the definition of the type is not known.
+        """
         key = (topic, type_name)
         if key in self._channels:
             return self._channels[key]
@@ -464,3 +440,31 @@ class BagWriter(RecordWriter):
         schema = mcap.Schema(id=0, name=type_name, encoding='ros2msg', data=text)
         self._channels[key] = self.declare(channel, schema)
         return self._channels[key]
+
+
+@contextmanager
+def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
+    """
+    Open a bag to write into; where that fails, none is left.
+
+    Parameters
+    ----------
+    out
+        MCAP file to make.
+    attachments
+        Text by name, a ship file for instance.
+
+    Raises
+    ------
+    BagError
+        If the bag cannot be made.
+    """
+    writer = BagWriter(out)
+    try:
+        with writer:
+            for name, text in attachments.items():
+                writer.attach(name, text)
+            yield writer
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise

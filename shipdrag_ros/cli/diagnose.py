@@ -78,12 +78,10 @@ def run(options: argparse.Namespace) -> int:
     from shipdrag_ros.diagnosis.document import document, read_earlier
     from shipdrag_ros.inference.decision import Verdict
     from shipdrag_ros.library.diagnosing import diagnose_runs
-    from shipdrag_ros.library.replaying import refuse_overlaps
 
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
     runs = open_windowed(options.bags, remap=options.remap, window=options.window, output=output)
-    refuse_overlaps(runs)
     facts = _facts(options.fact)
     earlier = [read_earlier(path) for path in options.earlier]
     with stages(output) as progress:

@@ -32,13 +32,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 from shipdrag_ros import cli
+from shipdrag_ros.bags.writer import new_bag
 from shipdrag_ros.cli.arguments import add, checked
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources import format, formats
 from shipdrag_ros.sources.format import Format, Job, Option
-from shipdrag_ros.sources.log import new_bag
 from shipdrag_ros.sources.reading import format_of, read_joined
 
 KINDS = ', '.join(each.kind for each in formats.found())

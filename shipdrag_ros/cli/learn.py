@@ -60,11 +60,9 @@ def run_baseline(options: argparse.Namespace) -> int:
     # what follows takes half a second to import
     from shipdrag_ros.diagnosis.learn_baseline import learn_baseline
     from shipdrag_ros.library.diagnosing import coasts_of
-    from shipdrag_ros.library.replaying import refuse_overlaps
 
     output = Output(options.json)
     runs = open_windowed(options.bags, remap=options.remap, output=output)
-    refuse_overlaps(runs)
     with stages(output) as progress:
         coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)
     found = learn_baseline(coasts, ship, parameters)

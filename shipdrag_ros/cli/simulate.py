@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -45,8 +46,9 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--ship', required=True, type=Path)
     parser.add_argument('-o', '--out', required=True, type=Path)
     parser.add_argument('--speed', type=number(0.0, 40.0, unit='m/s', above=True))
-    parser.add_argument('--duration', type=number(0.0, 1e6, unit='s', above=True), default=1500.0)
-    parser.add_argument('--lead-in', type=number(0.0, 1e6, unit='s'), default=600.0)
+    length = partial(number, 0.0, simulated.LONGEST_S, unit='s')
+    parser.add_argument('--duration', type=length(above=True), default=1500.0)
+    parser.add_argument('--lead-in', type=length(), default=600.0)
     parser.add_argument('--heading', type=course, default=0.0)
     parser.add_argument('--effect', action='append', default=[])
     parser.add_argument('--first-heading', type=course)

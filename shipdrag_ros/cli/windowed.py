@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from shipdrag_ros.bags import Run, WindowedRun, WindowSpan, open_runs
-from shipdrag_ros.bags.mcap_file import is_bag
+from shipdrag_ros.bags.mcap_file import METADATA, is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
 
@@ -119,7 +119,7 @@ def open_windowed(
         if each.window is not None:
             runs = open_sources([each.path], output, remap=remap)
         else:
-            files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
+            files = each.path.parent if each.path.name == METADATA else each.path
             runs = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
             left = [run for run in left if run not in runs]
         found += [WindowedRun(run, each.window or of_all) for run in runs]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.linalg import block_diag
 
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, SimulationError
 from shipdrag_ros.estimation.record import BIN_S, RunRows
 from shipdrag_ros.estimation.run_down import TURNS, RunDown
 from shipdrag_ros.estimation.window import Series, Window
@@ -725,7 +725,12 @@ def _simulating(
     def simulate(actions: Sequence[Action], speed_m_s: Float64, later_s: float) -> SimulatedRows:
         lead_in_s = min(max(first + later_s, 1.0), length - 1.0)  # within the record
         scenario = replace(frame.scenario, lead_in_s=lead_in_s, duration_s=length - lead_in_s)
-        columns = simulate_columns(frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s)
+        try:
+            columns = simulate_columns(
+                frame.ship, scenario, actions, run.time_s, speed_m_s=speed_m_s
+            )
+        except SimulationError as error:  # of a speed that the baseline does not hold
+            raise SimulationError(f'{run.name}: {error}') from error
         along, ahead = rows_of(run, columns)
         rest = run.context.predict(columns, actions, lead_in_s)
         return SimulatedRows(along, rest, ahead[:, run.context.at_port])

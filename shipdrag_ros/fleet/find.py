@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import posixpath
-import re
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,11 +19,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from shipdrag_ros.bags.mcap_file import METADATA, PART
 from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
 from shipdrag_ros.sources.beside import (
     BAGS,
     FIRST_BYTES,
-    METADATA,
     RUN_FILE,
     is_bag_folder,
     is_source,
@@ -278,7 +277,6 @@ LIMIT_BYTES = 64 << 30
 """Of a file; a longer one is skipped."""
 
 _BESIDE = (SHIP_FILE, RUN_FILE, EVENTS_FILE, 'truth.csv')
-_PART = re.compile(r'(.*)_\d+\.mcap(\.zstd)?')
 
 
 @dataclass(frozen=True)
@@ -331,7 +329,7 @@ class BagToRead:
     @property
     def may_be_part(self) -> bool:
         """Whether the name is that of one part of a recording."""
-        return not self.folder and _PART.fullmatch(posixpath.basename(self.bag)) is not None
+        return not self.folder and PART.search(posixpath.basename(self.bag)) is not None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
+from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.coastdown.events import NOT_ALL, EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, diagnose
 from shipdrag_ros.diagnosis.diagnose import with_whole_glides
@@ -158,14 +159,10 @@ def _digest(files: Sequence[Path]) -> str:
 
 
 def _recording(files: Sequence[Path]) -> str:
-    from shipdrag_ros.bags.mcap_file import McapFile
-    from shipdrag_ros.bags.writer import METADATA
-
     try:
-        about = McapFile(files[0]).contents.metadata.get(METADATA, {})
+        return McapFile(files[0]).contents.recording.get('recording_id', '')
     except BagError:
         return ''  # the job will say so
-    return str(about.get('recording_id', ''))
 
 
 UNNAMED = 'unnamed'
@@ -181,7 +178,7 @@ class BagJob(NamedTuple):
     sources
         The parts of one recording; of most bags, one.
     content_hash
-        What the rows depend on, see `local.content_hash`.
+        What the rows depend on, see `content_hash`.
     learnt
         Terms beside those of the ship file.
     """
@@ -333,24 +330,24 @@ def _held(result: ReplayResult, hull: _ShipInRun, run: CoastRun) -> DiagnosisRes
 def _hull(source: BagToRead, run: Run) -> _ShipInRun:
     """Return the ship as she was in a run: the file beside it or attached, and `run.yaml`."""
     attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
-    if not (attached or beside):
+    own, above = (
+        Ship.from_yaml(text, subject=f'{SHIP_FILE} {where}') if text else None
+        for text, where in ((attached, 'attached'), (beside, 'above'))
+    )
+    ship, text = above or own, beside or attached
+    warnings: tuple[str, ...] = ()
+    if ship is None:
         raise BagError(
             f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above, up to the '
             'one given; put one there, or give the folder that holds it'
         )
-    warnings: tuple[str, ...] = ()
-    text, subject = beside or attached, f'{SHIP_FILE} {"above" if beside else "attached"}'
-    if attached and beside:
-        own = Ship.from_yaml(attached, subject=f'{SHIP_FILE} attached')
-        above = Ship.from_yaml(beside, subject=f'{SHIP_FILE} above')
-        if own.name and own.name != (above.name or source.beside.ship_name):
-            # a recording knows best which ship it is of
-            text, subject = attached, f'{SHIP_FILE} attached'
-            warnings = (
-                f'the {SHIP_FILE} above is of {above.name!r}, the one attached of {own.name!r}, '
-                'which is used',
-            )
-    ship = Ship.from_yaml(text, subject=subject)
+    if own and above and own.name and own.name != (above.name or source.beside.ship_name):
+        # a recording knows best which ship it is of
+        ship, text = own, attached
+        warnings = (
+            f'the {SHIP_FILE} above is of {above.name!r}, the one attached of {own.name!r}, '
+            'which is used',
+        )
     sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE) if source.run else RunSheet()
     return _ShipInRun(sheet.of(ship, subject=RUN_FILE), sheet, text, warnings)
 

@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.result import DiagnosisResult, SeenRun, WeighedEarli
 from shipdrag_ros.errors import DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.library.replaying import Listener, refuse_two_ships
+from shipdrag_ros.library.replaying import Listener, refuse_mixed, ship_in
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (
@@ -85,8 +85,7 @@ def diagnose_runs(
         If neither a coastdown nor the log and the track can be examined, or an earlier
         diagnosis is of another ship, of later runs or of one of these.
     """
-    if given is None:
-        refuse_two_ships((run, None) for run, _ in runs)
+    refuse_mixed(runs, given)
     windowed = any(window is not None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
     if (
@@ -233,6 +232,7 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
+    refuse_mixed(runs, given)
     seen = _found(listener, runs, given, progress)
     for line in seen.warnings:  # a diagnosis has them among its notes
         listener.log(line)
@@ -291,17 +291,16 @@ def _found(
     estimates: list[Estimate] = []
     own: list[Ship | None] = []
     warnings: list[str] = []
-    ship, parameters = given, None
-    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), None)
+    for run, _ in runs:
+        refuse_without_input(run)
+    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0][0])
+    ship, parameters = ship_of(owner, given), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
-        refuse_without_input(each)
-        ship = ship_of(owner or each, ship)
-        sheet, where = sheet_of(each, listener.log)
-        was = sheet.of(ship, subject=where)
+        told, sheet = ship_in(each, ship, facts, listener.log)
+        was = replace(told, facts=ship.facts)
         of_run = None if was == ship else was
-        told = replace(was, facts=overriding(ship.facts, sheet.facts, facts))
         own.append(of_run)
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
         result = replay(each, ship=told, window=window, stop=stop, compare=False, progress=stage)
@@ -320,16 +319,11 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-        run = partial(CoastRun, facts=sheet.facts, ship=of_run)
-        if ship.baseline is None:
-            seen.append(_OfRun([run(*one) for one in _named(each.name, windows)]))
-        else:
-            seen.append(_of_run(result, windows, run))
-    assert ship is not None
+        seen.append(_of_run(result, windows, partial(CoastRun, facts=sheet.facts, ship=of_run)))
     assert parameters is not None
     return _Coastdowns(
         [coast for one in seen for coast in one.coasts],
-        [glide for one in seen for glide in one.whole] if any(one.more for one in seen) else [],
+        [glide for one in seen for glide in one.whole] if any(one.notes for one in seen) else [],
         tuple(note for one in seen for note in one.notes),
         ship,
         parameters,
@@ -341,10 +335,9 @@ def _found(
 
 
 class _OfRun(NamedTuple):
-    """Coastdowns of a bag; whether it has more of a glide; the glides, and what these are."""
+    """Coastdowns of a bag; its glides, and what these are where they are more than those."""
 
     coasts: list[CoastRun]
-    more: bool = False
     whole: Sequence[CoastRun] = ()
     notes: tuple[str, ...] = ()
 
@@ -354,12 +347,14 @@ def _of_run(
     windows: Sequence[tuple[EndedCoastdown, Window]],
     run: Callable[[str, Window], CoastRun],
 ) -> _OfRun:
-    """Look for glides that are more than the coastdowns of a bag."""
+    """Look for glides that are more than the coastdowns of a bag; by a baseline alone."""
     bag = result.run.name
     coasts = [run(*one) for one in _named(bag, windows)]
+    if result.ship.baseline is None:
+        return _OfRun(coasts)
     if not windows:
         missed = [run(bag, each) for each in dismissed_glides(result)]
-        return _OfRun([], bool(missed), missed, (f'{bag}: {DISMISSED}',) if missed else ())
+        return _OfRun([], missed, (f'{bag}: {DISMISSED}',) if missed else ())
     whole: list[CoastRun] = []
     notes: list[str] = []
     glide_end_ns = 0
@@ -371,7 +366,7 @@ def _of_run(
         if glide is not None:
             notes.append(f'{coast.name}: {coastdown.disturbed or NOT_ALL}')
             glide_end_ns = glide.end_ns
-    return _OfRun(coasts, glide_end_ns > 0, whole, tuple(notes))
+    return _OfRun(coasts, whole, tuple(notes))
 
 
 def _named(

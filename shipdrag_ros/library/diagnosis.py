@@ -286,7 +286,6 @@ def diagnose(
     """
     parts = records_of(records)
     runs = [WindowedRun(run, window) for record in parts for run in record.runs]
-    replaying.refuse_overlaps(runs)
     if ship is None:
         replaying.refuse_two_ships((run, record.given) for record in parts for run in record.runs)
     listener = replaying.Notes()
@@ -372,9 +371,6 @@ def learn_from(
         Called with each stage, how much of it is done, and of how much.
     """
     check_name(name)
-    replaying.refuse_overlaps(runs)
-    if given is None:
-        replaying.refuse_two_ships((run, None) for run, _ in runs)
     coasts, ship, parameters = coasts_of(listener, runs, given, progress, whole=True)
     coasts = sorted(coasts, key=lambda coast: coast.window.start_ns)
     return learn_runs(coasts, ship, parameters, name=name, progress=progress)

@@ -29,7 +29,7 @@ from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.document import document
-from shipdrag_ros.replay.playback import SHIP_FILE, StopTime
+from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, attached_ship
 from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
@@ -221,10 +221,7 @@ class Record(Shown):
     @property
     def ship(self) -> Ship | None:
         """The ship given, or the one attached to the first run; None: not known."""
-        text = self.runs[0].attachments.get(SHIP_FILE)
-        if self.given is not None or text is None:
-            return self.given
-        return Ship.from_yaml(text, subject=f'{self.runs[0].name}: {SHIP_FILE}')
+        return self.given or attached_ship(self.runs[0])
 
     @property
     def truth(self) -> TrueCurve | None:
@@ -247,12 +244,13 @@ class Record(Shown):
         """
         Return all that was measured, in order of arrival, plausible or not.
         """
-        items = (item for run in self.runs for item in run.inputs())
-        return concatenate([item for item in items if isinstance(item, Block)])
+        return concatenate([run.inputs().block() for run in self.runs])
 
     def save(self, path: str | PathLike[str]) -> Path:
         """
         Write a record of one run as a bag, which `read` and the command line take.
+
+        A ship that was given for it is attached.
 
         Raises
         ------
@@ -265,7 +263,7 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        self.runs[0].save(out)
+        self.runs[0].save(out, {} if self.given is None else {SHIP_FILE: self.given.to_yaml()})
         return out
 
     def _lines(self) -> Sequence[str]:
@@ -428,12 +426,17 @@ def read(
     given = ship_of(ship)
     alone = isinstance(source, str | PathLike) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
-    sources = [each if is_frame(each) else _path(each) for each in several]
-    bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
+    bags: list[Path] = []
+    others: list[Any] = []
+    for each in several:
+        path = None if is_frame(each) else _path(each)
+        if path is not None and is_bag(path):
+            bags.append(path)
+        else:
+            others.append(path or each)
     runs = open_runs(bags, remap=remap) if bags else []
     if given is None:
         refuse_two_ships((run, None) for run in runs)
-    others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
         given_for_logs = {'columns': columns, 'time': time, 'rate_hz': rate_hz, 'options': options}
         idle = [f'{name}=' for name, value in given_for_logs.items() if value is not None]

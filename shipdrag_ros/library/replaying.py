@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Protocol
@@ -17,15 +17,15 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import (
-    SHIP_FILE,
     StopTime,
+    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
 )
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, RunSheet, Ship
 from shipdrag_ros.ship.facts import overriding
 
 _LATE_S = 10.0
@@ -72,14 +72,21 @@ class Notes:
         return nullcontext(lambda done, total: None)
 
 
-def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
+def refuse_mixed(runs: Sequence[WindowedRun], given: Ship | None) -> None:
     """
-    Refuse windows of one bag that overlap: what they share would count twice.
+    Refuse runs that cannot go together: of two ships, or of windows that overlap.
+
+    Parameters
+    ----------
+    runs
+        What two windows of one bag share would count twice.
+    given
+        The ship of all; None: the one attached to each.
 
     Raises
     ------
     BagError
-        If two runs hold the same part of a recording.
+        If two runs hold the same part of a recording, or no ship is given and they are of two.
     """
     for number, one in enumerate(runs):
         for other in runs[:number]:
@@ -91,6 +98,8 @@ def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
                     f'{one.run.name!r} is given twice, {_text(first)} and {_text(second)}: they '
                     'share a part, which is one run and not two; give windows that do not overlap'
                 )
+    if given is None:
+        refuse_two_ships((run, None) for run, _ in runs)
 
 
 def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
@@ -109,11 +118,9 @@ def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
     """
     named: dict[str, str] = {}
     for run, given in runs:
-        text = run.attachments.get(SHIP_FILE)
-        if given is None and text is not None:
-            given = Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
-        if given is not None and given.name:
-            named.setdefault(given.name, run.name)
+        ship = given or attached_ship(run)
+        if ship is not None and ship.name:
+            named.setdefault(ship.name, run.name)
     if len(named) > 1:
         (one, first), (other, second), *_ = named.items()
         raise BagError(
@@ -126,9 +133,24 @@ def _text(window: WindowSpan) -> str:
     return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'
 
 
-def ship_in(run: Run, given: Ship | None) -> Ship:
+def ship_in(
+    run: Run,
+    given: Ship | None,
+    facts: Sequence[Fact] = (),
+    say: Callable[[str], None] | None = None,
+) -> tuple[Ship, RunSheet]:
     """
-    Return the ship as she was in a run, with what is known of it: a `run.yaml` is noted.
+    Return the ship as she was in a run, with what is known of it, and the sheet of the run.
+
+    Parameters
+    ----------
+    run
+    given
+        The ship; None: the one attached.
+    facts
+        Of all runs, which override those of the ship and of the run.
+    say
+        Called where a `run.yaml` holds for the run; None: it is noted with the run.
 
     Raises
     ------
@@ -141,8 +163,9 @@ def ship_in(run: Run, given: Ship | None) -> Ship:
 
     refuse_without_input(run)
     ship = ship_of(run, given)
-    sheet, where = sheet_of(run, lambda text: run.note([text]))
-    return replace(sheet.of(ship, subject=where), facts=overriding(ship.facts, sheet.facts))
+    sheet, where = sheet_of(run, say or (lambda text: run.note([text])))
+    was = sheet.of(ship, subject=where)
+    return replace(was, facts=overriding(ship.facts, sheet.facts, facts)), sheet
 
 
 def replay_run(
@@ -166,21 +189,19 @@ def replay_run(
         result = RunResult.of(
             replay(
                 each,
-                ship=ship_in(each, ship),
+                ship=ship_in(each, ship)[0],
                 parameters=parameters,
                 window=window,
                 stop=stop,
                 progress=progress,
             )
         )
+    warnings = list(result.warnings)
     if stop is not None:
-        beside = told_beside(each, stop, (one.start_ns for one in result.coastdowns))
-        listener.log(f'{each.name}: {beside}')
-        result = replace(result, warnings=(*result.warnings, beside))
+        warnings.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+        listener.log(f'{each.name}: {warnings[-1]}')
     if not result.coastdowns:
-        astern = _astern(each, result.ship)
-        if astern:
-            result = replace(result, warnings=(*result.warnings, astern))
+        warnings.append(_astern(each, result.ship))
     if window is not None:
         for coastdown in result.coastdowns:
             if coastdown.estimate is None:
@@ -188,10 +209,8 @@ def replay_run(
                     f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
                     f'{coastdown.failure}'
                 )
-        beyond = _beyond(each, window[1])
-        if beyond:
-            result = replace(result, warnings=(*result.warnings, beyond))
-    return result
+        warnings.append(_beyond(each, window[1]))
+    return replace(result, warnings=tuple(filter(None, warnings)))
 
 
 def _astern(run: Run, ship: Ship) -> str:

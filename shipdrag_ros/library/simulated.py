@@ -14,13 +14,15 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from shipdrag_ros import simulation
-from shipdrag_ros.bags import BagWriter, Run
+from shipdrag_ros.bags import Run
 from shipdrag_ros.bags.mcap_file import BagFiles, McapFile
+from shipdrag_ros.bags.writer import new_bag
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library.record import Record, ShipGiven, ship_of
 from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.shown import says_it_in_python
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay.playback import PARAMETERS_FILE, SHIP_FILE
 from shipdrag_ros.replay.run_result import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
@@ -30,6 +32,9 @@ from shipdrag_ros.simulation.effects import find, parse, terms, values_of
 
 SPEED_FRACTION = 0.8
 """Of the highest speed of the baseline: where a simulation begins."""
+
+LONGEST_S = 1e6
+"""Of the record before the stop, and from it on."""
 
 _FIRST_YEAR, _LAST_YEAR = 1980, 2037  # the stamp of a message has 31 bits of seconds
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -90,6 +95,11 @@ def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
     SimulationError
         If the settings ask for something impossible.
     """
+    for name in ('lead_in_s', 'duration_s'):
+        if getattr(settings, name) > LONGEST_S:
+            raise SimulationError(
+                f'{name} is {getattr(settings, name):g}, expected at most {LONGEST_S:g}'
+            )
     scenario = Scenario(
         speed_m_s=settings.speed_m_s,
         lead_in_s=settings.lead_in_s,
@@ -119,21 +129,17 @@ def write_bag(path: Path, block: Block, ship: Ship, truth: TrueCurve, listener: 
     """
     Write a simulated record; what is begun and not ended is removed.
     """
-    writer = BagWriter(path)
-    try:
-        with writer, listener.progress(f'writing {path}') as progress:
-            writer.attach('ship.yaml', ship.to_yaml())
-            writer.attach('parameters.yaml', Parameters().to_yaml())
-            writer.attach(ATTACHMENT, truth.to_yaml())
-            acting = [each['name'] for each in truth.settings['effects']]
-            for term in terms(acting):
-                writer.attach(f'effects/{term.name}.yaml', term.to_yaml())
-            for done in range(0, len(block), _AT_ONCE):
-                writer.write_samples(block[done : done + _AT_ONCE])
-                progress(done, len(block))
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
+    acting = [each['name'] for each in truth.settings['effects']]
+    attachments = {
+        SHIP_FILE: ship.to_yaml(),
+        PARAMETERS_FILE: Parameters().to_yaml(),
+        ATTACHMENT: truth.to_yaml(),
+        **{f'effects/{term.name}.yaml': term.to_yaml() for term in terms(acting)},
+    }
+    with new_bag(path, attachments) as bag, listener.progress(f'writing {path}') as progress:
+        for done in range(0, len(block), _AT_ONCE):
+            bag.write_samples(block[done : done + _AT_ONCE])
+            progress(done, len(block))
 
 
 def usual_speed(ship: Ship) -> float:

@@ -278,7 +278,7 @@ class BagSource(PictureFeed):
         speed: float = 1.0,
         past: Sequence[PastRun] = (),
     ) -> None:
-        self._runs = [(run, *settings_of(run, ship_in(run, ship))) for run in runs]
+        self._runs = [(run, *settings_of(run, ship_in(run, ship)[0])) for run in runs]
         self._number = -1
         self._speed = speed
         self._playing = True

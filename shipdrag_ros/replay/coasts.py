@@ -46,7 +46,6 @@ from shipdrag_ros.samples import (
     Channel,
     Float64,
     Reason,
-    concatenate,
 )
 from shipdrag_ros.ship import Ship
 
@@ -262,7 +261,7 @@ def accepted_samples(
     """
     refuse_without_input(run)
     parameters = recorded_parameters(run)
-    block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    block = run.inputs().block()
     reason = validate(block, parameters, _SHORTEST_M if ship is None else ship.length_m)
     accepted = reason == Reason.ACCEPTED
     if zeros:

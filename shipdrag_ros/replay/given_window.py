@@ -18,7 +18,7 @@ from shipdrag_ros.coastdown.heading import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8, concatenate
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8
 from shipdrag_ros.ship import Ship
 
 _SET_CLOCK_S = 10.0
@@ -93,8 +93,8 @@ def read_window(
     # of what is not there, nothing
     end_ns = span[1] if end_s >= length_s else span[0] + round(end_s * SECOND_NS)
     margin_ns = margin_around_ns(parameters)
-    around = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
-    block = concatenate([item for item in around if isinstance(item, Block)])
+    first_ns = max(start_ns - margin_ns, 0)
+    block = run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns).block()
     inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
     inputs = run.inputs(start_ns=start_ns, end_ns=end_ns)
     deque(inputs, maxlen=0)  # counted, and the samples are there already

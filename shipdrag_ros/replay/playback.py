@@ -37,7 +37,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.samples import SECOND_NS, Block, concatenate
+from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import checked
 
@@ -128,8 +128,7 @@ class ReplayResult:
             return Block.empty()
         first_ns = max(min(each.first_ns for each in holding) - margin_ns, 0)
         last_ns = max(each.last_ns for each in holding) + margin_ns
-        inputs = self.run.inputs(start_ns=first_ns, end_ns=last_ns)
-        block = concatenate([item for item in inputs if isinstance(item, Block)])
+        block = self.run.inputs(start_ns=first_ns, end_ns=last_ns).block()
         arrived = block.receive_ns[(block.stamp_ns >= start_ns) & (block.stamp_ns <= end_ns)]
         if not len(arrived):
             return block[:0]
@@ -374,11 +373,18 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     """
     Return the ship that is given, else the one attached to a bag.
     """
-    if given is not None:
-        return given
-    if SHIP_FILE not in run.attachments:
+    ship = given or attached_ship(run)
+    if ship is None:
         raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
-    return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
+    return ship
+
+
+def attached_ship(run: Run) -> Ship | None:
+    """
+    Return the ship whose file is attached to a bag, if one is.
+    """
+    text = run.attachments.get(SHIP_FILE)
+    return None if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
 
 
 def recorded_parameters(run: Run) -> Parameters:

@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 import os
-import re
 import zlib
 from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 
 from shipdrag_ros.bags import Run
+from shipdrag_ros.bags.mcap_file import METADATA, PART
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.ship import RunSheet
 
-RUN_FILE, METADATA = 'run.yaml', 'metadata.yaml'
+RUN_FILE = 'run.yaml'
 FIRST_BYTES = 1 << 13
 """Of a file, by which its format is known."""
 
@@ -22,7 +22,6 @@ BAGS = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd')
 _LOGS = ('.nmea', '.nmea.gz', '.csv', '.tsv')
 _SOURCES = (*BAGS, '.bag', *_LOGS)
 _NONE = ('truth.csv', 'events.csv')  # of `shipdrag simulate-fleet`, and of a fleet
-_PART = re.compile(r'_\d{3}(?=\.mcap)')  # of a recording of the node
 
 
 def is_source(name: str, beginning: Callable[[], bytes]) -> bool:
@@ -102,11 +101,11 @@ def run_file(
     names = (f'{bag}.{RUN_FILE}', f'{bag}/{RUN_FILE}' if folder else f'{stem}.{RUN_FILE}')
     found = [name for name in names if exists(name)]
     if exists(RUN_FILE):
-        of_run = {_PART.sub('', each) for each in own}
+        of_run = {PART.sub('', each) for each in own}
         others = [
             each
             for each in beside()
-            if _PART.sub('', each) not in of_run
+            if PART.sub('', each) not in of_run
             # a log beside a bag may be what that was imported from
             and (bag.endswith(_LOGS) or not each.endswith(_LOGS))
         ]

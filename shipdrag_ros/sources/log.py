@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime, tzinfo
 from pathlib import Path
@@ -27,6 +26,9 @@ LIMIT_NS = 2**31 * SECOND_NS
 
 BASE_NS = 946_684_800 * SECOND_NS
 """2000-01-01, where times that are no dates begin."""
+
+DATE_FROM_NS = 100_000_000 * SECOND_NS
+"""A count of less, which is before March 1973, is no time since 1970."""
 
 UNDATED = 'The log has no fix that gives the date; its times count from 2000-01-01.'
 
@@ -221,34 +223,6 @@ def key_of(channel: Channel) -> tuple[str, str]:
     Return topic and type that samples of a channel have in a bag.
     """
     return f'/{channel.input}', input_type(channel)
-
-
-@contextmanager
-def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
-    """
-    Open a bag to write into; where that fails, none is left.
-
-    Parameters
-    ----------
-    out
-        MCAP file to make.
-    attachments
-        Text by name, a ship file for instance.
-
-    Raises
-    ------
-    BagError
-        If the bag cannot be made.
-    """
-    writer = BagWriter(out)
-    try:
-        with writer:
-            for name, text in attachments.items():
-                writer.attach(name, text)
-            yield writer
-    except BaseException:
-        out.unlink(missing_ok=True)
-        raise
 
 
 _ISO = re.compile(

@@ -23,10 +23,11 @@ import numpy as np
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.contents import Contents
-from shipdrag_ros.bags.mcap_file import BagFiles, is_bag
+from shipdrag_ros.bags.mcap_file import METADATA, BagFiles, is_bag
 from shipdrag_ros.bags.message_index import Messages
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.bags.run import BATCH
+from shipdrag_ros.bags.writer import new_bag
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.messages.encoding import encode_batch
@@ -37,13 +38,11 @@ from shipdrag_ros.samples import (
     Channel,
     Float64,
     Int64,
-    concatenate,
     in_arrival_order,
 )
 from shipdrag_ros.sources import formats
-from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import Format, Job, best_of, head_of
-from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of, new_bag
+from shipdrag_ros.sources.log import ATTACHMENT, ImportResult, Log, key_of
 
 _APART_M = (
     2000.0  # more than a ship is long, and more than clocks make of it that disagree a little
@@ -174,7 +173,7 @@ def _block(log: Log) -> Block:
     """Return all samples of a log; messages as their topics say."""
     if log.messages is None:
         return log.block
-    return concatenate([item for item in LogRun(log, []).inputs() if isinstance(item, Block)])
+    return LogRun(log, []).inputs().block()
 
 
 def _taken(blocks: Sequence[Block]) -> tuple[list[Block], list[Counter[str]]]:
@@ -214,11 +213,7 @@ class LogPart:
         Its channels, how many messages each has, and attachments.
     span_ns
         First and last time of arrival [ns]; None without messages.
-    indexed
-        Whether its messages are known without reading it to its end.
     """
-
-    indexed = True
 
     def __init__(self, log: Log, path: Path) -> None:
         self.path = path
@@ -299,19 +294,12 @@ class LogRun(Run):
         """The files that it was made of."""
         return self._sources
 
-    def save(self, out: Path) -> None:
+    def save(self, out: Path, attachments: Mapping[str, str]) -> None:
         """
-        Write the run as a bag.
-
-        Raises
-        ------
-        BagError
-            If the disk does not take it.
+        Write the run as a bag, see `Run.save`.
         """
-        own = self._log.attachments
-        with new_bag(
-            out, {k: text for k, text in self.attachments.items() if k not in own}
-        ) as bag:
+        known, own = {**self.attachments, **attachments}, self._log.attachments
+        with new_bag(out, {k: text for k, text in known.items() if k not in own}) as bag:
             self._log.copy_to(bag)
 
 

@@ -117,11 +117,13 @@ def write_messages(path: Path, messages: list[EncodedMessage], *, ship: bool = T
         if ship:
             bag.attach('ship.yaml', SHIP_FILE.read_text(encoding='utf-8'))
         for message in messages:
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
+            bag.put(
+                EncodedMessage(
+                    message.topic,
+                    message.type,
+                    message.payload,
+                    log_ns=message.log_ns,
+                    publish_ns=message.publish_ns,
+                )
             )
     return path

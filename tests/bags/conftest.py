@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.messages import encode, types
-from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from tests.runs import write_run
 
 START_NS = 1_700_000_000_000_000_000
@@ -85,11 +85,6 @@ def sample_bag(tmp_path_factory: pytest.TempPathFactory, block: Block) -> bytes:
     return path.read_bytes()
 
 
-def read_samples(run: Any) -> Block:
-    """Join the blocks among what a run gives."""
-    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
-
-
 def assert_same(one: Block, other: Block) -> None:
     for name in ('channel', 'stamp_ns', 'receive_ns', 'variance'):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
@@ -110,6 +105,14 @@ def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NO
                 )
             writer.write(connections[message.topic], message.log_ns, message.payload)
     return path
+
+
+def listed(folder: Path, files: Sequence[str]) -> None:
+    """Write the metadata of rosbag2 over files."""
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
+        f'  relative_file_paths: {list(files)}\n  compression_mode: ""\n'
+    )
 
 
 def foreign(path: Path, block: Block, **options: Any) -> Path:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.records import MAGIC
 from shipdrag_ros.samples import Block
-from tests.bags.conftest import read_samples
 from tests.bags.test_wild_bags import read_or_refuse
 
 EXAMPLES = settings(
@@ -24,7 +23,7 @@ EXAMPLES = settings(
 def read(path: Path, content: bytes) -> tuple[Run, Block]:
     path.write_bytes(content)
     (run,) = open_runs([path])
-    block = read_samples(run)
+    block = run.inputs().block()
     list(run.outputs())
     return run, block
 

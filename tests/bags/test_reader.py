@@ -17,9 +17,9 @@ from rosbags.rosbag2 import CompressionMode
 from shipdrag_ros.bags import BagWriter, Compression, ResetMark, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message
+from shipdrag_ros.messages import EncodedMessage, EventKind, EventNote, encode, event_message
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import assert_same, foreign, read_samples, rosbag2
+from tests.bags.conftest import assert_same, foreign, listed, rosbag2
 
 WriteBag = Callable[..., Path]
 START_NS = 1_700_000_000_000_000_000
@@ -29,7 +29,7 @@ START_NS = 1_700_000_000_000_000_000
 def test_what_was_written_is_read(write_bag, block, compression):
     path = write_bag('a.mcap', block, compression=compression, chunk_bytes=5000)
     (run,) = open_runs([path])
-    assert_same(read_samples(run), block)
+    assert_same(run.inputs().block(), block)
     assert run.name == str(path)
     assert run.paths == (path,)
     assert run.warnings == ()
@@ -61,7 +61,7 @@ def test_what_was_written_is_read(write_bag, block, compression):
 )
 def test_files_without_an_index_are_read_too(tmp_path, block, options):
     (run,) = open_runs([foreign(tmp_path / 'a.mcap', block, **options)])
-    assert_same(read_samples(run), block)
+    assert_same(run.inputs().block(), block)
     assert run.warnings == ()
     assert {topic.topic.rpartition('/')[0] for topic in run.topics} == {'/ship'}
 
@@ -70,13 +70,13 @@ def test_files_without_an_index_are_read_too(tmp_path, block, options):
 def test_bags_of_rosbag2_by_another_tool(tmp_path, block: Block, mode: CompressionMode) -> None:
     path = rosbag2(tmp_path / 'bag', block, mode)
     (run,) = open_runs([path])
-    assert_same(read_samples(run), block)
+    assert_same(run.inputs().block(), block)
     assert run.warnings == ()
     (same,) = open_runs([path / 'metadata.yaml'])
-    assert_same(read_samples(same), block)
+    assert_same(same.inputs().block(), block)
     if mode is not CompressionMode.MESSAGE:  # which only metadata.yaml tells of
         (single,) = open_runs([next(path.glob('*.mcap*'))])
-        assert_same(read_samples(single), block)
+        assert_same(single.inputs().block(), block)
 
 
 @pytest.mark.parametrize('chunked', [True, False])
@@ -88,7 +88,7 @@ def test_arrival_decides_the_order_and_then_the_place(tmp_path: Path, chunked: b
     block = Block.of(Channel.SHAFT, np.arange(n), rng.normal(size=n), receive_ns=received)
     path = foreign(tmp_path / 'a.mcap', block, chunk_size=2000, use_chunking=chunked)
     (run,) = open_runs([path])
-    assert_same(read_samples(run), block[np.argsort(received, kind='stable')])
+    assert_same(run.inputs().block(), block[np.argsort(received, kind='stable')])
 
 
 def test_a_batch_is_bounded_and_its_size_changes_nothing(write_bag, block, monkeypatch):
@@ -131,9 +131,9 @@ def test_parts_of_one_recording_are_joined_in_their_order(write_bag, block):
     ]
     other = write_bag('other.mcap', block[:50])
     run, alone = open_runs([paths[1], other, paths[0], paths[2]])
-    assert_same(read_samples(run), block[:300])
+    assert_same(run.inputs().block(), block[:300])
     assert [path.name for path in run.paths] == ['c.mcap', 'b.mcap', 'a.mcap']
-    assert_same(read_samples(alone), block[:50])
+    assert_same(alone.inputs().block(), block[:50])
     (short,) = open_runs([paths[1], paths[0]])
     assert short.warnings == ('part 1 of the recording is missing',)
     with pytest.raises(BagError, match='are the same part 0'):
@@ -146,7 +146,7 @@ def test_parts_follow_each_other_even_if_the_clock_went_back(write_bag, block):
         write_bag('1.mcap', block[:100], recording_id='r', part=1),
     ]
     (run,) = open_runs(paths)
-    assert_same(read_samples(run), concatenate([block[100:200], block[:100]]))
+    assert_same(run.inputs().block(), concatenate([block[100:200], block[:100]]))
     assert run.span_ns == (block.receive_ns[0], block.receive_ns[199])
 
 
@@ -164,28 +164,21 @@ def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(tmp_path, block: B
     for i in range(11):
         foreign(folder / f'split_{i}.mcap', block[i * 20 : i * 20 + 20])
     (run,) = open_runs([folder])
-    assert_same(read_samples(run), block[:220])
+    assert_same(run.inputs().block(), block[:220])
     assert 'metadata.yaml is missing' in run.warnings[0]
-    files = [f'split_{i}.mcap' for i in range(12)]
-    (folder / 'metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        f'  relative_file_paths: {files}\n  compression_mode: ""\n'
-    )
+    listed(folder, [f'split_{i}.mcap' for i in range(12)])
     (run,) = open_runs([folder])
-    assert_same(read_samples(run), block[:220])
+    assert_same(run.inputs().block(), block[:220])
     assert run.warnings == ('split_11.mcap is listed in metadata.yaml and is not there',)
 
 
 def test_a_split_bag_may_hold_files_of_another_tool(write_bag: WriteBag, block: Block) -> None:
     own = write_bag('a.mcap', block[:100])
     foreign(own.with_name('b.mcap'), block[:0])
-    own.with_name('metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        '  relative_file_paths: [a.mcap, b.mcap]\n'
-    )
+    listed(own.parent, ['a.mcap', 'b.mcap'])
     (run,) = open_runs([own.parent])
     assert [path.name for path in run.paths] == ['a.mcap', 'b.mcap']
-    assert_same(read_samples(run), block[:100])
+    assert_same(run.inputs().block(), block[:100])
 
 
 def test_attachments_are_read_and_a_difference_between_parts_is_told(tmp_path: Path) -> None:
@@ -205,14 +198,8 @@ def test_resets_are_read_at_their_place(tmp_path: Path, block: Block) -> None:
                 mark = event_message(
                     EventNote(EventKind.RESET_REQUEST, message.log_ns, f'reason {i}')
                 )
-                bag.write(mark.topic, mark.type, mark.payload, log_ns=message.log_ns, publish_ns=0)
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+                bag.put(EncodedMessage(mark.topic, mark.type, mark.payload, message.log_ns, 0))
+            bag.put(message)
     (run,) = open_runs([tmp_path / 'a.mcap'])
     first, reset, second, again, third = run.inputs()
     assert isinstance(first, Block)
@@ -231,7 +218,7 @@ def test_outputs_of_two_nodes_are_told_and_not_mixed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for node in ('/a', '/b'):
             mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'), node=node)
-            bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+            bag.put(EncodedMessage(mark.topic, mark.type, mark.payload, 5, 5))
     (run,) = open_runs([tmp_path / 'a.mcap'])
     assert run.node is None
     assert list(run.outputs()) == []
@@ -330,7 +317,7 @@ def test_attachments_outputs_and_damage(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         bag.attach('ship.yaml', 'é')
         mark = event_message(EventNote(EventKind.RESET_REQUEST, 5, 'x'))
-        bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+        bag.put(EncodedMessage(mark.topic, mark.type, mark.payload, 5, 5))
     content = (tmp_path / 'a.mcap').read_bytes()
     (tmp_path / 'a.mcap').write_bytes(content[:-20])
     (run,) = open_runs([tmp_path / 'a.mcap'])

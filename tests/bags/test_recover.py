@@ -28,8 +28,9 @@ from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.records import MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.samples import Block, Channel, concatenate
-from tests.bags.conftest import as_chunk, as_record, assert_same, read_samples, rosbag2
+from tests.bags.conftest import as_chunk, as_record, assert_same, listed, rosbag2
 
 WriteBag = Callable[..., Path]
 MIB = 1 << 20
@@ -47,7 +48,7 @@ def test_a_directory_of_rosbag2(tmp_path: Path, block: Block, mode: CompressionM
     # not 0600, as temporary files are: the group may read it
     assert stat.S_IMODE(Path(result.output).stat().st_mode) == 0o640
     (run,) = open_runs([result.output])
-    assert_same(read_samples(run), block[:300])
+    assert_same(run.inputs().block(), block[:300])
     # cut off, as a loss of power leaves it
     (file,) = source.glob('*.mcap*')
     file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
@@ -83,11 +84,7 @@ def test_a_split_bag_is_joined_and_each_damage_names_its_file(tmp_path, write_ba
     cut = folder / 'split_1.mcap'
     cut.write_bytes(cut.read_bytes()[:-14_000])
     (folder / 'split_3.mcap').touch()
-    files = [f'split_{number}.mcap' for number in range(5)]
-    (folder / 'metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        f'  relative_file_paths: {files}\n  compression_mode: ""\n'
-    )
+    listed(folder, [f'split_{number}.mcap' for number in range(5)])
     reports = check([folder])
     assert [report.sound for report in reports] == [True, False, True, False, False]
     result = recover(folder, tmp_path / 'saved.mcap')
@@ -103,7 +100,7 @@ def test_a_split_bag_is_joined_and_each_damage_names_its_file(tmp_path, write_ba
     # the same topic of three files is one channel
     assert len({topic.topic for topic in run.topics}) == len(run.topics)
     whole = concatenate([block[:100], block[200:300]])
-    assert set(whole.receive_ns) <= set(read_samples(run).receive_ns)
+    assert set(whole.receive_ns) <= set(run.inputs().block().receive_ns)
 
 
 def test_several_bags_are_not_joined(tmp_path: Path, write_bag: WriteBag, block: Block) -> None:
@@ -267,7 +264,7 @@ def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path, damag
     with BagWriter(path) as bag:
         for number in range(1500):
             payload = rng.randbytes(64_000)
-            bag.write('/cloud', 'std_msgs/msg/String', payload, log_ns=number, publish_ns=number)
+            bag.put(EncodedMessage('/cloud', 'std_msgs/msg/String', payload, number, number))
     if damaged:
         with path.open('r+b') as file:
             file.seek(48 * MIB)
@@ -299,10 +296,7 @@ def test_topics_that_have_other_numbers_in_each_file_are_joined(tmp_path: Path) 
                     writer.add_message(channel, log_ns, payload, log_ns + 1, n)
                     written.add((topic, f'x/msg/T{topic[1:]}', n, log_ns, log_ns + 1, payload))
             writer.finish()
-    (folder / 'metadata.yaml').write_text(
-        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
-        "  relative_file_paths: [split_0.mcap, split_1.mcap]\n  compression_mode: ''\n"
-    )
+    listed(folder, ['split_0.mcap', 'split_1.mcap'])
     result = recover(folder, tmp_path / 'saved.mcap')
     assert (result.damage, result.bytes_lost, result.quarantine) == ((), 0, None)
     assert check([result.output])[0].damage == ()
@@ -336,7 +330,7 @@ def test_sound_chunks_are_copied_as_they_are(tmp_path: Path) -> None:
     assert check([tmp_path / 'c.mcap'])[0].sound
     assert found.messages_recovered + found.messages_crc_suspect <= 4000
     (run,) = open_runs([tmp_path / 'c.mcap'])
-    assert sum(len(part) for part in run.inputs() if isinstance(part, Block)) > 3000
+    assert len(run.inputs().block()) > 3000
 
 
 def test_a_chunk_with_a_topic_that_cannot_be_read_is_not_copied(tmp_path: Path) -> None:
@@ -365,7 +359,7 @@ def test_chunks_of_two_files_whose_numbers_meet_keep_their_topics(tmp_path: Path
     recover(folder, tmp_path / 'c.mcap')
     assert check([tmp_path / 'c.mcap'])[0].sound
     (run,) = open_runs([tmp_path / 'c.mcap'])
-    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    block = run.inputs().block()
     for place, channel in enumerate((Channel.DEPTH, Channel.SPEED_THROUGH_WATER)):
         assert np.all(block.value[block.channel == channel, 0] == 5.0 + place)
         assert np.sum(block.channel == channel) == 2000

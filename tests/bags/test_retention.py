@@ -27,7 +27,7 @@ def part(directory: Path, hour: int, number: int = 0, *, coastdown: bool = False
     with BagWriter(path) as bag:
         topic = RESISTANCE.under('/coastdown_node') if coastdown else '/depth'
         kind = RESISTANCE.type if coastdown else 'sensor_msgs/msg/Range'
-        bag.write(topic, kind, b'\x00\x01\x00\x00', log_ns=1, publish_ns=1)
+        bag.put(EncodedMessage(topic, kind, b'\x00\x01\x00\x00', 1, 1))
     assert path.stat().st_size <= 4096
     changed_s = NOW_S - DAY_S + 3600.0 * hour
     os.utime(path, (changed_s, changed_s))

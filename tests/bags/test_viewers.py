@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, EncodedMessage
 from tests.recorded import summary
 
 TYPES = sorted(
@@ -30,7 +30,7 @@ def definition(directory: Path, type_name: str) -> tuple[str, dict[str, str]]:
     """Return the definition of a type as a bag holds it, and those it needs by their names."""
     path = directory / 'a.mcap'
     with BagWriter(path) as bag:
-        bag.write('/topic', type_name, b'\0\1\0\0', log_ns=1, publish_ns=1)
+        bag.put(EncodedMessage('/topic', type_name, b'\0\1\0\0', 1, 1))
     (schema,) = summary(path).schemas.values()
     path.unlink()
     assert (schema.name, schema.encoding) == (type_name, 'ros2msg')

@@ -31,7 +31,7 @@ from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
 from shipdrag_ros.replay import replay
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from tests.bags.conftest import as_chunk, as_record, foreign
 
@@ -87,7 +87,7 @@ def read(path: Path, content: bytes) -> tuple[Block, tuple[str, ...]]:
     path.write_bytes(content)
     (run,) = open_runs([path])
     inputs = run.inputs()
-    found = concatenate([item for item in inputs if isinstance(item, Block)])
+    found = inputs.block()
     list(run.outputs())
     span = run.span_ns
     if span is not None:

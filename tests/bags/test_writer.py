@@ -16,7 +16,7 @@ from mcap_ros2.decoder import DecoderFactory
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, Compression, writer
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, encode, types
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, EncodedMessage, encode, types
 from shipdrag_ros.samples import Block, Channel
 from tests.recorded import rows, summary
 
@@ -142,8 +142,8 @@ def test_closing_twice_is_harmless_and_an_exception_keeps_what_is_written(tmp_pa
     path = tmp_path / 'a.mcap'
     (message,) = encode(Block.of(Channel.SHAFT, [5], [1.0]))
     with pytest.raises(RuntimeError, match='stop'), BagWriter(path) as bag:  # noqa: PT012
-        bag.write(
-            message.topic, message.type, message.payload, log_ns=6, publish_ns=message.publish_ns
+        bag.put(
+            EncodedMessage(message.topic, message.type, message.payload, 6, message.publish_ns)
         )
         raise RuntimeError('stop')
     bag.close()
@@ -153,6 +153,6 @@ def test_closing_twice_is_harmless_and_an_exception_keeps_what_is_written(tmp_pa
 def test_a_stamp_before_1970_is_no_obstacle(tmp_path: Path) -> None:
     (message,) = encode(Block.of(Channel.SHAFT, [-5], [1.0]))
     with BagWriter(tmp_path / 'a.mcap') as bag:
-        bag.write(message.topic, message.type, message.payload, log_ns=6, publish_ns=-5)
+        bag.put(message._replace(log_ns=6, publish_ns=-5))
     (row,) = rows(tmp_path / 'a.mcap')
     assert (row.publish_ns, row.payload) == (0, message.payload)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,8 +66,14 @@ def test_an_existing_file_is_not_overwritten(ship_file, tmp_path, capsys):
     assert 'exists; choose another name or remove it' in capsys.readouterr().err
 
 
-def test_a_record_without_a_coastdown_is_refused(steady_bag, ship_file, tmp_path, capsys):
-    out = tmp_path / 'learnt.yaml'
-    assert main(['baseline', str(steady_bag), '--ship', str(ship_file), '-o', str(out)]) == 1
-    assert 'no coastdown' in capsys.readouterr().err
-    assert not out.exists()
+def test_a_run_that_cannot_be_used_is_named(bags, steady_bag, ship_file, tmp_path, capsys):
+    slow, out = tmp_path / 'slow.yaml', tmp_path / 'learnt.yaml'
+    known = TableBaseline((0.0, 1.0, 3.0), (0.0, 1e4, 9e4), 0.02)
+    slow.write_text(replace(Ship.load(ship_file), baseline=known).to_yaml())
+    for bag, ship, why in (
+        (steady_bag, ship_file, 'no coastdown was found in'),
+        (bags[0], slow, 'ERROR: {}: speed_m_s is 7.9'),
+    ):
+        assert main(['baseline', str(bag), '--ship', str(ship), '-o', str(out)]) == 1
+        assert why.format(bag) in capsys.readouterr().err
+        assert not out.exists()

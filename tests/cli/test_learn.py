@@ -13,7 +13,6 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import EffectFileError
 from shipdrag_ros.fleet.store import BagResult, Store, bag_row
-from shipdrag_ros.samples import Block, concatenate
 from tests.runs import write_run
 
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
@@ -73,7 +72,7 @@ def bare(fleet: Path, folder: Path, *ships: str) -> Path:
     (folder / 'bags').mkdir()
     store = Store(folder / 'store')
     (run,) = open_runs([fleet / 'bags' / 'run.mcap'])
-    whole = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    whole = run.inputs().block()
     for number, ship in enumerate(ships):
         bag = write_run(folder / 'bags' / f'{number}.mcap', whole)
         row = bag_row('bags', bag.name, f'{number}' * 64)

@@ -15,7 +15,7 @@ from shipdrag_ros.cli import main, watch
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import WindowedBag, open_parts, open_windowed, windowed_bag
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.library.replaying import refuse_overlaps
+from shipdrag_ros.library.replaying import refuse_mixed
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -107,8 +107,8 @@ def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
     ((run, _),) = open_windowed([WindowedBag(coastdown_bag, None)], remap={}, output=Output())
     part = WindowedRun(run, (430.0, 900.0))
     with pytest.raises(BagError, match='given twice'):
-        refuse_overlaps([WindowedRun(run, None), part])
-    refuse_overlaps([WindowedRun(run, (0.0, 430.0)), part])
+        refuse_mixed([WindowedRun(run, None), part], None)
+    refuse_mixed([WindowedRun(run, (0.0, 430.0)), part], None)
 
 
 def test_a_window_may_hold_the_steady_lead(tmp_path, capsys) -> None:

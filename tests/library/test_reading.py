@@ -110,12 +110,16 @@ def test_days_apart_and_tests_without_dates_are_runs_of_their_own() -> None:
     assert len(sd.read(tests, columns=LOG, time='t').runs) == 2
 
 
-def test_bags_are_a_run_each(bag: Path, record: sd.Record) -> None:
+def test_bags_are_a_run_each(bag: Path, record: sd.Record, tmp_path: Path) -> None:
     read = sd.read([bag])
     assert read.ship == record.ship
     assert read.to_frame().equals(record.to_frame())
     other = sd.Ship(name='other', length_m=90.0, displaced_volume_m3=5000.0)
-    assert sd.read(str(bag), ship=other).ship == other
+    given = sd.read(str(bag), ship=other)
+    saved = sd.read(given.save(tmp_path / 'saved.mcap'))
+    assert given.ship == saved.ship == other
+    assert saved.to_frame().equals(record.to_frame())
+    assert saved.runs[0].attachments.keys() == record.runs[0].attachments.keys()
 
 
 def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:

@@ -196,19 +196,17 @@ def test_what_is_no_record_is_refused() -> None:
     for source in (None, [3]):
         with pytest.raises(sd.ShipdragError, match='results of'):
             sd.trends(source)  # type: ignore[arg-type]
-    ship = sd.Ship.example()
-    with pytest.raises(sd.ShipdragError, match='give names with sizes'):
-        sd.simulate(ship, 'fouling=0.3')  # type: ignore[arg-type]
-    with pytest.raises(sd.ShipdragError, match='expected a whole number'):
-        sd.simulate(ship, seed=-1)
-    with pytest.raises(sd.ShipdragError, match='lead_in'):
-        sd.simulate(ship, lead_in=3.0)  # type: ignore[call-arg]
-    with pytest.raises(sd.ShipdragError, match='along_track_m_s is missing'):
-        sd.simulate(ship, {'current': {'cross_track_m_s': 1.0}})
-    with pytest.raises(sd.ShipdragError, match="'weed' is not known"):
-        sd.simulate(ship, {'weed': 1.0})
-    with pytest.raises(sd.ShipdragError, match='expected a date of ISO 8601'):
-        sd.simulate(ship, start='yesterday')
+    for arguments, why in (
+        ({'effects': 'fouling=0.3'}, 'give names with sizes'),
+        ({'seed': -1}, 'expected a whole number'),
+        ({'lead_in': 3.0}, 'lead_in'),
+        ({'duration_s': 1e12}, r'duration_s is 1e\+12, expected at most 1e\+06'),
+        ({'effects': {'current': {'cross_track_m_s': 1.0}}}, 'along_track_m_s is missing'),
+        ({'effects': {'weed': 1.0}}, "'weed' is not known"),
+        ({'start': 'yesterday'}, 'expected a date of ISO 8601'),
+    ):
+        with pytest.raises(sd.ShipdragError, match=why):
+            sd.simulate(sd.Ship.example(), **arguments)
 
 
 def test_a_window_has_a_start_and_an_end(record: sd.Record) -> None:

@@ -93,7 +93,7 @@ class Live:
     def write(self, message: EncodedMessage | OutputMessage, log_ns: int, publish_ns: int) -> None:
         if self.bag is not None:
             content = (message.topic, message.type, message.payload)
-            self.bag.write(*content, log_ns=log_ns, publish_ns=publish_ns)
+            self.bag.put(EncodedMessage(*content, log_ns=log_ns, publish_ns=publish_ns))
 
 
 @pytest.fixture(scope='session')

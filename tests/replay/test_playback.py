@@ -27,11 +27,18 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.errors import BagError, SimulationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.run_down import RunDown
-from shipdrag_ros.messages import EventKind, EventNote, encode, event_message, types
+from shipdrag_ros.messages import (
+    EncodedMessage,
+    EventKind,
+    EventNote,
+    encode,
+    event_message,
+    types,
+)
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
-from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship, StatedEffect
 from tests.runs import write_run
 
@@ -85,7 +92,7 @@ def test_further_instruments_are_recorded_in_their_order_and_replayed_bit_for_bi
     assert result.inputs['speed_through_water_2'] == InputCounts(1100, 1100, {})
     assert result.inputs['position_2'].used == 1100
     (run,) = open_runs([tmp_path / 'live.mcap'])
-    heard = concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    heard = run.inputs().block()
     assert heard.channel.tolist() == block.channel.tolist()
 
 
@@ -185,7 +192,7 @@ def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, shi
                 effort=np.empty(0),
             )
             payload = types.serialize(types.JOINT_STATE, message)
-            bag.write('/shaft', types.JOINT_STATE, payload, log_ns=i * 10**9, publish_ns=i * 10**9)
+            bag.put(EncodedMessage('/shaft', types.JOINT_STATE, payload, i * 10**9, i * 10**9))
     (run,) = open_runs([tmp_path / 'a.mcap'])
     counts = replay(run, ship=ship).inputs['shaft']
     assert counts == InputCounts(10, 9 * 4 + 10, {'surplus_joint': 10, 'nan': 4})

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.sources.log import Log, new_bag
+from shipdrag_ros.bags.writer import new_bag
+from shipdrag_ros.sources.log import Log
 
 
 def into_bag(read: Callable[..., Any], source: Path, out: Path, *args: Any, **options: Any) -> Any:

@@ -26,7 +26,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     table, bag = folder / 'a.csv', folder / 'a.mcap'
     table.write_text('time_s,STW [kn]\n0,12.0\n1,11.9\n')
     (run,) = read_any([table])
-    run.save(bag)
+    run.save(bag, {})
     about = {'storage_identifier': 'mcap', 'relative_file_paths': ['bag_0.mcap']}
     metadata = f'rosbag2_bagfile_information: {about}'.encode()
     return {'.csv': table.read_bytes(), '.mcap': bag.read_bytes(), '.yaml': metadata}
@@ -40,7 +40,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         (['a.mcap', 'b.mcap'], ['run.yaml', 'a.mcap.run.yaml'], 'a.mcap.run.yaml', True),
         (['a.mcap', 'b.mcap'], ['a.run.yaml'], 'a.run.yaml', False),
         (['run_1.mcap', 'run_2.mcap'], ['run.yaml'], '', True),
-        (['part_000.mcap', 'part_001.mcap'], ['run.yaml'], 'run.yaml', False),
+        (['part_000.mcap', 'part_1000_2.mcap'], ['run.yaml'], 'run.yaml', False),
         (['a.mcap', 'a.csv'], ['run.yaml'], 'run.yaml', True),
         (['a.csv', 'a.mcap'], ['run.yaml'], '', True),
         (['a.csv'], ['run.yaml'], 'run.yaml', False),
@@ -78,6 +78,7 @@ def test_the_file_of_a_run(
     assert ['used for none' in note for note in found.notes] == [True] * noted
     (alone,) = find([str(tmp_path / bags[0])]).sources
     assert alone.run == texts.get(bags[0], alone.run)
+    assert alone.may_be_part == bags[0].startswith('part_')
 
 
 def test_two_files_of_a_run_are_one_too_many(content, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.replay import replay
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import (
@@ -61,7 +61,7 @@ def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> dic
 def samples(path: Path) -> Block:
     (run,) = open_runs([path])
     assert run.warnings == ()
-    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
+    return run.inputs().block()
 
 
 _PAIR = '{}\n' + ''.join(f'{t},{54.1 + 1e-5 * t:.5f},{7.9 + 1e-5 * t:.5f}\n' for t in range(9))
@@ -369,18 +369,13 @@ def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -
         ('depth=d:kn', "no unit 'kn' here"),
         ('position=x:m,y:deg', 'both columns in deg'),
         ('position=x:deg,y:m', 'both columns in deg'),
+        ('t:min', "no unit 'min' here; units are ms, ns, s, us"),
+        ('', 'expected COLUMN'),
     ],
 )
-def test_maps_that_say_nothing(text: str, expected: str) -> None:
+def test_maps_and_times_that_say_nothing(text: str, expected: str) -> None:
     with pytest.raises(ImportDataError, match=expected):
-        parse_input(text)
-
-
-def test_times_that_say_nothing() -> None:
-    with pytest.raises(ImportDataError, match="no unit 'min' here; units are ms, ns, s, us"):
-        parse_time('t:min')
-    with pytest.raises(ImportDataError, match='expected COLUMN'):
-        parse_time('')
+        (parse_time if text in ('t:min', '') else parse_input)(text)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shipdrag_ros as sd
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.samples import Block
 from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, row_clock
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
 from shipdrag_ros.sources.formats.csv.table import LogTable
@@ -44,9 +44,7 @@ def frame(rows: int) -> pd.DataFrame:
 
 
 def samples(source: Any) -> Block:
-    record = sd.read(source, columns=COLUMNS, time='t')
-    items = [item for run in record.runs for item in run.inputs()]
-    return concatenate([item for item in items if isinstance(item, Block)])
+    return sd.read(source, columns=COLUMNS, time='t').samples()
 
 
 def test_a_frame_gives_the_samples_of_its_table(tmp_path: Any) -> None:

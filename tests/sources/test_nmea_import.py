@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
-from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
+from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.nmea import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
@@ -64,7 +64,7 @@ def run(log: str | bytes, **options: Any) -> tuple[NmeaResult, Block]:
         assert about['source'] == 'in.nmea'
         assert about['written'] == result.written
         assert ('log.nmea' in bag.attachments) == result.log_attached
-        block = concatenate([item for item in bag.inputs() if isinstance(item, Block)])
+        block = bag.inputs().block()
     assert sum(result.written.values()) == len(block)
     return result, block
 

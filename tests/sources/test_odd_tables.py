@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.sources.format import Job
 from shipdrag_ros.sources.formats.csv.importer import FORMAT
 from shipdrag_ros.sources.log import Log
@@ -28,7 +28,7 @@ def read(folder: Path, header: str, rows: Iterable[str]) -> tuple[Block, str]:
     path.write_text('\n'.join([header, *rows]) + '\n')
     shown: list[list[str]] = []
     (run,) = read_any([path], show=shown.append)
-    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    block = run.inputs().block()
     return block, '\n'.join(shown[0])
 
 
@@ -55,9 +55,7 @@ def test_a_longitude_in_degrees_stays_one(tmp_path: Path, written: str, degrees:
     assert "line 52: '999.9'" in shown
 
 
-def test_a_time_in_large_steps_and_no_unit_is_asked_about(tmp_path: Path) -> None:
-    with pytest.raises(ImportDataError, match=r'its steps are 100\. Give --time t:ms, or :s'):
-        read(tmp_path, 't,STW [kn]', [f'{100 * i},10.{i % 10}' for i in range(60)])
+def test_a_time_in_small_steps_and_no_unit_is_taken_as_seconds(tmp_path: Path) -> None:
     block, said = read(tmp_path, 't,STW [kn]', [f'{i},10.{i % 10}' for i in range(60)])
     assert np.ptp(block.stamp_ns) == 59 * 10**9
     assert 'states no unit and is taken as s' in said
@@ -85,15 +83,19 @@ def test_degrees_and_minutes_in_one_number(tmp_path, north, east, expected):
     np.testing.assert_allclose(of(block, Channel.POSITION_GEODETIC)[:, :2], [expected] * 20)
 
 
-@pytest.mark.parametrize('name', ['time [min]', 'Time (h)'])
-def test_a_time_in_another_unit_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ImportDataError, match='is said to be in'):
-        read(tmp_path, f'{name},STW [kn]', [f'{i},10' for i in range(20)])
-
-
-def test_days_of_a_spreadsheet_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ImportDataError, match='as the days of a spreadsheet do'):
-        read(tmp_path, 'time,STW [kn]', [f'{43161.5 + i / 86400:.8f},10' for i in range(20)])
+@pytest.mark.parametrize(
+    ('name', 'first', 'step', 'why'),
+    [
+        ('time [min]', 0.0, 1.0, 'is said to be in'),
+        ('Time (h)', 0.0, 1.0, 'is said to be in'),
+        ('time', 43161.5, 1 / 86400, 'as the days of a spreadsheet do'),
+        ('t', 0.0, 100.0, r'its steps are 100\. Give --time t:ms, or :s'),
+    ],
+)
+def test_a_time_of_which_the_unit_is_not_clear_is_refused(tmp_path, name, first, step, why):
+    rows = [f'{first + step * i:.8f},10.{i % 10}' for i in range(60)]
+    with pytest.raises(ImportDataError, match=why):
+        read(tmp_path, f'{name},STW [kn]', rows)
 
 
 @pytest.mark.parametrize(
@@ -119,17 +121,17 @@ def test_a_stated_unit_that_agrees_with_the_way_is_taken(tmp_path, unit, factor)
     np.testing.assert_allclose(of(block, Channel.SPEED_OVER_GROUND)[:, 0], SPEED, rtol=1e-4)
 
 
-def test_a_date_with_a_midnight_beside_a_time_of_day(tmp_path: Path) -> None:
-    rows = [f'22.03.2018 00:00:00;{clock(i)};10,25' for i in range(20)]
-    block, _ = read(tmp_path, 'Date;Time;STW [kn]', rows)
+@pytest.mark.parametrize(
+    ('header', 'row'),
+    [
+        ('Date;Time;STW [kn]', '22.03.2018 00:00:00;{};10,25'),  # a spreadsheet's midnight
+        ('time,STW [kn]', '2018-03-22 {} UTC,10'),
+    ],
+)
+def test_a_date_is_read_however_it_is_written(tmp_path: Path, header: str, row: str) -> None:
+    block, _ = read(tmp_path, header, [row.format(clock(i)) for i in range(20)])
     assert block.stamp_ns[0] == 1_521_720_000 * 10**9  # 2018-03-22 12:00:00
     assert np.all(np.diff(block.stamp_ns) == 10**9)
-
-
-def test_a_zone_in_words(tmp_path: Path) -> None:
-    rows = [f'2018-03-22 {clock(i)} UTC,10' for i in range(20)]
-    block, _ = read(tmp_path, 'time,STW [kn]', rows)
-    assert block.stamp_ns[0] == 1_521_720_000 * 10**9
 
 
 def test_rows_that_change_places_at_midnight_stay_in_their_day(tmp_path: Path) -> None:

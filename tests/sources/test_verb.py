@@ -15,7 +15,6 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import Block, concatenate
 from shipdrag_ros.sources import formats
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,7 +93,7 @@ def test_what_follows_a_clock_that_was_set_back_has_times_of_its_own(tmp_path: P
     line = ['import', str(path), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
     assert main([*line, '--map', 'speed_through_water=u']) == 0
     (run,) = open_runs([tmp_path / 'a.mcap'])
-    block = concatenate([each for each in run.inputs() if isinstance(each, Block)])
+    block = run.inputs().block()
     arrived_s = (block.receive_ns - block.receive_ns[0]) / 1e9
     assert arrived_s[:400].tolist() == list(range(400))
     assert arrived_s[401:1601].tolist() == [399.5 + i for i in range(1200)]

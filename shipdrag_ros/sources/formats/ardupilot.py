@@ -13,15 +13,15 @@ from io import StringIO
 from math import pi, radians
 from typing import Any
 
+from shipdrag_ros.errors import reason_of
 from shipdrag_ros.samples import SHAFTS, Channel
 from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
-from shipdrag_ros.sources.log import BASE_NS, UNDATED, Tally
+from shipdrag_ros.sources.log import BASE_NS, DATE_FROM_NS, UNDATED, Tally
 from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 
 # a message begins with A3 95, the first one defines the definitions (type 80)
 _MAGIC = b'\xa3\x95\x80\x80'
 _TYPES = ['GPS', 'POS', 'ATT', 'ESC', 'RPM']
-_DATE_S = 1e8
 _FIX = 3
 
 
@@ -43,7 +43,7 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
         ):
             found.extend(_readings(stored, tally))
     except Exception as error:  # the parser raises what a damaged byte happens to raise
-        tally.note(f'The log could not be read to its end: {error or type(error).__name__}.')
+        tally.note(f'The log could not be read to its end: {reason_of(error)}.')
     yield from found
 
 
@@ -65,7 +65,7 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
     while (message := log.recv_match(type=_TYPES)) is not None:
         tally.records += 1
         stamp_ns = round(float(message._timestamp) * 1e6) * 1000
-        if stamp_ns < _DATE_S * 1e9:
+        if stamp_ns < DATE_FROM_NS:
             stamp_ns += BASE_NS
             tally.note(UNDATED)
         fields = message.to_dict()

@@ -25,7 +25,7 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of, fraction_ns, of_day_ns
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources import format
-from shipdrag_ros.sources.log import BASE_NS, Tally, iso_ns
+from shipdrag_ros.sources.log import BASE_NS, DATE_FROM_NS, Tally, iso_ns
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
 
@@ -134,7 +134,6 @@ def _frame(parts: dict[str, str]) -> N2kFrame | None:
     return N2kFrame(time_ns, cycle_ns, pgn, sender, data, whole)
 
 
-_RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _SYSTEM_TIME, _GNSS = 126992, 129029
 _DATED_FRAMES = 50_000  # in which a date is looked for
 _FAST = (_GNSS,)
@@ -210,7 +209,7 @@ def clock_of(job: format.Job, tally: Tally) -> FrameClock:
             'many frames came in a second'
         )
     if not first.cycle_ns:
-        if first.time_ns >= _RELATIVE_BELOW_NS:
+        if first.time_ns >= DATE_FROM_NS:
             return FrameClock()
         times = [frame.time_ns for frame in islice(frames, 1000) if frame.time_ns is not None]
         if any(after < before for before, after in pairwise(times)):

@@ -25,14 +25,13 @@ import zstandard
 from rosbags.rosbag1 import Reader
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.bags.mcap_file import unpacked_file
+from shipdrag_ros.bags.mcap_file import METADATA, unpacked_file
 from shipdrag_ros.bags.records import DamageKind, DamageList
 from shipdrag_ros.bags.run import unpacked_message
 from shipdrag_ros.display import Table
-from shipdrag_ros.errors import BagError, ImportDataError
+from shipdrag_ros.errors import BagError, ImportDataError, reason_of
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
 from shipdrag_ros.messages.topics import TOPICS
-from shipdrag_ros.sources.beside import METADATA
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
@@ -164,7 +163,7 @@ def _ros1(path: Path, tally: Tally) -> Iterator[EncodedMessage]:
         raise
     except Exception as error:  # the reader raises what a damaged record happens to raise
         tally.notes.append(
-            f'The bag could not be read to its end: {error or type(error).__name__}; '
+            f'The bag could not be read to its end: {reason_of(error)}; '
             '`rosbag reindex` may mend it.'
         )
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.errors import ImportDataError, reason_of
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
 from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
 from shipdrag_ros.sources.log import BASE_NS, UNDATED, Tally
@@ -47,7 +47,7 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
             found = ULog(str(job.source), _TOPICS, True)
     except Exception as error:  # the parser raises what a damaged byte happens to raise
         raise ImportDataError(
-            f'{str(job.source)!r} is an ULog that cannot be read: {error or type(error).__name__}'
+            f'{str(job.source)!r} is an ULog that cannot be read: {reason_of(error)}'
         ) from error
     try:
         with np.errstate(invalid='ignore'):  # a damaged number is rejected as what it is

@@ -35,7 +35,7 @@ from shipdrag_ros.sources.formats.csv.table import (
     texts_of,
     written,
 )
-from shipdrag_ros.sources.log import BASE_NS, LIMIT_NS
+from shipdrag_ros.sources.log import BASE_NS, DATE_FROM_NS, LIMIT_NS
 
 _PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
@@ -381,8 +381,6 @@ def _clock_ns(text: str) -> tuple[int, tzinfo | None]:
     return of_day_ns(hour, found[2], found[3], found[4]), zone
 
 
-# a count of seconds below this, March 1973, is no date
-_RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _COUNTS_FROM = (('ns', 10**17), ('us', 10**14), ('ms', 10**11))  # since 1970, from 1973 on
 
 
@@ -427,7 +425,7 @@ class RowClock:
         good = usable(len(found), bad)
         if self.unit and not self._begun and good.any():
             self._begun = True
-            self.base_ns = BASE_NS if found[good.argmax()] < _RELATIVE_BELOW_NS else None
+            self.base_ns = BASE_NS if found[good.argmax()] < DATE_FROM_NS else None
         found += self.base_ns or 0
         beyond = good & ((found < 0) | (found >= LIMIT_NS))
         read_each(_impossible, cells, beyond, found, bad)
