@@ -228,8 +228,7 @@ def test_a_rate_next_to_nothing_gives_one_frame_a_date(files: dict[str, Path]) -
 def test_times_that_are_no_dates_take_the_one_of_a_frame_or_the_one_given(
     tmp_path: Path, capsys, kind: str
 ) -> None:
-    """Of SLCAN, and of `candump -tz`, which counts from its first frame."""
-    path = tmp_path / 'log'
+    path = tmp_path / 'log'  # that of candump as -tz writes it, from its first frame on
     since = lambda at: f'{int(at[0]) - made.epoch_ns(0) // 10**9:03d}'  # noqa: E731
     text = re.sub(r'(?<=\()\d+', since, getattr(made, kind)().decode())
     dated = f'{made._can_id(126992):08X}'
