@@ -316,8 +316,7 @@ class NmeaFeed:
             names = ', '.join(self._topic_refused)
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'
         used = [f'{name} from {source}' for name, source in found.feeding(address).items()]
-        unstated = any(each.endswith(NOT_STATED) for each in found.no_value)
-        if unstated and 'depth' not in found.used:
+        if 'depth' not in found.used and any(each.endswith(NOT_STATED) for each in found.no_value):
             used.append(
                 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
             )

@@ -106,17 +106,6 @@ def test_two_instruments_are_never_mixed() -> None:
     assert interpreter.feeding(LINE) == {'speed_through_water': 'IIVHW'}
 
 
-def test_the_same_sentence_on_two_lines_is_two_sources() -> None:
-    interpreter = Interpreter()
-    text = sentence('HEHDT,90.0,T')
-    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
-        first = interpreter.messages(text, 'tcp://a:1', stamp_ns)
-        second = interpreter.messages(text, 'tcp://b:1', stamp_ns)
-    assert (len(first), len(second)) == (1, 0)
-    fed = [interpreter.feeding(address) for address in ('tcp://a:1', 'tcp://b:1')]
-    assert fed == [{'heading': 'HEHDT'}, {}]
-
-
 def test_a_source_whose_line_is_gone_gives_way_at_once_and_that_is_said() -> None:
     interpreter = Interpreter()
     text = sentence('HEHDT,90.0,T')
@@ -124,6 +113,7 @@ def test_a_source_whose_line_is_gone_gives_way_at_once_and_that_is_said() -> Non
         interpreter.messages(text, address, START_NS)
     now_ns = START_NS + SETTLE_NS
     assert len(interpreter.messages(text, 'tcp://a:1', now_ns)) == 1
+    assert [interpreter.feeding(f'tcp://{each}:1') for each in 'ab'] == [{'heading': 'HEHDT'}, {}]
     interpreter.lose('tcp://b:1')  # feeds nothing
     assert interpreter.messages(text, 'tcp://b:1', now_ns + 1) == []
     interpreter.lose('tcp://a:1')
