@@ -70,13 +70,13 @@ def _verdict(found: DiagnosisResult) -> str:
             names = names_text([effect.name for effect in found.effects])
             return (
                 f'Missing in the model, and not alike in these runs: {names}; probability '
-                f'{_least_probable(found)}.{_besides(found)}'
+                f'{least_probable(found)}.{_besides(found)}'
             )
         case Verdict.NAMED:
             sizes = ' and '.join(_sized(effect) for effect in found.effects)
             return (
                 f'Missing in the model: {sizes}; probability '
-                f'{_least_probable(found)}.{_besides(found)}'
+                f'{least_probable(found)}.{_besides(found)}'
             )
         case Verdict.ONE_OF:
             fitted = found.baseline == 'fitted_here'  # some could not be seen, and have no size
@@ -107,8 +107,10 @@ def _verdict(found: DiagnosisResult) -> str:
             )
 
 
-def _least_probable(found: DiagnosisResult) -> str:
-    """Return how probable the named effects are; of two the less probable."""
+def least_probable(found: DiagnosisResult) -> str:
+    """
+    Return how probable the named effects are; of two the less probable.
+    """
     return probability(min(effect.probability for effect in found.effects))
 
 

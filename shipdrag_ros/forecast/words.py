@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from shipdrag_ros.display import LIGHT_KG, Table, ship_speed
 from shipdrag_ros.forecast.followed import Passed
@@ -28,16 +29,16 @@ def clock(seconds: float) -> str:
     return f'{minutes}:{rest:02d}'
 
 
-def way(metres: float, mass_kg: float) -> str:
+def way(metres: float, mass_kg: float, largest_m: float = 0.0) -> str:
     """
-    Return a distance in nautical miles, of a light craft or a short way in metres.
+    Return a distance in nautical miles, of a light craft or beside no long way in metres.
 
     Examples
     --------
     >>> way(-1852.0, 2e7), way(-81.7, 2e7)
     ('-1.00 nm', '-81.7 m')
     """
-    if mass_kg < LIGHT_KG or abs(metres) < 0.1 * _MILE_M:
+    if mass_kg < LIGHT_KG or max(abs(metres), largest_m) < 0.1 * _MILE_M:
         return f'{metres:.3g} m'
     return f'{metres / _MILE_M:.2f} nm'
 
@@ -84,16 +85,13 @@ def table(compared: Sequence[Passed], mass_kg: float, *, followed: bool = True) 
     """
     Show milestones, a line each; beside what followed, or alone.
     """
-
-    def far(metres: float) -> str:
-        return way(metres, mass_kg)
-
     rows = []
     for each in apart(compared, mass_kg):
+        far = partial(way, mass_kg=mass_kg, largest_m=each.foretold.distance_m.high)
         time, distance = cells(each.foretold.time_s, clock), cells(each.foretold.distance_m, far)
         if followed:
             time += (_was(each.was_s, each.was_s, clock),)
             distance += (_was(each.was_m, each.was_s, far),)
         rows.append((ship_speed(each.foretold.speed_m_s, mass_kg), *time, *distance))
     was = ('was',) if followed else ()
-    return Table(('down to', 'in', '90 %', *was, 'after', '90 %', *was), tuple(rows))
+    return Table(('down to', 'in [min:s]', '90 %', *was, 'after', '90 %', *was), tuple(rows))

@@ -213,6 +213,9 @@ def _first(found: DiagnosisResult) -> str:
     """Name the most probable answer, or ask."""
     if found.question:
         return in_python(found.question)
+    if found.effects:
+        names = diagnosis_words.names_text([each.name for each in found.effects])
+        return f'{names} ({diagnosis_words.least_probable(found)})'
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 

@@ -163,7 +163,7 @@ def shaft_check(rate_rad_s: float | None) -> Check:
     """
     name = 'Shaft'
     if rate_rad_s is None:
-        return Check(name, Held.UNKNOWN, 'not received: is the engine stopped, and not astern?')
+        return Check(name, Held.UNKNOWN, 'see that it is not astern')
     text = f'{rate_rad_s * 30.0 / math.pi:z.0f} rpm mean of the last minute'  # z: no -0
     astern = rate_rad_s < -STANDS_RAD_S
     return Check(name, Held.NO if astern else Held.YES, f'{text}: astern' if astern else text)

@@ -213,7 +213,7 @@ class Interpreter:
     rejected
         Lines that are no sentence, by address, then by reason.
     unknown
-        Sentences that measure nothing that is used here, by address.
+        Sentences that measure nothing that is used here, by talker and kind.
     no_value
         Values that a known sentence does not hold, by input and reason.
     behind
@@ -271,13 +271,13 @@ class Interpreter:
                     found += self._of_sentence(stamped, address)
         return found
 
-    def feeding(self) -> dict[str, str]:
+    def feeding(self, address: str) -> dict[str, str]:
         """
-        Return by input the sources that are used.
+        Return by input the sources on an address that are used.
         """
         by_input: dict[str, dict[str, None]] = {}
         for channel, choice in sorted(self._choices.items()):
-            if choice.held is not None:
+            if choice.held is not None and choice.held[1] == address:
                 by_input.setdefault(channel.input, {})[str(choice.held[0])] = None
         return {name: ', '.join(sources) for name, sources in by_input.items()}
 

@@ -285,10 +285,10 @@ class NmeaFeed:
         }
         groups: tuple[tuple[str, Mapping[str, object]], ...] = (
             ('rejected', found.rejected[address]),
-            ('unknown sentence', found.unknown),
-            ('no value', found.no_value),
-            ('feeds', found.feeding()),
-            ('used', found.used),
+            ('of all sources: unknown sentence', found.unknown),
+            ('of all sources: no value', found.no_value),
+            ('feeds', found.feeding(address)),
+            ('of all sources: used', found.used),
             ('of a backlog, stamped by their own times', found.behind),
             ('not taken, of another source', found.not_taken[address]),
             ('not used, a topic feeds', self._nmea_refused),
@@ -315,10 +315,8 @@ class NmeaFeed:
         if self._topic_refused:
             names = ', '.join(self._topic_refused)
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'
-        feeding = found.feeding()
-        used = [f'{name} from {source}' for name, source in feeding.items()]
-        unstated = any(each.endswith(NOT_STATED) for each in found.no_value)
-        if unstated and 'depth' not in feeding:
+        used = [f'{name} from {source}' for name, source in found.feeding(address).items()]
+        if 'depth' not in found.used and any(each.endswith(NOT_STATED) for each in found.no_value):
             used.append(
                 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
             )

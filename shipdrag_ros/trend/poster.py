@@ -123,9 +123,9 @@ def table(found: Poster) -> Table:
     Show a line a step, with time and way from the highest speed on.
     """
     mass = found.ship.mass_kg
-    ways = partial(way, mass_kg=mass)
     rows, time, distance = [], 0.0, 0.0
     for each in found.steps:
+        ways = partial(way, mass_kg=mass, largest_m=each.way_m.high)
         time, distance = time + each.time_s.median, distance + each.way_m.median
         rows.append(
             (
@@ -138,7 +138,7 @@ def table(found: Poster) -> Table:
             )
         )
     return Table(
-        ('speed', 'time (90 %)', 'way (90 %)', 'time so far', 'way so far', 'runs'),
+        ('speed', 'time [min:s] (90 %)', 'way (90 %)', 'time so far', 'way so far', 'runs'),
         rows=tuple(rows),
     )
 

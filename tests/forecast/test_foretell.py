@@ -255,6 +255,9 @@ def test_words(early: Estimate, ship: Ship) -> None:
     text = words.sentence(first, ship.mass_kg, 451.0)
     assert text.endswith(' nm; was 7:31')
     early_m = words.table([Passed(first, -2.5, -9.0)], ship.mass_kg).rows[0]
+    short = first._replace(distance_m=Band(100.0, 50.0, 300.0))  # in one unit
+    shown = words.table([Passed(short, None, None)], ship.mass_kg).rows[0]
+    assert shown[4:6] == ('0.05 nm', '0.03 nm to 0.16 nm')
     assert (early_m[3], early_m[6]) == ('before', 'before')
     assert words.sentence(first, ship.mass_kg, -2.5).endswith('; passed before')
     assert words.clock(first.time_s.median) in text

@@ -31,7 +31,9 @@ def test_each_says_in_a_line_what_it_is(record, found, diagnosis):
     assert repr(found).startswith('<Resistance: Vitus Bering, 1 coastdown; ')
     assert 'kN at' in repr(found)
     assert repr(found.coastdowns[0]).startswith('<Coastdown: 2026-06-01 08:06:')
-    assert repr(diagnosis).startswith('<Diagnosis: Vitus Bering, named: log scale (')
+    title, _, sure = repr(diagnosis).rpartition(' (')
+    assert title == '<Diagnosis: Vitus Bering, named: log scale'
+    assert f'probability {sure.removesuffix(")>")}' in diagnosis.summary()
 
 
 def test_a_notebook_shows_text_and_a_table_and_nothing_else(record, found, diagnosis):

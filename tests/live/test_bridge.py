@@ -372,7 +372,8 @@ def test_bytes_that_are_none_of_the_outputs_are_said_once_and_change_nothing_els
         (depth_check(20.0, 8.0, None), Held.YES, ''),  # 2.75 v^2 / g = 17.9 m
         (depth_check(None, 8.0, None), Held.UNKNOWN, ''),
         (rudder_check(math.radians(-4.0)), Held.YES, ''),
-        (shaft_check(None), Held.UNKNOWN, ''),
+        (shaft_check(None), Held.UNKNOWN, 'see that it is not astern'),
+        (shaft_check(-0.001), Held.YES, '0 rpm mean of the last minute'),  # no sign
         (shaft_check(2.0), Held.YES, ''),
         (shaft_check(-2.0), Held.NO, ''),
         (rudder_check(math.radians(-6.0)), Held.NO, ''),
@@ -389,10 +390,6 @@ def test_the_checklist_says_what_holds_and_what_it_compares(
     assert check.held is held
     assert check.text
     assert check.text == (shown or check.text)
-
-
-def test_a_shaft_that_stands_has_no_sign() -> None:
-    assert shaft_check(-0.001).text == shaft_check(0.001).text == '0 rpm mean of the last minute'
 
 
 def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(bags, tmp_path):

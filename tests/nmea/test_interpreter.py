@@ -68,9 +68,9 @@ def test_each_sentence(content: str, channel: Channel, value: tuple[float, float
 
 def test_a_depth_says_what_makes_it_one_from_the_surface() -> None:
     own, _ = settled('SDDPT,20.0,5.0')
-    assert own.feeding() == {'depth': 'SDDPT with its own offset'}
+    assert own.feeding(LINE) == {'depth': 'SDDPT with its own offset'}
     none, found = settled('SDDPT,20.0,')
-    assert none.feeding() == found == {}
+    assert none.feeding(LINE) == found == {}
     assert none.no_value == {'depth DPT: state the depth of the transducer': 2}
     stated = Interpreter(3.0)
     for stamp_ns in (START_NS, START_NS + SETTLE_NS):
@@ -78,7 +78,7 @@ def test_a_depth_says_what_makes_it_one_from_the_surface() -> None:
     assert message is not None
     block = decode(Source('depth', message.type), [message.payload], [0]).block
     assert block.value[0, 0] == 23.0
-    assert stated.feeding() == {'depth': 'SDDPT with the stated depth of the transducer'}
+    assert stated.feeding(LINE) == {'depth': 'SDDPT with the stated depth of the transducer'}
 
 
 def test_a_heading_that_is_not_measured_is_not_used() -> None:
@@ -97,22 +97,13 @@ def test_two_instruments_are_never_mixed() -> None:
     now_ns = START_NS + SETTLE_NS
     assert interpreter.messages(single, LINE, now_ns) == []
     assert len(interpreter.messages(dual, LINE, now_ns)) == 1
-    assert interpreter.feeding() == {'speed_through_water': 'VWVBW'}
+    assert interpreter.feeding(LINE) == {'speed_through_water': 'VWVBW'}
     assert interpreter.not_taken[LINE]['speed_through_water'] == 7
 
     later_ns = now_ns + SILENT_NS + 1
     assert interpreter.messages(single, LINE, later_ns) == []
     assert len(interpreter.messages(single, LINE, later_ns + SETTLE_NS)) == 1
-    assert interpreter.feeding() == {'speed_through_water': 'IIVHW'}
-
-
-def test_the_same_sentence_on_two_lines_is_two_sources() -> None:
-    interpreter = Interpreter()
-    text = sentence('HEHDT,90.0,T')
-    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
-        first = interpreter.messages(text, 'tcp://a:1', stamp_ns)
-        second = interpreter.messages(text, 'tcp://b:1', stamp_ns)
-    assert (len(first), len(second)) == (1, 0)
+    assert interpreter.feeding(LINE) == {'speed_through_water': 'IIVHW'}
 
 
 def test_a_source_whose_line_is_gone_gives_way_at_once_and_that_is_said() -> None:
@@ -122,6 +113,7 @@ def test_a_source_whose_line_is_gone_gives_way_at_once_and_that_is_said() -> Non
         interpreter.messages(text, address, START_NS)
     now_ns = START_NS + SETTLE_NS
     assert len(interpreter.messages(text, 'tcp://a:1', now_ns)) == 1
+    assert [interpreter.feeding(f'tcp://{each}:1') for each in 'ab'] == [{'heading': 'HEHDT'}, {}]
     interpreter.lose('tcp://b:1')  # feeds nothing
     assert interpreter.messages(text, 'tcp://b:1', now_ns + 1) == []
     interpreter.lose('tcp://a:1')

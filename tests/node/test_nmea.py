@@ -46,7 +46,7 @@ def test_what_is_heard_is_used_recorded_and_replayed(
     instruments.say(sentence('HEHDT,90.0,T')[:-2] + '00', sentence('GPXYZ,1'))
     status = diagnostics.wait_for(part, '1', value='rejected wrong checksum')
     found = values(status)
-    assert found['unknown sentence GPXYZ'] == '1'
+    assert found['of all sources: unknown sentence GPXYZ'] == '1'
     assert found['feeds speed_through_water'] == 'IIVHW'
     assert found['feeds shaft'] == 'IIRPM shaft 1'
     status = diagnostics.of('input speed_through_water')

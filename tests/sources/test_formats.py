@@ -7,6 +7,7 @@ import gc
 import gzip
 import json
 import math
+import re
 import shutil
 import sqlite3
 import struct
@@ -224,16 +225,23 @@ def test_a_rate_next_to_nothing_gives_one_frame_a_date(files: dict[str, Path]) -
     assert len(block_of(files['candump'], rate=1e-300)) == 1
 
 
-def test_the_date_that_is_given_is_not_said_to_be_another(tmp_path: Path, capsys) -> None:
-    path = tmp_path / 'slcan.log'
-    lines = made.slcan().decode().splitlines()
-    dated = f'T{made._can_id(126992):08X}'
-    path.write_text('\n'.join(line for line in lines if not line.startswith(dated)))
-    line = ['import', str(path), '-o', str(tmp_path / 'a.mcap'), '--date', '2024-05-17']
-    assert main(line) == 0
-    shown = capsys.readouterr().out
-    assert 'from 2024-05-17' in shown
-    assert '2000-01-01' not in shown
+@pytest.mark.parametrize('kind', ['slcan', 'candump'])
+def test_times_that_are_no_dates_take_the_one_of_a_frame_or_the_one_given(
+    tmp_path: Path, capsys, kind: str
+) -> None:
+    path = tmp_path / 'log'  # that of candump as -tz writes it, from its first frame on
+    since = lambda at: f'{int(at[0]) - made.epoch_ns(0) // 10**9:03d}'  # noqa: E731
+    text = re.sub(r'(?<=\()\d+', since, getattr(made, kind)().decode())
+    dated = f'{made._can_id(126992):08X}'
+    bare = '\n'.join(line for line in text.splitlines() if dated not in line)
+    said = []
+    for number, (log, *more) in enumerate([(text,), (bare, '--date', '2025-03-02'), (bare,)]):
+        path.write_text(log)
+        assert main(['import', str(path), '-o', str(tmp_path / f'{number}.mcap'), *more]) == 0
+        said.append(capsys.readouterr().out)
+    dates = [f'{made.START:%Y-%m-%d}', '2025-03-02', '2000-01-01']
+    assert [[date in each for date in dates] for each in said] == np.eye(3).tolist()
+    assert 'No frame states the date' in said[2]
 
 
 @pytest.mark.filterwarnings('error')

@@ -17,7 +17,7 @@ from contextlib import suppress
 from datetime import UTC
 from fractions import Fraction
 from functools import cache
-from itertools import chain, islice, pairwise
+from itertools import islice, pairwise
 from math import pi
 from typing import Any, NamedTuple
 
@@ -208,21 +208,21 @@ def clock_of(job: format.Job, tally: Tally) -> FrameClock:
             f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
             'many frames came in a second'
         )
-    if not first.cycle_ns:
-        if first.time_ns >= DATE_FROM_NS:
-            return FrameClock()
-        times = [frame.time_ns for frame in islice(frames, 1000) if frame.time_ns is not None]
-        if any(after < before for before, after in pairwise(times)):
-            raise ImportDataError(
-                f'{name}: its times are no dates and go back and forth, as those of `candump -td` '
-                'do; log with `candump -L`, or give --rate HZ'
-            )
-        return FrameClock(BASE_NS)
-    known_ns = _start_in(chain([first], islice(frames, _DATED_FRAMES)))
-    if first.cycle_ns == MINUTE_NS:
-        tally.note(
-            'The times of the frames count within a minute: a pause of a minute is not seen.'
+    if not first.cycle_ns and first.time_ns >= DATE_FROM_NS:
+        return FrameClock()
+    begin = [first, *islice(frames, _DATED_FRAMES)]
+    times = [frame.time_ns for frame in begin[:1000] if frame.time_ns is not None]
+    if not first.cycle_ns and any(after < before for before, after in pairwise(times)):
+        raise ImportDataError(
+            f'{name}: its times are no dates and go back and forth, as those of `candump -td` '
+            'do; log with `candump -L`, or give --rate HZ'
         )
+    known_ns = _start_in(begin)
+    if first.cycle_ns != DAY_NS:
+        if first.cycle_ns:
+            tally.note(
+                'The times of the frames count within a minute: a pause of a minute is not seen.'
+            )
         if known_ns is None and days is None:
             tally.note('No frame states the date; the times count from 2000-01-01.')
             known_ns = BASE_NS
