@@ -369,9 +369,8 @@ class Monitor:
     def _wake(self, source: int, number: int) -> None:
         """Let the regimes take the record, from some minutes before a second on."""
         self._watch.source = source
-        width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
-        bins = self._vouching.sound(self._memory.bins)
-        self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
+        before, bins = self._regimes, self._vouching.sound(self._memory.bins)
+        self._regimes, self._silent = RegimeFilter(self._ship, bins, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
 

@@ -44,7 +44,7 @@ _FULL_S = 6 * 3600.0  # of record that it remembers
 _ASKED_EVERY = 60  # bins
 _EVEN = 0.95
 _DOUBTED = 0.5
-_BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
+_UNKNOWN = 12  # bins from which on it is known what drove her
 _RAN_DOWN_S = 40.0  # a run-down that is worth a word
 _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
@@ -117,32 +117,24 @@ class RegimeFilter:
         Its length and volume.
     bins
         Of the monitor: which shafts are read.
-    width
-        Seconds in a bin of the bank.
     woken
         Second in which it is woken; the record before it is taken too.
     """
 
-    def __init__(self, ship: Ship, bins: Bins, width: int, woken: int) -> None:
+    def __init__(self, ship: Ship, bins: Bins, woken: int) -> None:
         first = woken - LEAD_S
         shafts = sum(int(bins.filling[each]) > first for each in SHAFTS)
-        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
+        hull = HullPrior.of(ship)
+        self._width = max(1, round(hull.bin_s))
+        self._setting = BankSetting.of(hull, float(self._width), shafts=shafts)
         self._bank = Bank.fresh()
-        self._width = width
-        self._next = first // width + 1
+        self._next = first // self._width + 1
         self._first = self._next
         self._woken = woken
         self._out: list[Float64] = []
         self._low: list[float] = []
         self._read: list[int] = []  # readings of motion in each bin
         self._even_s = 0.0
-
-    @staticmethod
-    def width(slope_window_s: float) -> int:
-        """
-        Return the seconds in a bin: fewer for smaller craft, whose slope window is shorter.
-        """
-        return max(1, round(slope_window_s / _BINS_OF_WINDOW))
 
     def advance(self, bins: Bins, number: int) -> bool:
         """
@@ -360,7 +352,7 @@ class RegimeFilter:
         astern = np.array(self._low[first : first + len(by.lost_m_s)]) < _ASTERN
         if by.lost_m_s[astern].sum() > 0.5 * by.lost_m_s.sum():
             reason, text = _REVERSED
-        elif reason in BY_SPEED and by.begin_s < _BINS_OF_WINDOW * self._width:
+        elif reason in BY_SPEED and by.begin_s < _UNKNOWN * self._width:
             reason, text = _UNSEEN
         most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
         start_ns, end_ns = (
