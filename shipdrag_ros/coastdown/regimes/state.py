@@ -134,8 +134,10 @@ class BankSetting(NamedTuple):
     ----------
     hull
         Of the ship.
-    step_s, pace
-        Length of a bin [s], and over that of the table.
+    step_s
+        Length of a bin [s].
+    pace
+        By which the times of the table shrink.
     shafts
         How many are read.
     told_s
@@ -155,6 +157,6 @@ class BankSetting(NamedTuple):
     @classmethod
     def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
-        Return the setting of a bank with bins of `step_s`.
+        Return the setting of a bank with bins of `step_s` that follows a record.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan, 0.0)
+        return cls(hull, step_s, 1.0, shafts, np.nan, 0.0)

@@ -275,7 +275,7 @@ class RegimeFilter:
     def asleep(self) -> bool:
         """Whether she has been under even power for long."""
         awake_s = self.taken_s - self._woken
-        return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
+        return min(self._even_s, awake_s) > _ASLEEP_S
 
     @property
     def full(self) -> bool:
@@ -306,7 +306,7 @@ class RegimeFilter:
         cuts: list[NotCoastdown] = []
         if glide.before in (s.BRAKE, s.GLIDE_TURN):  # nothing drove her before it
             cuts.append(_cut(before, stop, *_WHY[glide.before]))
-        if not self._setting.shafts and begin - stop > _RAN_DOWN_S * self._setting.pace:
+        if not self._setting.shafts and begin - stop > _RAN_DOWN_S:
             text = (
                 f'the thrust ran down for {begin - stop:.0f} s, and was gone at the end of that, '
                 f'± {glide.begin_sd_s:.0f} s'
@@ -318,9 +318,8 @@ class RegimeFilter:
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
         if glide.after < 0:
             return None
-        around = _ASTERN_S * self._setting.pace
         first, last = (
-            max(round((glide.end_s + off) / self._width), 0) for off in (-around, around)
+            max(round((glide.end_s + off) / self._width), 0) for off in (-_ASTERN_S, _ASTERN_S)
         )
         if any(low < _ASTERN for low in self._low[first : last + 1]):
             return EndedBy.ASTERN
