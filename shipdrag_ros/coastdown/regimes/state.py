@@ -138,6 +138,8 @@ class BankSetting(NamedTuple):
         Length of a bin [s].
     pace
         By which the times of the table shrink.
+    forgets
+        Share of what was learnt under power that a bin outdates.
     shafts
         How many are read.
     told_s
@@ -150,6 +152,7 @@ class BankSetting(NamedTuple):
     hull: HullPrior
     step_s: float
     pace: float
+    forgets: float
     shafts: int
     told_s: float
     engine: float
@@ -159,4 +162,4 @@ class BankSetting(NamedTuple):
         """
         Return the setting of a bank with bins of `step_s` that follows a record.
         """
-        return cls(hull, step_s, 1.0, shafts, np.nan, 0.0)
+        return cls(hull, step_s, 1.0, step_s / n.MEMORY_S, shafts, np.nan, 0.0)

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.bins import SOURCES, Bins, mean_place
 from shipdrag_ros.coastdown.events import BY_SPEED, Dismissal, EndedBy, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.past import FIRST_TRACK
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import (
@@ -34,7 +35,7 @@ from shipdrag_ros.coastdown.regimes.read_out import (
     unpowered,
 )
 from shipdrag_ros.coastdown.regimes.state import BankSetting
-from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
+from shipdrag_ros.samples import KIND, SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
 LEAD_S = 900  # of record before what woke it
@@ -48,6 +49,9 @@ _UNKNOWN = 12  # bins from which on it is known what drove her
 _RAN_DOWN_S = 40.0  # a run-down that is worth a word
 _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
+_TRACKS = [track for track in SOURCES.tolist() if KIND[track] >= FIRST_TRACK]
+_FIXES_S = 60  # over which fixes are counted
+_FIXES = 2.0  # in a bin: a way is from one to the next
 
 _ENDED = {
     s.LEVEL: EndedBy.ENGINE,
@@ -103,6 +107,13 @@ class Dated(NamedTuple):
         return self._replace(stop_s=begin_s, start_s=begin_s, begin_s=begin_s, cuts=gap)
 
 
+def _of_fixes_s(bins: Bins, second: int) -> float:
+    """Return the length of a bin in which fixes show a way; 0 where there are none [s]."""
+    counts = [mean_place(bins, track, second, _FIXES_S)[3] for track in _TRACKS]
+    least = min((count for count in counts if count > 0), default=np.inf)
+    return float(min(_FIXES * _FIXES_S / least, n.BIN_S))
+
+
 def _cut(first_s: float, last_s: float, reason: Dismissal, text: str) -> NotCoastdown:
     return NotCoastdown(round(first_s * SECOND_NS), round(last_s * SECOND_NS), reason, text)
 
@@ -125,7 +136,7 @@ class RegimeFilter:
         first = woken - LEAD_S
         shafts = sum(int(bins.filling[each]) > first for each in SHAFTS)
         hull = HullPrior.of(ship)
-        self._width = max(1, round(hull.bin_s))
+        self._width = max(1, round(max(hull.bin_s, _of_fixes_s(bins, woken))))
         self._setting = BankSetting.of(hull, float(self._width), shafts=shafts)
         self._bank = Bank.fresh()
         self._next = first // self._width + 1
