@@ -326,10 +326,11 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     -----
     No steady record shows the noise: all settings of it are weighed by their evidence.
     """
-    hull = HullPrior.any_body(ship)
-    binned = bin_window(window, parameters, hull.bin_s)
+    longest_s = float(n.BIN_S) * math.sqrt(ship.length_m / float(n.BIN_LENGTH_M))
+    binned = bin_window(window, parameters, longest_s)
     if binned is None or not binned.top > 0.0:
         return None
+    hull = HullPrior.any_body(ship)
     read_out = np.isfinite(binned.said[:, s.SHAFTS : s.SHAFTS + 4]).any(axis=0)
     resistance = math.exp(hull_law(hull, math.log(binned.top))[0] + hull.level)
     setting = BankSetting.of(hull, binned.step_s, shafts=int(read_out.sum()))._replace(
@@ -339,7 +340,7 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
         engine=max(resistance, binned.swing),
     )
     # a log errs by a part of the speed: as that of the ship of the table
-    wanders = n.WANDER * binned.top / math.exp(hull.sails) * hull.bin_s / float(n.BIN_S)
+    wanders = n.WANDER * binned.top / math.exp(hull.sails) * longest_s / float(n.BIN_S)
     short, long = n.WANDER_S
     settings = [*product(n.ANY_GUST, wanders, [long]), *product(n.GUST[:1], wanders, [short])]
     banks = [_bank(binned, *each) for each in settings]
