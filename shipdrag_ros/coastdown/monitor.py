@@ -369,9 +369,8 @@ class Monitor:
     def _wake(self, source: int, number: int) -> None:
         """Let the regimes take the record, from some minutes before a second on."""
         self._watch.source = source
-        width, before = RegimeFilter.width(self._parameters.slope_window_s), self._regimes
-        bins = self._vouching.sound(self._memory.bins)
-        self._regimes, self._silent = RegimeFilter(self._ship, bins, width, number), False
+        before, bins = self._regimes, self._vouching.sound(self._memory.bins)
+        self._regimes, self._silent = RegimeFilter(self._ship, bins, number), False
         if before is not None:
             self._regimes.tell(before.told_s)
 
@@ -497,6 +496,8 @@ class Monitor:
         self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
+        if ended_by is EndedBy.SPEED:  # nor of one that was announced and is none
+            self._reported_s = float(regimes.taken_s)
         self._watch.update_ns = ALWAYS
         return events
 

@@ -212,28 +212,29 @@ def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, said) -> Non
 
 @pytest.fixture(scope='module')
 def long_record(record, sensors) -> Block:
-    """An hour with coastdowns, slow-downs and turns, and even power for a while between them."""
+    """Coastdowns, a slow-down and turns, and even power for some minutes between them."""
     orders = []
-    for start in (0.0, 1100.0, 2400.0):
+    for start in (0.0, 1500.0, 3200.0):
         orders += [
             EngineOrder(start, shaft=0.0, thrust=0.0),
             EngineOrder(start + 300.0, shaft=1.0, thrust=1.0),
         ]
-    orders.insert(4, EngineOrder(1900.0, shaft=0.7, thrust=0.5))
+    orders.insert(4, EngineOrder(2500.0, shaft=0.7, thrust=0.5))
     return record(
         sensors=(sensors['log'], replace(sensors['radar'], sd=0.3), sensors['compass']),
         orders=tuple(orders),
-        turns=(Turn(1250.0, 60.0, 0.02), Turn(2950.0, 100.0, 0.01)),
+        turns=(Turn(1650.0, 60.0, 0.02), Turn(3750.0, 100.0, 0.01)),
         lead_in_s=400.0,
-        duration_s=3200.0,
+        duration_s=4000.0,
     )
 
 
 @pytest.fixture(scope='module')
 def long_records(ship, long_record) -> list:
-    """Of all inputs, and of fixes on the globe alone, each with what the whole of it says."""
-    early = long_record.stamp_ns < START_NS + 2700 * S
-    fixes = on_the_globe(long_record[early & (long_record.channel == Channel.POSITION)])
+    """Of all inputs, and of a log and fixes on the globe, each with what the whole of it says."""
+    early = long_record.stamp_ns < START_NS + 3300 * S
+    heard = np.isin(long_record.channel, [LOG, Channel.POSITION])
+    fixes = on_the_globe(long_record[early & heard])
     return [(block, run(ship, [block])[0]) for block in (long_record, fixes)]
 
 

@@ -18,6 +18,7 @@ from shipdrag_ros.coastdown.events import (
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.sections import TableBaseline
 from shipdrag_ros.simulation import (
     EngineOrder,
     GaussMarkov,
@@ -304,6 +305,23 @@ def test_a_ship_without_a_baseline_is_judged_by_its_size(record) -> None:
     bare = Ship(length_m=150.0, displaced_volume_m3=20200.0)
     events = Monitor(bare, Parameters(), estimate=refuse, final=refuse).update(record())
     assert len(onsets(events)) == 1
+
+
+def test_a_yacht_needs_no_parameters_of_her_own() -> None:
+    # 10 m: half of her speed is lost in 20 s, mostly to waves
+    bare = Ship(length_m=10.4, displaced_volume_m3=6.9)
+    speed = np.linspace(0.0, 3.2, 17)
+    r = 0.0095 * speed**2 * (1.0 + (speed / 3.5) ** 4)
+    table = TableBaseline(tuple(speed.tolist()), tuple((bare.mass_kg * r).tolist()), 0.05)
+    yacht = replace(bare, baseline=table)
+    scenario = Scenario(speed_m_s=3.0, lead_in_s=480.0, duration_s=180.0)
+    log = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03)
+    for seed in (1, 2):
+        block = sense(simulate(yacht, scenario), (log,), seed=seed, start_ns=START_NS)
+        monitor = Monitor(bare, Parameters(), estimate=refuse, final=refuse)
+        (ended,) = standing([*monitor.update(block), *monitor.finish()])
+        assert abs(after_s(ended.start_ns, 480.0)) <= 2.0
+        assert after_s(ended.end_ns, 480.0) >= 150.0
 
 
 def test_a_small_craft_with_short_windows() -> None:

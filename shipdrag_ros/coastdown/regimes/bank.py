@@ -234,6 +234,7 @@ _SETTING = BankSetting(
     HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(1)),
     0.0,
     0.0,
+    0.0,
     0,
     0.0,
     0.0,

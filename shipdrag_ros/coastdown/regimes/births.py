@@ -403,7 +403,7 @@ def _children(
     f = bank.row[i]
     claimed = setting.engine > 0.0
     # a window is as long as a person finds it worth, and manoeuvres with it
-    hours = (n.BIN_S if claimed else setting.step_s) / 3600.0
+    hours = setting.step_s / setting.pace / 3600.0
     regime = f.regime
     age_s = now_s - f.since if f.count > 0 else np.inf
     if both and f.liar == s.NOBODY:

@@ -334,6 +334,8 @@ def read(window: Window, ship: Ship, parameters: Parameters) -> WindowRegimes | 
     read_out = np.isfinite(binned.said[:, s.SHAFTS : s.SHAFTS + 4]).any(axis=0)
     resistance = math.exp(hull_law(hull, math.log(binned.top))[0] + hull.level)
     setting = BankSetting.of(hull, binned.step_s, shafts=int(read_out.sum()))._replace(
+        pace=binned.step_s / n.BIN_S,
+        forgets=n.BIN_S / n.MEMORY_S,
         told_s=binned.before * binned.step_s,
         engine=max(resistance, binned.swing),
     )

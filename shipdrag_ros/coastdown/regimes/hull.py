@@ -53,6 +53,11 @@ class HullPrior(NamedTuple):
     sails: float
     run_down: Float64
 
+    @property
+    def bin_s(self) -> float:
+        """Length of a bin that suits her [s]: a smaller craft is quicker."""
+        return float(n.BIN_S) * min(1.0, math.sqrt(self.length_m / float(n.CRAFT_M)))
+
     @classmethod
     def of(cls, ship: Ship) -> HullPrior:
         """

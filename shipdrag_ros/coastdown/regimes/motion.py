@@ -200,7 +200,7 @@ def predict(
     u = math.exp(x[s.LN_U])
     if regime == s.DRIVEN:  # waves stay as they were learnt until that is forgotten
         law = hull_law(setting.hull, x[s.LN_U])[0]
-        f.gust_a += (math.exp(law + x[s.LN_A]) - f.gust_a) * n.BIN_S / n.MEMORY_S
+        f.gust_a += (math.exp(law + x[s.LN_A]) - f.gust_a) * setting.forgets
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[s.LN_U])
@@ -511,7 +511,8 @@ def _shaft(
         if np.isnan(before):
             return math.log(n.BAD if stands else 1.0)
         if stands and before >= n.CREEPS:
-            stops = n.MANOEUVRE * n.OF_MANOEUVRES[0] * n.BIN_S / 3600.0  # as often as she glides
+            hours = setting.step_s / setting.pace / 3600.0
+            stops = n.MANOEUVRE * n.OF_MANOEUVRES[0] * hours  # as often as she glides
             return math.log(n.BAD * stops)
         if stands:  # of the other they say nothing
             return 0.0

@@ -109,14 +109,14 @@ def listen(
     for which in range(4):
         value = _value(setting, said, which)
         if not np.isnan(value):
-            _bends(noise, which, value)
+            _bends(noise, setting, which, value)
             if which <= s.GROUND:
-                _coarse(noise, which, said[s.RANGES + which], driven)
+                _coarse(noise, setting, which, said[s.RANGES + which], driven)
             _one(noise, setting, which, value, before, driven)
     if not np.isnan(said[s.RATE]):
         sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
         clipped = min(abs(said[s.RATE]), 3.0 * max(sd, _STEADY_RAD_S))
-        gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
+        gain = driven / min(noise.rate[1] + 1.0, 1.0 / setting.forgets)
         noise.rate[1] += driven
         noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
     _average(noise, setting, noise.used)
@@ -132,7 +132,7 @@ def _value(setting: BankSetting, said: Float64, which: int) -> float:
 
 
 @compiled(uncounted=True)
-def _bends(noise: NoiseFilters, which: int, value: float) -> None:
+def _bends(noise: NoiseFilters, setting: BankSetting, which: int, value: float) -> None:
     """Learn the size of second differences, in which no regime is seen."""
     last, bend = noise.last[which], noise.bend[which]
     size = abs(value - 2.0 * last[0] + last[1])
@@ -142,7 +142,7 @@ def _bends(noise: NoiseFilters, which: int, value: float) -> None:
     if bend[1] > 8.0:
         size = min(size, max(4.0 * bend[0], n.WHITE_FLOOR * abs(value)))
     bend[1] += 1.0
-    bend[0] += (size - bend[0]) / min(bend[1], n.MEMORY_S / n.BIN_S)
+    bend[0] += (size - bend[0]) / min(bend[1], 1.0 / setting.forgets)
 
 
 @compiled(inline=True, uncounted=True)
@@ -156,10 +156,12 @@ def _spread(noise: NoiseFilters, which: int, setting: BankSetting) -> float:
 
 
 @compiled(inline=True, uncounted=True)
-def _coarse(noise: NoiseFilters, which: int, spread: float, driven: float) -> None:
+def _coarse(
+    noise: NoiseFilters, setting: BankSetting, which: int, spread: float, driven: float
+) -> None:
     """Learn how often the seconds of a bin read the same, and their mean range."""
     coarse = noise.coarse[which]
-    gain = driven / min(noise.seen[which] + 1.0, n.MEMORY_S / n.BIN_S)
+    gain = driven / min(noise.seen[which] + 1.0, 1.0 / setting.forgets)
     coarse[0] += gain * ((1.0 if spread == 0.0 else 0.0) - coarse[0])
     coarse[1] += gain * (spread - coarse[1])
 
@@ -200,7 +202,7 @@ def _one(
         return
     size = noise.mean[0 if which == _APART else which, 0, 1]
     a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
-    fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
+    fade = 1.0 - driven * setting.forgets
     stride = _GUSTS if which == _APART else 1  # no gust moves one of them alone
     gained, best = noise.gained, -np.inf
     for k in range(0, FILTERS, stride):

@@ -3,8 +3,8 @@
 Every number of the regimes: priors, hazards, shares, and what a decision costs.
 
 One table, so that a vessel which behaves otherwise changes a prior here and nothing
-else. Times are those of a ship whose bin is `BIN_S`; a smaller craft has a shorter
-bin, and all times of the table but the hazards shrink with it.
+else. A craft shorter than `CRAFT_M` has bins shorter than `BIN_S`, and the shortest
+coastdown shrinks with them; in a window that a person claims all times but the hazards do.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ NUMBERS = NumberTable()
 _number, _grid = NUMBERS.number, NUMBERS.grid
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
-BIN_LENGTH_M = _number('BIN_LENGTH_M', 150.0, 'm', 'of a ship of that bin; times go by the root')
+BIN_LENGTH_M = _number('BIN_LENGTH_M', 150.0, 'm', 'of a ship of that bin in a claimed window')
+CRAFT_M = _number('CRAFT_M', 60.0, 'm', 'a craft that is shorter has shorter bins, by the root')
 LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
 LOG_LAG_MOST = _number('LOG_LAG_MOST', 30.0, 's', 'no filter of a log is longer')
 LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')

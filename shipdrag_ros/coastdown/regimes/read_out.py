@@ -192,7 +192,7 @@ def glides(found: Spans, setting: BankSetting, speed: Float64) -> list[SmoothedG
         even_s = _even_s(speed, glide, step_s)
         if even_s < glide.end_s:
             glide = glide._replace(end_s=even_s, after=s.LEVEL)
-        if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.pace:
+        if glide.end_s - glide.begin_s >= n.SHORTEST_S * setting.step_s / n.BIN_S:
             all_of.append(glide)
     return all_of
 
@@ -250,7 +250,7 @@ def unpowered(found: Spans, bins: int, setting: BankSetting) -> list[tuple[float
     """
     Return the stretches [s] without thrust that are probably not one glide from end to end.
     """
-    step_s, spared_s = setting.step_s, n.SHORTEST_S * setting.pace
+    step_s, spared_s = setting.step_s, n.SHORTEST_S * setting.step_s / n.BIN_S
     likely = probability_of(found.part(np.isin(found.what, _UNPOWERED)), bins, step_s)
     glide = found.part(found.what == s.GLIDE)
     several = []

@@ -134,8 +134,12 @@ class BankSetting(NamedTuple):
     ----------
     hull
         Of the ship.
-    step_s, pace
-        Length of a bin [s], and over that of the table.
+    step_s
+        Length of a bin [s].
+    pace
+        By which the times of the table shrink.
+    forgets
+        Share of what was learnt under power that a bin outdates.
     shafts
         How many are read.
     told_s
@@ -148,6 +152,7 @@ class BankSetting(NamedTuple):
     hull: HullPrior
     step_s: float
     pace: float
+    forgets: float
     shafts: int
     told_s: float
     engine: float
@@ -155,6 +160,6 @@ class BankSetting(NamedTuple):
     @classmethod
     def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0) -> BankSetting:
         """
-        Return the setting of a bank with bins of `step_s`.
+        Return the setting of a bank with bins of `step_s` that follows a record.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, np.nan, 0.0)
+        return cls(hull, step_s, 1.0, step_s / n.MEMORY_S, shafts, np.nan, 0.0)

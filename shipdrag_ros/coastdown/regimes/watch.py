@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.bins import SOURCES, Bins, mean_place
 from shipdrag_ros.coastdown.events import BY_SPEED, Dismissal, EndedBy, NotCoastdown, Regimes
+from shipdrag_ros.coastdown.past import FIRST_TRACK
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import (
@@ -34,7 +35,7 @@ from shipdrag_ros.coastdown.regimes.read_out import (
     unpowered,
 )
 from shipdrag_ros.coastdown.regimes.state import BankSetting
-from shipdrag_ros.samples import SECOND_NS, SHAFTS, Float64
+from shipdrag_ros.samples import KIND, SECOND_NS, SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
 LEAD_S = 900  # of record before what woke it
@@ -44,10 +45,13 @@ _FULL_S = 6 * 3600.0  # of record that it remembers
 _ASKED_EVERY = 60  # bins
 _EVEN = 0.95
 _DOUBTED = 0.5
-_BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
+_UNKNOWN = 12  # bins from which on it is known what drove her
 _RAN_DOWN_S = 40.0  # a run-down that is worth a word
 _ASTERN = -0.05  # of the steady revs times pitch
 _ASTERN_S = 30.0  # about the end of a glide
+_TRACKS = [track for track in SOURCES.tolist() if KIND[track] >= FIRST_TRACK]
+_FIXES_S = 60  # over which fixes are counted
+_FIXES = 2.0  # in a bin: a way is from one to the next
 
 _ENDED = {
     s.LEVEL: EndedBy.ENGINE,
@@ -103,6 +107,13 @@ class Dated(NamedTuple):
         return self._replace(stop_s=begin_s, start_s=begin_s, begin_s=begin_s, cuts=gap)
 
 
+def _of_fixes_s(bins: Bins, second: int) -> float:
+    """Return the length of a bin in which fixes show a way; 0 where there are none [s]."""
+    counts = [mean_place(bins, track, second, _FIXES_S)[3] for track in _TRACKS]
+    least = min((count for count in counts if count > 0), default=np.inf)
+    return float(min(_FIXES * _FIXES_S / least, n.BIN_S))
+
+
 def _cut(first_s: float, last_s: float, reason: Dismissal, text: str) -> NotCoastdown:
     return NotCoastdown(round(first_s * SECOND_NS), round(last_s * SECOND_NS), reason, text)
 
@@ -117,32 +128,24 @@ class RegimeFilter:
         Its length and volume.
     bins
         Of the monitor: which shafts are read.
-    width
-        Seconds in a bin of the bank.
     woken
         Second in which it is woken; the record before it is taken too.
     """
 
-    def __init__(self, ship: Ship, bins: Bins, width: int, woken: int) -> None:
+    def __init__(self, ship: Ship, bins: Bins, woken: int) -> None:
         first = woken - LEAD_S
         shafts = sum(int(bins.filling[each]) > first for each in SHAFTS)
-        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
+        hull = HullPrior.of(ship)
+        self._width = max(1, round(max(hull.bin_s, _of_fixes_s(bins, woken))))
+        self._setting = BankSetting.of(hull, float(self._width), shafts=shafts)
         self._bank = Bank.fresh()
-        self._width = width
-        self._next = first // width + 1
+        self._next = first // self._width + 1
         self._first = self._next
         self._woken = woken
         self._out: list[Float64] = []
         self._low: list[float] = []
         self._read: list[int] = []  # readings of motion in each bin
         self._even_s = 0.0
-
-    @staticmethod
-    def width(slope_window_s: float) -> int:
-        """
-        Return the seconds in a bin: fewer for smaller craft, whose slope window is shorter.
-        """
-        return max(1, round(slope_window_s / _BINS_OF_WINDOW))
 
     def advance(self, bins: Bins, number: int) -> bool:
         """
@@ -283,7 +286,7 @@ class RegimeFilter:
     def asleep(self) -> bool:
         """Whether she has been under even power for long."""
         awake_s = self.taken_s - self._woken
-        return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
+        return min(self._even_s, awake_s) > _ASLEEP_S
 
     @property
     def full(self) -> bool:
@@ -314,7 +317,7 @@ class RegimeFilter:
         cuts: list[NotCoastdown] = []
         if glide.before in (s.BRAKE, s.GLIDE_TURN):  # nothing drove her before it
             cuts.append(_cut(before, stop, *_WHY[glide.before]))
-        if not self._setting.shafts and begin - stop > _RAN_DOWN_S * self._setting.pace:
+        if not self._setting.shafts and begin - stop > _RAN_DOWN_S:
             text = (
                 f'the thrust ran down for {begin - stop:.0f} s, and was gone at the end of that, '
                 f'± {glide.begin_sd_s:.0f} s'
@@ -326,9 +329,8 @@ class RegimeFilter:
     def _ended_by(self, glide: SmoothedGlide) -> EndedBy | None:
         if glide.after < 0:
             return None
-        around = _ASTERN_S * self._setting.pace
         first, last = (
-            max(round((glide.end_s + off) / self._width), 0) for off in (-around, around)
+            max(round((glide.end_s + off) / self._width), 0) for off in (-_ASTERN_S, _ASTERN_S)
         )
         if any(low < _ASTERN for low in self._low[first : last + 1]):
             return EndedBy.ASTERN
@@ -360,7 +362,7 @@ class RegimeFilter:
         astern = np.array(self._low[first : first + len(by.lost_m_s)]) < _ASTERN
         if by.lost_m_s[astern].sum() > 0.5 * by.lost_m_s.sum():
             reason, text = _REVERSED
-        elif reason in BY_SPEED and by.begin_s < _BINS_OF_WINDOW * self._width:
+        elif reason in BY_SPEED and by.begin_s < _UNKNOWN * self._width:
             reason, text = _UNSEEN
         most = float((table[first:last, P_RUN_DOWN] + table[first:last, P_GLIDING]).max())
         start_ns, end_ns = (
