@@ -496,7 +496,7 @@ class Monitor:
         self._dismissed_s = (end_ns if was is None else was.end_ns) / SECOND_NS
         events = self._running.withdraw(was, ended_by, end_ns, regimes.regimes())
         self._running = None
-        if ended_by is EndedBy.SPEED:  # nor of one that was announced and is none
+        if ended_by is EndedBy.SPEED:  # noise begins no other glide, as in `_end`
             self._reported_s = float(regimes.taken_s)
         self._watch.update_ns = ALWAYS
         return events

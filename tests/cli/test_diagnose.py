@@ -87,7 +87,7 @@ def test_a_speed_that_no_baseline_reaches_is_a_question_too(ship_file, tmp_path,
     found = json.loads((tmp_path / 'found.json').read_text())
     assert (found['verdict'], found['candidates']) == ('one_of', [])
     assert 'near knots over m/s' in found['question']
-    assert 'if the unit is right: speed_m_s is 15.5' in '; '.join(found['notes'])
+    assert f'if the unit is right: {bag}: speed_m_s is 15.5' in '; '.join(found['notes'])
 
 
 def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(ship_file, tmp_path, capsys):
@@ -330,7 +330,7 @@ def sound(path: Path, slowing: bool) -> Path:
 def test_the_first_word_is_that_there_is_no_coastdown_and_why(slowing, tmp_path, capsys):
     sailed = sound(tmp_path / 'sailed.mcap', slowing)
     ship, document = tmp_path / 'ship.yaml', tmp_path / 'found.json'
-    ship.write_text(MODEL)
+    ship.write_text('length_m: 60.0\ndisplaced_volume_m3: 2000.0\n')
     page = tmp_path / 'page.html'
     line = ['diagnose', str(sailed), '--ship', str(ship), '--report', str(page)]
     assert main([*line, '--json', str(document)]) == 0
