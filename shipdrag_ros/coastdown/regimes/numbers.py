@@ -3,8 +3,8 @@
 Every number of the regimes: priors, hazards, shares, and what a decision costs.
 
 One table, so that a vessel which behaves otherwise changes a prior here and nothing
-else. A craft shorter than `CRAFT_M` has bins shorter than `BIN_S`, and the shortest
-coastdown shrinks with them; in a window that a person claims all times but the hazards do.
+else. A craft shorter than `CRAFT_M` has bins shorter than `BIN_S`; `SHORTEST_S` and `EVEN`
+shrink with them, in a window that a person claims all times but the hazards.
 """
 
 from __future__ import annotations
