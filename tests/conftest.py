@@ -172,6 +172,7 @@ def estimate(ship: Ship) -> Estimate:
         froude=ship.froude(speed),
         slope=np.gradient(r, ship.froude(speed)),
         slope_sigma=np.full_like(speed, 1e-3),
+        by_current_1_s=np.zeros_like(speed),
     )
     time_s = np.arange(1500.0)
     fitted = 8.2 / (1.0 + 8.2 * time_s / 3000.0)

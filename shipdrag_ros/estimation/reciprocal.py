@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Several coastdowns of one ship: one r(v), the current taken out.
+Several coastdowns of one ship: one r(v), current and log offset taken out.
 
-A run measured over ground alone shifts its speeds by the current along its
-track. On opposite headings the shifts are opposite: the current is the one
-under which the curves agree. What still differs from run to run (wind, waves,
+A current turns with the heading, the offset of a log, which one run takes for a
+current, does not: the runs show both, and by its posterior r of each follows
+its current. Where no run finds one, it is that under which the curves of runs
+over ground agree, their speeds shifted by it. What still differs from run to run (wind, waves,
 a current that changes) widens the band.
 """
 
@@ -12,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 
 _POINTS = 101
@@ -78,10 +80,14 @@ def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None])
     """
     if len(estimates) < 2:
         raise EstimationError(f'{len(estimates)} coastdown(s) to combine, give two or more')
-    along = _along_first(headings_rad)
+    heading = np.array([math.nan if each is None else each for each in headings_rad])
+    along = np.cos(heading - heading[0])
     over_ground = np.array([not item.by_log and item.current_m_s is None for item in estimates])
-    current, current_sigma = _current(estimates, along)
-    curves = comparable(estimates)
+    less, current, current_sigma = _currents(estimates, heading)
+    curves = [
+        replace(each, resistance_m_s2=each.resistance_m_s2 + more * each.by_current_1_s)
+        for each, more in zip(comparable(estimates), less)
+    ]
     if current is None and over_ground.any():
         current, current_sigma = _agreement(curves, over_ground, along)
     shifts = np.zeros(len(estimates))
@@ -109,31 +115,34 @@ def comparable(estimates: Sequence[Estimate]) -> list[ResistanceCurve]:
     return [each.valid_conditions if unknown else each.valid_calm for each in estimates]
 
 
-def _along_first(headings_rad: Sequence[float | None]) -> Float64:
-    """Return the cosine of each heading with the first; NaN where one is unknown."""
-    first = headings_rad[0]
-    return np.array(
-        [
-            math.nan if heading is None or first is None else math.cos(heading - first)
-            for heading in headings_rad
-        ]
-    )
+def _currents(
+    estimates: Sequence[Estimate], heading_rad: Float64
+) -> tuple[Float64, float | None, float | None]:
+    """
+    Return what each run has found too little of its current, and the current and its sd.
 
-
-def _current(estimates: Sequence[Estimate], along: Float64) -> tuple[float | None, float | None]:
-    """Average the currents that the runs have found by themselves."""
-    found = [
-        (item.current_m_s * np.sign(cosine), item.current_sigma_m_s)
-        for item, cosine in zip(estimates, along)
-        if item.current_m_s is not None and item.current_sigma_m_s and abs(cosine) > _OPPOSITE
-    ]
-    if not found:
-        return None, None
-    value, sigma = np.array(found).T
-    weight = 1.0 / sigma**2
-    mean = float((weight * value).sum() / weight.sum())
-    excess = float((weight * (value - mean) ** 2).sum()) / max(len(found) - 1, 1)
-    return mean, math.sqrt(max(excess, 1.0) / float(weight.sum()))
+    The current turns with the heading, and is a calm one's other in each run. The error of what
+    the runs with a log have found is that of one log, the same on every heading.
+    """
+    at = [i for i, each in enumerate(estimates) if each.current_sigma_m_s is not None]
+    less = np.zeros(len(estimates))
+    if not at:
+        return less, None, None
+    found = [(each.current_m_s, each.current_sigma_m_s, each.by_log) for each in estimates]
+    value, sigma, by_log = np.array(found, np.float64)[at].T
+    calm = priors.sheltered(max(float(each.calm.speed_m_s[-1]) for each in estimates))
+    of_earth = (calm * priors.CURRENT.sd) ** 2
+    prior = of_earth * np.nan_to_num(np.cos(heading_rad[:, None] - heading_rad))
+    first = prior[0, at]
+    np.fill_diagonal(prior, of_earth + (calm * priors.CALM_CURRENT.sd) ** 2)
+    prior, error = prior[np.ix_(at, at)], np.outer(by_log * sigma, by_log * sigma)
+    np.fill_diagonal(error, sigma**2)
+    weight = np.linalg.inv(prior + error)
+    less[at] = prior @ weight @ value - value
+    if not first.any():
+        return less, None, None
+    variance = of_earth - first @ weight @ first
+    return less, float(first @ weight @ value), math.sqrt(variance)
 
 
 def _agreement(

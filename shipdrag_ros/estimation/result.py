@@ -64,12 +64,15 @@ class ResistanceCurve(ForceCurve):
     ----------
     slope, slope_sigma : (m,)
         dr/dFr and its standard deviation [m/s^2].
+    by_current_1_s : (m,)
+        Covariance of r and the current found along the track, over the variance of the current.
     """
 
     __repr__ = short_repr
 
     slope: Float64
     slope_sigma: Float64
+    by_current_1_s: Float64
 
     def between(self, froude_min: float, froude_max: float) -> ResistanceCurve:
         """

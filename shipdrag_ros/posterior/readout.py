@@ -33,6 +33,8 @@ class ReadOut:
     speed_m_s, resistance_m_s2, sigma_m_s2 : (m,)
     slope_1_s, slope_sigma_1_s : (m,)
         dr/dv.
+    by_current_1_s : (m,)
+        By how much r is another where the current is another: their covariance, as a slope.
     parts_m_s2
         Parts of sigma by cause (m,): `n_r`, `log`, `ground` (its scale), `held_force`, `wind`,
         `depth`, `law` and `noise`, whose squares add up to its square. Each is what would go if
@@ -47,6 +49,7 @@ class ReadOut:
     sigma_m_s2: Float64
     slope_1_s: Float64
     slope_sigma_1_s: Float64
+    by_current_1_s: Float64
     parts_m_s2: dict[str, Float64]
     shared_m_s2: Float64
 
@@ -82,6 +85,8 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
     theta, covariance = found.mean[:k], found.covariance
     cross = columns.T @ covariance[:k]  # of r with every unknown
     variance = np.einsum('km,mk->m', columns, cross[:, :k])
+    current = k + motion.CURRENT
+    by_current = cross[:, current] / covariance[current, current]
     half = _half_band(found.force, columns)
     variance, cross = variance * half**2, cross * half[:, None]
     of_slope = np.einsum('km,kl,lm->m', slopes, covariance[:k, :k], slopes)
@@ -91,6 +96,7 @@ def read(found: RunPosterior, speed_m_s: Float64, *, without: Collection[str] = 
         np.sqrt(variance),
         known[1] + theta @ slopes,
         np.sqrt(of_slope),
+        by_current,
         _parts(found, cross, variance),
         _shared(found, cross),
     )

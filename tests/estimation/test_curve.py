@@ -15,7 +15,7 @@ from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 def curve(froude: np.ndarray, slope: np.ndarray, slope_sigma: float) -> ResistanceCurve:
     unused = np.ones_like(froude)
     return ResistanceCurve(
-        froude, unused, unused, unused, froude, slope, np.full(len(froude), slope_sigma)
+        froude, unused, unused, unused, froude, slope, slope_sigma * unused, unused
     )
 
 

@@ -18,28 +18,32 @@ from shipdrag_ros.posterior.weather import Knowledge, Reference
 from shipdrag_ros.samples import Channel
 
 
-def run(coast, ship, *, current_m_s: float, seed: int, log: bool) -> Estimate:
+def run(
+    coast, ship, *, current_m_s: float, seed: int, log: bool, offset_m_s: float = 0.0
+) -> Estimate:
     """A coastdown whose positions drift by the current along its track."""
     block = coast.block(500, position_sigma=1.0, seed=seed)
     rows = block.channel == Channel.POSITION
     time_s = (block.stamp_ns - block.stamp_ns[0]) * 1e-9
     block.value[rows] += current_m_s * time_s[rows, None] * [np.cos(0.7), np.sin(0.7)]
+    block.value[~rows, 0] += offset_m_s
     if not log:
         block = block[rows]
     cut = Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
     return estimate_final(cut, ship, Parameters())
 
 
-@pytest.mark.parametrize('log', [True, False])
-def test_the_current_is_taken_out(coast, ship, log: bool) -> None:
-    there = run(coast, ship, current_m_s=0.2, seed=1, log=log)
-    back = run(coast, ship, current_m_s=-0.2, seed=2, log=log)
+@pytest.mark.parametrize(('log', 'offset_m_s'), [(True, 0.0), (False, 0.0), (True, 0.2)])
+def test_current_and_offset_are_taken_out(coast, ship, log: bool, offset_m_s: float) -> None:
+    there = run(coast, ship, current_m_s=0.2, seed=1, log=log, offset_m_s=offset_m_s)
+    back = run(coast, ship, current_m_s=-0.2, seed=2, log=log, offset_m_s=offset_m_s)
     both = combine([there, back], [0.7, 0.7 + math.pi])
     assert both.runs == 2
     assert both.current_m_s == pytest.approx(0.2, abs=0.05)
     truth = coast.resistance(both.speed_m_s, ship)
-    rms = np.sqrt(np.mean((both.resistance_m_s2 - truth) ** 2))
-    assert rms < (0.02 if log else 0.04) * truth.max()
+    error = both.resistance_m_s2 - truth
+    assert np.sqrt(np.mean(error**2)) < (0.02 if log else 0.03) * truth.max()
+    assert not log or np.all(np.abs(error) < 1.96 * both.sigma_m_s2)
 
 
 def test_runs_that_differ_widen_the_band(coast, ship) -> None:
@@ -51,7 +55,7 @@ def test_runs_that_differ_widen_the_band(coast, ship) -> None:
     assert np.all(alike.scatter_m_s2 == 0.0)
     assert np.all(apart.sigma_repeatable_m_s2 > 3.0 * alike.sigma_repeatable_m_s2)
     np.testing.assert_allclose(
-        apart.scatter_m_s2, 0.2 / math.sqrt(2.0) * alike.resistance_m_s2, rtol=1e-9
+        apart.scatter_m_s2, 0.2 / math.sqrt(2.0) * alike.resistance_m_s2, rtol=1e-4
     )
     # the error of n_r is common to all runs and does not average out
     of_n_r = alike.sigma_m_s2**2 - alike.sigma_repeatable_m_s2**2
@@ -86,7 +90,7 @@ def test_runs_are_of_one_kind(coast, ship) -> None:
         mixed.resistance_m_s2, combine([one, one], [0.0, 0.0]).resistance_m_s2
     )
     calm = combine([known, known], [0.0, 0.0])
-    np.testing.assert_allclose(calm.resistance_m_s2, 0.9 * mixed.resistance_m_s2, rtol=1e-9)
+    np.testing.assert_allclose(calm.resistance_m_s2, 0.9 * mixed.resistance_m_s2, rtol=1e-4)
 
 
 def test_no_heading_no_current(coast, ship) -> None:

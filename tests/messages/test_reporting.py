@@ -41,6 +41,7 @@ def estimate() -> Estimate:
         speed / 38.0,
         2e-3 * speed,
         1e-4 * speed,
+        np.zeros_like(speed),
     )
     return Estimate(
         estimator='s1_joint',

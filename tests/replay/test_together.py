@@ -101,7 +101,7 @@ def coasted(estimate: Estimate, top: float, rule: FroudeMax) -> Estimate:
     slope = 1.0 - 50.0 * np.maximum(froude - top - 1e-9, 0.0) + froude
     points = np.ones_like(froude)
     curve = ResistanceCurve(
-        froude, froude, points, points, froude, slope, slope_sigma=np.full_like(froude, 0.01)
+        froude, froude, points, points, froude, slope, 0.01 * points, by_current_1_s=points
     )
     # as of an estimator that is valid to the top of the branch whatever r does
     return replace(

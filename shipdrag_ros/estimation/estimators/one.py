@@ -416,6 +416,7 @@ def _curve(part: ReadOut, use: slice, ship: Ship) -> ResistanceCurve:
         ship.froude(part.speed_m_s[use]),
         per_froude * part.slope_1_s[use],
         per_froude * part.slope_sigma_1_s[use],
+        part.by_current_1_s[use],
     )
 
 

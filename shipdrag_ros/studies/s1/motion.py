@@ -408,6 +408,7 @@ def _resistance(motion: Motion, ship: Ship) -> ResistanceCurve:
         ship.froude(speed),
         -per_froude * (by_jerk * jerk + by_v * a),
         per_froude * sigma(slope_error),
+        np.zeros_like(speed),
     )
 
 
