@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -286,14 +287,9 @@ class _Judge:
         regime = self._reading.probability.argmax(axis=0)
         for a, b in gaps:
             regime[a:b] = len(self._reading.probability)
-        cuts, at = [], first
-        while at < last:
-            end = at + 1
-            while end < last and regime[end] == regime[at]:
-                end += 1
-            cuts.append(self._cut(at, end, int(regime[at]), kept))
-            at = end
-        return cuts
+        changes = first + 1 + np.flatnonzero(np.diff(regime[first:last]))
+        edges = pairwise([first, *changes.tolist(), last])
+        return [self._cut(a, b, int(regime[a]), kept) for a, b in edges if b > a]
 
     def _cut(self, first: int, last: int, regime: int, kept: _SPAN | None) -> NotCoastdown:
         binned = self._binned
@@ -388,19 +384,9 @@ def _without(span: _SPAN, gaps: list[_SPAN]) -> list[_SPAN]:
 
 def _fitted(cuts: list[NotCoastdown], start_ns: int, end_ns: int) -> list[NotCoastdown]:
     """Let cuts end where the part that is kept begins, and begin where it ends."""
-    fitted = []
-    for cut in cuts:
-        if cut.start_ns < start_ns:
-            cut = replace(cut, end_ns=min(cut.end_ns, start_ns))
-        elif cut.end_ns > end_ns:
-            cut = replace(cut, start_ns=max(cut.start_ns, end_ns))
-        else:  # the part that is kept reaches over it: a shaft dates it better than the bins
-            continue
-        fitted.append(cut)
-    before = [cut for cut in fitted if cut.start_ns < start_ns]
-    if before:
-        fitted[len(before) - 1] = replace(before[-1], end_ns=start_ns)
-    after = [k for k, cut in enumerate(fitted) if cut.start_ns >= end_ns]
-    if after:
-        fitted[after[0]] = replace(fitted[after[0]], start_ns=end_ns)
-    return [cut for cut in fitted if cut.end_ns > cut.start_ns]
+    before = [cut for cut in cuts if cut.start_ns < start_ns]
+    after = [cut for cut in cuts if cut.start_ns >= start_ns and cut.end_ns > end_ns]
+    # a shaft dates an edge better than the bins
+    before[-1:] = [replace(cut, end_ns=start_ns) for cut in before[-1:]]
+    after[:1] = [replace(cut, start_ns=end_ns) for cut in after[:1]]
+    return [*before, *after]

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.heading import rep103_yaw
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.bank import Bank, step
@@ -149,6 +148,7 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     Binned or None
         None where nothing shows a speed.
     """
+    window = window.by_rep103(parameters.heading_convention)
     length_s = (window.end_ns - window.start_ns) / SECOND_NS
     heard = [series.time_ns for series in window.each(*MOTION_INPUTS) if len(series) > 2]
     apart = [float(np.median(np.diff(time_ns))) / SECOND_NS for time_ns in heard]
@@ -167,9 +167,8 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     said, noise = np.full((count, s.SAID), np.nan), np.zeros(s.NOISES)
     heading = _heading(bins)
     course = _track(bins, said, noise)
-    yaw = np.array([rep103_yaw(each, parameters.heading_convention) for each in heading])
     with np.errstate(invalid='ignore'):
-        opposed = (np.cos(course - yaw) < _OPPOSED) & (step_s > 1.5 * min(apart))
+        opposed = (np.cos(course - heading) < _OPPOSED) & (step_s > 1.5 * min(apart))
         sign = np.where(opposed, -1.0, 1.0)
     said[:, s.LOG] = bins.speeds('speed_through_water')
     said[:, s.GROUND] = sign * bins.speeds('speed_over_ground')
@@ -180,7 +179,8 @@ def bin_window(window: Window, parameters: Parameters, longest_s: float) -> Binn
     apart_s = step_s * np.diff(bins.means(at, at)) if by_compass else step_s
     said[1:, s.RATE] = _turned(heading if by_compass else course) / apart_s
     said[:, s.RUDDER] = bins.means(*bins.of('rudder'))
-    _shafts(bins, said)
+    for k in range(len(window.shafts)):
+        said[:, s.SHAFTS + k] = bins.means(*bins.of('shafts', k))
     speed = said[:, s.LOG]
     for other in (said[:, s.GROUND], said[:, s.ADVANCE] / step_s):
         speed = np.where(np.isnan(speed), other, speed)
@@ -237,12 +237,6 @@ def _track(bins: _Bins, said: Float64, noise: Float64) -> Float64:
     way[1:] = np.diff(east) * np.cos(course[1:]) + np.diff(north) * np.sin(course[1:])
     said[:, s.ADVANCE] = way
     return course
-
-
-def _shafts(bins: _Bins, said: Float64) -> None:
-    """Put revs times pitch of each shaft into `said`."""
-    for k in range(len(bins.parts[0].shafts)):
-        said[:, s.SHAFTS + k] = bins.means(*bins.of('shafts', k))
 
 
 def shaft_revs(parts: tuple[Window, ...], number: int) -> tuple[Int64, Float64]:
