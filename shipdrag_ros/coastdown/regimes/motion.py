@@ -626,7 +626,7 @@ def weigh(
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.row[i]
     regime, liar = bank.row[i].regime, bank.row[i].liar
-    h, half_s = work[1], 0.5 * setting.step_s
+    h = work[1]
     gained = f.excess = 0.0
     bad, claimed = float(n.BAD_DENSITY), setting.engine > 0.0
     for which in (s.LOG, s.GROUND):
@@ -641,8 +641,7 @@ def weigh(
         u = math.exp(x[s.LN_U])
         for j in range(s.STATES):
             h[j] = 0.0
-        law, slope = hull_law(setting.hull, x[s.LN_U])
-        net, by_u, by_a, by_open, _ = _force(x, f, bank.clock[0] * setting.step_s, law, slope)
+        h[s.LN_U] = u
         expected = u + f.mean_u
         # learnt at less speed, it may be less than that of now
         sd, value = max(noise[s.N_LOG], n.WHITE_FLOOR * u), said[which]
@@ -654,16 +653,16 @@ def weigh(
             h[s.WANDER], h[s.LAG] = 1.0, longer
             h[s.LONGER] = longer * lags if x[s.LONGER] < _LONGEST else 0.0
             expected += x[s.WANDER] + longer * lags
-            since_s = half_s * (1.0 - longer)  # what the log lags behind is as new
-        else:
-            h[s.CURRENT] = h[s.EDDY] = 1.0
+        else:  # of half a bin before, and some more by its filter
             lag_s = setting.pace * _GROUND_LAG_S
+            law, slope = hull_law(setting.hull, x[s.LN_U])
+            net, by_u, by_a, by_open, _ = _force(x, f, bank.clock[0] * setting.step_s, law, slope)
+            since_s = 0.5 * setting.step_s + lag_s
+            h[s.LN_U], h[s.LN_A] = u - since_s * by_u, -since_s * by_a
+            h[s.OPEN], h[s.GUST] = -since_s * by_open, -since_s
+            h[s.CURRENT] = h[s.EDDY] = 1.0
             expected += x[s.CURRENT] + x[s.EDDY] - lag_s * net
             sd = math.hypot(noise[s.N_GROUND], n.LOG_LAG_SD * lag_s * net)
-            since_s = half_s + lag_s
-        # it is the speed of some seconds before
-        h[s.LN_U], h[s.LN_A] = u - since_s * by_u, -since_s * by_a
-        h[s.OPEN], h[s.GUST] = -since_s * by_open, -since_s
         if claimed:
             sd = math.hypot(sd, _at_rest(setting, u))
         shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)
