@@ -10,7 +10,7 @@ is made compact in the same way: its name holds a whole file at every moment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -108,7 +108,7 @@ def recover(
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
     attachments
-        Text by name, added behind those of the source; of two of a name the last counts.
+        Text by name, in place of those of the source.
     progress
         Called with bytes done, and in all, of each file.
 
@@ -123,7 +123,7 @@ def recover(
             f'{str(source)!r} holds {len(bags)} bags; recover each by itself: '
             f'{", ".join(bag.name for bag in bags)}'
         )
-    with _salvaged(bags[0], output, progress) as salvage:
+    with _salvaged(bags[0], output, progress, attachments) as salvage:
         sound, doubtful, damages = salvage.sound, salvage.doubtful, salvage.damages
         if not salvage.records:
             raise BagError(
@@ -181,11 +181,14 @@ def compact(path: Path, *, messages: int) -> None:
 
 @contextmanager
 def _salvaged(
-    bag: BagFiles, output: Path, progress: PartDone = lambda done, total: None
+    bag: BagFiles,
+    output: Path,
+    progress: PartDone = lambda done, total: None,
+    replaced: Collection[str] = (),
 ) -> Iterator[_Salvage]:
     """Save what can be saved of a bag, into files that vanish unless they are published."""
     with _Salvaged(output) as sound, _Salvaged(output.with_suffix('.quarantine.mcap')) as doubtful:
-        salvage = _Salvage(sound, doubtful, bag, progress)
+        salvage = _Salvage(sound, doubtful, bag, progress, replaced)
         for file in bag.files:
             salvage.take(file)
         yield salvage
@@ -302,7 +305,12 @@ class _Salvage:
     """One pass over the files of a bag."""
 
     def __init__(
-        self, sound: _Salvaged, doubtful: _Salvaged, bag: BagFiles, progress: PartDone
+        self,
+        sound: _Salvaged,
+        doubtful: _Salvaged,
+        bag: BagFiles,
+        progress: PartDone,
+        replaced: Collection[str],
     ) -> None:
         self.damages = DamageList()
         self.bytes_read = 0
@@ -312,6 +320,7 @@ class _Salvage:
         self.doubtful = doubtful
         self._bag = bag
         self._progress = progress
+        self._replaced = replaced  # names of attachments
         self._declared = FileSummary()
         for warning in bag.warnings:
             self.damages.add(0, 'file', DamageKind.MISSING, warning)
@@ -401,6 +410,8 @@ class _Salvage:
                 self._forget()
             case Header():
                 self.sound.profile = self.doubtful.profile = record.profile
+            case Attachment() if record.name in self._replaced:
+                pass
             case Attachment() | Metadata():
                 bag.once(record)
 

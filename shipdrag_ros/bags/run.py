@@ -103,6 +103,8 @@ BATCH = 1 << 14
 # of one message that rosbag2 has packed for itself; inputs have some hundred bytes
 _MESSAGE_LIMIT_BYTES = 1 << 20
 _ALL_NS = (0, sys.maxsize)
+RECORDED = 'recorded_'
+"""Before the name of what was attached when it was recorded, where another is given since."""
 
 
 @dataclass(frozen=True)
@@ -260,15 +262,16 @@ class Run:
         out
             File to make.
         attachments
-            Text by name, which counts for what is attached.
+            Text by name, in place of what is attached, which is kept as `recorded_NAME`.
 
         Raises
         ------
         BagError
             If the disk does not take it.
         """
-        new = {k: text for k, text in attachments.items() if self.attachments.get(k) != text}
-        path = self.parts[0].path
+        path, known = self.parts[0].path, self.attachments
+        new = {k: text for k, text in attachments.items() if known.get(k) != text}
+        new |= {RECORDED + k: known.get(RECORDED + k, known[k]) for k in new if k in known}
         if new or self._message_compression or path.suffix == '.zstd':
             recover(Path(self.name) if self._message_compression else path, out, attachments=new)
             return

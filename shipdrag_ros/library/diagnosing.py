@@ -312,7 +312,7 @@ def _found(
             for name in clocks_apart(result)
         ]
         if stop is not None:
-            lines.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+            lines.append(told_beside(each, stop, result.coastdowns))
         warnings += [f'{each.name}: {line}' for line in lines]
         windows = coast_windows(result)
         warnings += _ends(each.name, windows)

@@ -198,7 +198,7 @@ def replay_run(
         )
     warnings = list(result.warnings)
     if stop is not None:
-        warnings.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+        warnings.append(told_beside(each, stop, result.coastdowns))
         listener.log(f'{each.name}: {warnings[-1]}')
     if not result.coastdowns:
         warnings.append(_astern(each, result.ship))

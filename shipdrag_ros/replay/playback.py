@@ -7,7 +7,7 @@ Also one window of it, given by hand, through the same estimator.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from numbers import Real
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, StopMark
+from shipdrag_ros.bags.run import RECORDED, Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -31,6 +31,7 @@ from shipdrag_ros.coastdown.memory import InputTally
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
+from shipdrag_ros.estimation.run_down import chance_told
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
@@ -406,7 +407,8 @@ def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
     """Say whether these are what the bag was recorded with, as far as it says so."""
     if run.node is None:
         return False
-    own_ship = SHIP_FILE not in run.attachments or ship_of(run, None).to_yaml() == ship.to_yaml()
+    text = run.attachments.get(RECORDED + SHIP_FILE, run.attachments.get(SHIP_FILE))
+    own_ship = text is None or Ship.from_yaml(text, subject=run.name).to_yaml() == ship.to_yaml()
     return own_ship and (
         PARAMETERS_FILE not in run.attachments or recorded_parameters(run) == parameters
     )
@@ -441,23 +443,32 @@ def told_ns(run: Run, stop: StopTime) -> int:
     return start_ns + round(at_s * SECOND_NS)
 
 
-def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
+def told_beside(run: Run, stop: StopTime, found: Sequence[EndedCoastdown]) -> str:
     """
-    Say where coastdowns begin, beside a stop that was told.
+    Say where coastdowns begin, beside a stop that was told, and what to do if it is of none.
 
     Parameters
     ----------
     run, stop
         As of `told_ns`.
-    starts_ns
-        Of the coastdowns that were found.
+    found
+        The coastdowns.
     """
     told = told_ns(run, stop)
-    begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
-    return (
+    # by the clock of the stamps, where a coastdown has been told of it
+    at_ns = next((each.told_ns for each in found if each.told_ns is not None), told)
+    starts_ns = [each.start_ns for each in found]
+    begins = ', '.join(f'{utc(each)} ({(each - at_ns) / SECOND_NS:+.0f} s)' for each in starts_ns)
+    off_s = [(at_ns - (each.stop_ns or each.start_ns)) / SECOND_NS for each in found]
+    said = (
         f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
-        f'at: {begins or "there is none"}; where none is the stop that is meant, check its '
-        'time and zone, or give the window in which she glided'
+        f'at: {begins or "there is none"}'
+    )
+    if any(chance_told(each) > 0.5 for each in off_s):
+        return said
+    return (
+        f'{said}; none of them is of that stop: check its time and zone, or give the window in '
+        'which she glided'
     )
 
 

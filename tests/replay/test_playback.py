@@ -38,6 +38,7 @@ from shipdrag_ros.messages import (
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
+from shipdrag_ros.replay.playback import told_beside
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship, StatedEffect
 from tests.runs import write_run
@@ -258,6 +259,15 @@ def test_what_a_bag_holds_is_not_denied_with_a_stop(tmp_path, recording, capsys)
     assert words in told.err
     assert words in told.out
     assert any(words in each['warning'] for each in json.loads(path.read_text())['warnings'])
+
+
+@pytest.mark.parametrize(('stop', 'denied'), [(405.0, False), (600.0, True), (800.0, False)])
+def test_a_stop_that_one_coastdown_has_is_not_denied(recording, stop, denied):
+    (run,), (_, events) = open_runs([recording[0]]), recording
+    (first,) = (each for each in events if isinstance(each, EndedCoastdown))
+    second = replace(first, start_ns=first.start_ns + 400_000_000_000, stop_ns=None)
+    said = told_beside(run, stop, [first, second])
+    assert ('; none of them is of that stop: check its time and zone' in said) == denied
 
 
 def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voyage, live):
