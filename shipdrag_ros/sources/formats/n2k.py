@@ -402,7 +402,7 @@ def _depth(fields: _Fields) -> N2kValue:
     if offset is None or offset <= 0.0:  # negative: to the keel, whose depth is not stated
         offset = fields.options.get('transducer')
         if offset is None:
-            raise NoValue('depth of the transducer not stated')
+            raise NoValue('depth below the transducer: give --transducer M')
     return Channel.DEPTH, 0, depth + offset, 0.0
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
 Deltas, one in a line: speedThroughWater, speedOverGround, position, heading, rudder, apparent
-wind, depth below the surface; of the own vessel, each input from one source. Revolutions are
-those of the engine and are taken with --gear.
+wind, depth below the surface, or below the transducer with --transducer; of the own vessel, each
+input from one source. Revolutions are those of the engine and are taken with --gear.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC
 from itertools import accumulate
 from math import pi
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Head, Job
+from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, TRANSDUCER, Head, Job
 from shipdrag_ros.sources.log import Tally, iso_ns
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
@@ -26,6 +26,7 @@ _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')
 _DEEPEST = 12  # brackets in a delta
 _POSITION = 'navigation.position'
+_BELOW = 'environment.depth.belowTransducer'
 _SPEED, _ANGLE = 'environment.wind.speedApparent', 'environment.wind.angleApparent'
 _NUMBERS: dict[str, tuple[Channel, int]] = {
     'navigation.speedThroughWater': (Channel.SPEED_THROUGH_WATER, 0),
@@ -40,6 +41,10 @@ _NUMBERS: dict[str, tuple[Channel, int]] = {
 }
 _MAGNETIC = 'MAGNETIC: good for finding turns, not for directions over ground.'
 _TOGETHER_NS = 2_000_000_000  # a wind's speed and angle that far apart are not one measurement
+_HINTS = {
+    'gear': ' (of the engine: --gear RATIO makes it the shaft)',
+    'transducer': ' (--transducer M makes it the depth)',
+}
 _ENGINE = re.compile(r'propulsion\.([^.]+)\.(?:.*\.)?revolutions')
 _SHAFTS = {'starboard': 1, '1': 1, '2': 2, '3': 3}
 
@@ -53,7 +58,7 @@ def _score(head: Head) -> float:
 
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
-    deltas = _Deltas(tally, job.options.get('gear'), _own_vessel(job))
+    deltas = _Deltas(tally, job.options, _own_vessel(job))
     lines = Lines(job.source, progress=job.progress)
     for line in counted(lines, tally):
         yield from deltas.of_line(line)
@@ -72,9 +77,9 @@ def _own_vessel(job: Job) -> str:
 class _Deltas:
     """Takes deltas apart, and puts the two halves of a wind together."""
 
-    def __init__(self, tally: Tally, gear: float | None, own: str) -> None:
+    def __init__(self, tally: Tally, options: Mapping[str, Any], own: str) -> None:
         self._tally = tally
-        self._gear = gear
+        self._options = options
         self._own = own
         self._winds: dict[tuple[str, str], tuple[int, float]] = {}
 
@@ -123,6 +128,8 @@ class _Deltas:
     def _value(self, path: str, value: Any, stamp_ns: int, source: str) -> Reading | None:
         origin = Origin(0, f'{path} {source}'.strip())
         engine = _ENGINE.fullmatch(path)
+        needed = 'transducer' if path == _BELOW else '' if engine is None else 'gear'
+        stated = self._options.get(needed)
         if path == _POSITION:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
@@ -134,20 +141,23 @@ class _Deltas:
             return None
         if path in _NUMBERS:
             channel, rank = _NUMBERS[path]
-        elif engine is not None and self._gear is not None:
-            channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
-        else:
-            hint = '' if engine is None else ' (of the engine: --gear RATIO makes it the shaft)'
-            self._tally.not_used[path + hint] += 1
+        elif stated is None:
+            self._tally.not_used[path + _HINTS.get(needed, '')] += 1
             return None
+        elif engine is None:
+            channel, rank = Channel.DEPTH, 1
+        else:
+            channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
         if not _is_number(value):
             self._tally.reject(channel.input, 'no number', f'{path} {value}')
             return None
         number = float(value)
         if channel is Channel.WIND_APPARENT:
             return self._wind(path, number, stamp_ns, source)
-        if engine is not None and self._gear is not None:
-            number = number * 2.0 * pi / self._gear
+        if engine is not None:
+            number = number * 2.0 * pi / stated
+        elif path == _BELOW:
+            number += stated
         elif channel is Channel.HEADING:
             number = yaw(number)
         if path == 'navigation.headingMagnetic':
@@ -175,5 +185,5 @@ FORMAT = stream_format(
     about=__doc__,
     score=_score,
     read=_read,
-    options=(GEAR,),
+    options=(GEAR, TRANSDUCER),
 )
