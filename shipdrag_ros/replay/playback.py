@@ -382,10 +382,17 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
 
 def attached_ship(run: Run) -> Ship | None:
     """
-    Return the ship whose file is attached to a bag, if one is.
+    Return the ship whose file is attached to a bag, or else lies beside it, which is noted.
     """
     text = run.attachments.get(SHIP_FILE)
-    return None if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
+    if text is not None:
+        return Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
+    first = run.paths[0]
+    path = (first.parent.parent if run.is_folder else first.parent) / SHIP_FILE
+    if not (first.is_file() and path.is_file()):  # a frame lies in no folder
+        return None
+    run.note([f'{path} holds for this run'])
+    return Ship.load(path)
 
 
 def recorded_parameters(run: Run) -> Parameters:

@@ -129,7 +129,7 @@ class _Deltas:
         origin = Origin(0, f'{path} {source}'.strip())
         engine = _ENGINE.fullmatch(path)
         needed = 'transducer' if path == _BELOW else '' if engine is None else 'gear'
-        stated = self._options.get(needed)
+        stated: Any = self._options.get(needed)
         if path == _POSITION:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
