@@ -30,8 +30,8 @@ from shipdrag_ros.replay import (
 )
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
-    SHIP_FILE,
     StopTime,
+    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -92,7 +92,7 @@ def diagnose_runs(
         not windowed
         and stop is None
         and given is None
-        and not any(SHIP_FILE in run.attachments for run, _ in runs)
+        and not any(attached_ship(run) for run, _ in runs)
     ):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
@@ -293,8 +293,8 @@ def _found(
     warnings: list[str] = []
     for run, _ in runs:
         refuse_without_input(run)
-    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0][0])
-    ship, parameters = ship_of(owner, given), None
+    known = filter(None, (attached_ship(run) for run, _ in runs))
+    ship, parameters = given or next(known, None) or ship_of(runs[0][0], None), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)

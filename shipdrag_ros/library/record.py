@@ -374,7 +374,8 @@ def read(
         `shipdrag import` knows, or of a table (CSV); a frame of pandas or polars; or a
         list of these, all of one ship.
     ship
-        The ship, or the path of her file; None: the one attached to the bag.
+        The ship, or the path of her file; None: the one attached to the bag, else `ship.yaml`
+        beside it.
     columns
         Which column of a table or frame is which input, with its unit behind a colon:
         `{'speed_through_water': 'log:kn', 'position': ('lat:deg', 'lon:deg')}`. Without

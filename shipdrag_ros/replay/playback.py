@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.bags.mcap_file import METADATA
 from shipdrag_ros.bags.run import RECORDED, Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
@@ -376,7 +377,9 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     """
     ship = given or attached_ship(run)
     if ship is None:
-        raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
+        raise BagError(
+            f'{run.name!r} has no {SHIP_FILE} attached or beside it; give one with --ship FILE'
+        )
     return ship
 
 
@@ -387,9 +390,10 @@ def attached_ship(run: Run) -> Ship | None:
     text = run.attachments.get(SHIP_FILE)
     if text is not None:
         return Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
-    first = run.paths[0]
-    path = (first.parent.parent if run.is_folder else first.parent) / SHIP_FILE
-    if not (first.is_file() and path.is_file()):  # a frame lies in no folder
+    first = run.paths[0]  # a frame lies in no folder, the files of rosbag2 in one of their own
+    near = first.parents[: first.is_file() + (first.parent / METADATA).is_file()]
+    path = next((each / SHIP_FILE for each in near if (each / SHIP_FILE).is_file()), None)
+    if path is None:
         return None
     run.note([f'{path} holds for this run'])
     return Ship.load(path)
