@@ -188,7 +188,7 @@ def _salvaged(
 ) -> Iterator[_Salvage]:
     """Save what can be saved of a bag, into files that vanish unless they are published."""
     with _Salvaged(output) as sound, _Salvaged(output.with_suffix('.quarantine.mcap')) as doubtful:
-        salvage = _Salvage(sound, doubtful, bag, progress, replaced)
+        sound.replaced, salvage = replaced, _Salvage(sound, doubtful, bag, progress)
         for file in bag.files:
             salvage.take(file)
         yield salvage
@@ -243,6 +243,7 @@ class _Salvaged:
         self._writer: RecordWriter | None = None
         self.numbers: dict[int, int] = {}
         self._written: set[bytes] = set()
+        self.replaced: Collection[str] = ()  # names of attachments
         self.part = path.with_name(f'.{path.name}{_PART}')
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
@@ -274,10 +275,9 @@ class _Salvaged:
     def once(self, record: Attachment | Metadata) -> None:
         """Write an attachment or metadata; those of several parts are often the same."""
         key = as_bytes(record)
-        if key in self._written:
-            return
-        self._written.add(key)
-        self.writer.add(record)
+        if key not in self._written and record.name not in self.replaced:
+            self._written.add(key)
+            self.writer.add(record)
 
     def publish(self) -> None:
         """Give the file its name."""
@@ -305,12 +305,7 @@ class _Salvage:
     """One pass over the files of a bag."""
 
     def __init__(
-        self,
-        sound: _Salvaged,
-        doubtful: _Salvaged,
-        bag: BagFiles,
-        progress: PartDone,
-        replaced: Collection[str],
+        self, sound: _Salvaged, doubtful: _Salvaged, bag: BagFiles, progress: PartDone
     ) -> None:
         self.damages = DamageList()
         self.bytes_read = 0
@@ -320,7 +315,6 @@ class _Salvage:
         self.doubtful = doubtful
         self._bag = bag
         self._progress = progress
-        self._replaced = replaced  # names of attachments
         self._declared = FileSummary()
         for warning in bag.warnings:
             self.damages.add(0, 'file', DamageKind.MISSING, warning)
@@ -410,8 +404,6 @@ class _Salvage:
                 self._forget()
             case Header():
                 self.sound.profile = self.doubtful.profile = record.profile
-            case Attachment() if record.name in self._replaced:
-                pass
             case Attachment() | Metadata():
                 bag.once(record)
 

@@ -86,14 +86,9 @@ def diagnose_runs(
         diagnosis is of another ship, of later runs or of one of these.
     """
     refuse_mixed(runs, given)
-    windowed = any(window is not None for _, window in runs)
+    alone = stop is None and given is None and all(window is None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
-    if (
-        not windowed
-        and stop is None
-        and given is None
-        and not any(attached_ship(run) for run, _ in runs)
-    ):
+    if alone and not any(attached_ship(run) for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
         return asked.unused(sailing, facts), None

@@ -438,8 +438,7 @@ def told_ns(run: Run, stop: StopTime) -> int:
         raise BagError(f'stop is {stop!r}: expected seconds as a number, or a datetime')
     if isinstance(stop, datetime) and stop.tzinfo is None:  # would be of this computer
         raise BagError(f'stop at {stop.isoformat()}: expected a date with its zone')
-    span = run.span_ns
-    start_ns, end_ns = (0, -1) if span is None else span
+    start_ns, end_ns = run.span_ns or (0, -1)
     said, at_s = (
         (f'{stop} s', stop)
         if not isinstance(stop, datetime)
@@ -468,8 +467,8 @@ def told_beside(run: Run, stop: StopTime, found: Sequence[EndedCoastdown]) -> st
     told = told_ns(run, stop)
     # by the clock of the stamps, where a coastdown has been told of it
     at_ns = next((each.told_ns for each in found if each.told_ns is not None), told)
-    starts_ns = [each.start_ns for each in found]
-    begins = ', '.join(f'{utc(each)} ({(each - at_ns) / SECOND_NS:+.0f} s)' for each in starts_ns)
+    starts = [(each.start_ns - at_ns, utc(each.start_ns)) for each in found]
+    begins = ', '.join(f'{said} ({off_ns / SECOND_NS:+.0f} s)' for off_ns, said in starts)
     off_s = [(at_ns - (each.stop_ns or each.start_ns)) / SECOND_NS for each in found]
     said = (
         f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '

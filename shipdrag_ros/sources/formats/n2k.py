@@ -433,15 +433,11 @@ _READERS: Mapping[int, Callable[[_Fields], N2kValue]] = {
 }
 
 
-def _score(head: format.Head) -> float:
-    return format.CERTAIN if head.share(parse) > 0.5 else format.NO
-
-
 FORMAT = stream_format(
     name='n2k',
     kind='a log of NMEA 2000',
     about=__doc__,
-    score=_score,
+    score=lambda head: format.CERTAIN if head.share(parse) > 0.5 else format.NO,
     read=_read,
     options=(format.DATE, format.GEAR, format.RATE, format.TRANSDUCER),
 )

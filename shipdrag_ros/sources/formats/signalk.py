@@ -41,10 +41,6 @@ _NUMBERS: dict[str, tuple[Channel, int]] = {
 }
 _MAGNETIC = 'MAGNETIC: good for finding turns, not for directions over ground.'
 _TOGETHER_NS = 2_000_000_000  # a wind's speed and angle that far apart are not one measurement
-_HINTS = {
-    'gear': ' (of the engine: --gear RATIO makes it the shaft)',
-    'transducer': ' (--transducer M makes it the depth)',
-}
 _ENGINE = re.compile(r'propulsion\.([^.]+)\.(?:.*\.)?revolutions')
 _SHAFTS = {'starboard': 1, '1': 1, '2': 2, '3': 3}
 
@@ -128,8 +124,7 @@ class _Deltas:
     def _value(self, path: str, value: Any, stamp_ns: int, source: str) -> Reading | None:
         origin = Origin(0, f'{path} {source}'.strip())
         engine = _ENGINE.fullmatch(path)
-        needed = 'transducer' if path == _BELOW else '' if engine is None else 'gear'
-        stated: Any = self._options.get(needed)
+        stated: Any = self._options.get('transducer' if path == _BELOW else 'gear')
         if path == _POSITION:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
@@ -141,13 +136,15 @@ class _Deltas:
             return None
         if path in _NUMBERS:
             channel, rank = _NUMBERS[path]
-        elif stated is None:
-            self._tally.not_used[path + _HINTS.get(needed, '')] += 1
-            return None
-        elif engine is None:
+        elif stated is not None and path == _BELOW:
             channel, rank = Channel.DEPTH, 1
-        else:
+        elif stated is not None and engine is not None:
             channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
+        else:
+            hint = '' if engine is None else ' (of the engine: --gear RATIO makes it the shaft)'
+            hint = ' (--transducer M makes it the depth)' if path == _BELOW else hint
+            self._tally.not_used[path + hint] += 1
+            return None
         if not _is_number(value):
             self._tally.reject(channel.input, 'no number', f'{path} {value}')
             return None
