@@ -471,12 +471,7 @@ class RunSamples:
     ) -> tuple[Block, NDArray[np.intp]]:
         """Return the samples and which message each came from."""
         block, kept, unreadable = decode_batch(
-            sources,
-            messages.channel,
-            messages.data,
-            messages.start,
-            messages.end,
-            messages.log_ns,
+            sources, messages.channel, messages.data, messages.start, messages.end, messages.log_ns
         )
         counts = np.bincount(messages.channel, minlength=len(sources)).tolist()
         for source, count, reasons in zip(sources, counts, unreadable, strict=False):

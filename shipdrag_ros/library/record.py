@@ -206,11 +206,7 @@ class Record(Shown):
     """
 
     def __init__(
-        self,
-        runs: Sequence[Run],
-        *,
-        given: Ship | None = None,
-        notes: Sequence[str] = (),
+        self, runs: Sequence[Run], *, given: Ship | None = None, notes: Sequence[str] = ()
     ) -> None:
         if not runs:
             raise BagError('no run was read; give a bag, a log or a table of measurements')

@@ -126,10 +126,4 @@ def _is_coordinate(text: str, largest: float) -> bool:
     return _NUMBER.fullmatch(text) is not None and abs(float(text)) <= largest
 
 
-FORMAT = stream_format(
-    name='gpx',
-    kind='a GPX track',
-    about=__doc__,
-    score=_score,
-    read=_read,
-)
+FORMAT = stream_format(name='gpx', kind='a GPX track', about=__doc__, score=_score, read=_read)
