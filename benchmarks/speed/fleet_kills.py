@@ -17,8 +17,6 @@ import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from distributed import Client
-
 from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
 from shipdrag_ros.fleet.engine import Engine
@@ -52,18 +50,14 @@ def main() -> None:
     options = asked(__doc__, kills=20, bags=24)
     random.seed(0)
     killed: list[int] = []
-    with (
-        TemporaryDirectory() as made,
-        Engine(workers=2) as engine,
-        Client(engine.address, set_as_default=False) as client,
-    ):
+    with TemporaryDirectory() as made, Engine(workers=2) as engine:
         folder = Path(made) / 'fleet'
         simulated(folder, options.bags)
 
         def kill(text: str, done: int, total: int) -> None:
             if text.startswith('replaying') and len(killed) < options.kills:
                 with contextlib.suppress(ProcessLookupError):  # dead already
-                    pids = sorted(client.run(os.getpid, on_error='ignore').values())
+                    pids = sorted(engine.on_each(os.getpid).values())
                     if pids:
                         os.kill(random.choice(pids), signal.SIGKILL)
                         killed.append(done)

@@ -26,8 +26,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from distributed import Client
-
 from benchmarks import ROOT
 from benchmarks._asked import asked
 from shipdrag_ros.cli import main as shipdrag
@@ -85,17 +83,14 @@ class Measured:
 
     def run(self, folder: Path, store: Path, workers: int, minutes: float) -> None:
         """Bring the store up to date, or as far as the time goes."""
-        with (
-            Engine(workers=workers) as engine,
-            Client(engine.address, set_as_default=False) as client,
-        ):
+        with Engine(workers=workers) as engine:
             warm = [str(path) for path in sorted(folder.glob('*.mcap'))[: 2 * workers]]
             trial = store.with_name('trial')
             shutil.rmtree(trial, ignore_errors=True)
             update(find(warm), Store(trial), engine, lambda text, done, total: None)
             before = dict(self.found)
             begun, alone = time.monotonic(), time.process_time()
-            busy = sum(client.run(time.process_time, on_error='ignore').values())
+            busy = sum(engine.on_each(time.process_time).values())
 
             def note(text: str, done: int, total: int) -> None:
                 now = time.monotonic() - begun
@@ -103,13 +98,13 @@ class Measured:
                 over = now > 60.0 * minutes
                 if not (over or done == total or done % EVERY == 0):
                     return
-                spent = sum(client.run(time.process_time, on_error='ignore').values()) - busy
+                spent = sum(engine.on_each(time.process_time).values()) - busy
                 self.found['bags'] = bags
                 self.found['clock_s'] = before['clock_s'] + now
                 self.found['workers_s'] = before['workers_s'] + spent
                 self.found['alone_s'] = before['alone_s'] + time.process_time() - alone
                 if text.startswith('replaying'):
-                    largest = max(client.run(memory_mb, on_error='ignore').values())
+                    largest = max(engine.on_each(memory_mb).values())
                     self.found['memory'].append([bags, largest, memory_mb()])
                 self._path.write_text(json.dumps(self.found))
                 if over:

@@ -107,6 +107,15 @@ class Engine:
         """Of the scheduler, for other programs."""
         return str(self._client.scheduler_info()['address'])
 
+    def on_each(self, function: Callable[[], Result]) -> dict[str, Result]:
+        """
+        Call a function on each worker; return what it gives, by the worker's address.
+
+        A worker that dies meanwhile is left out.
+        """
+        found: dict[str, Result] = self._client.run(function, on_error='ignore')
+        return found
+
     def map(
         self, function: Callable[[Item], Result], items: Mapping[str, Item]
     ) -> Iterator[tuple[str, Result | Lost]]:

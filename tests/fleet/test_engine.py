@@ -105,12 +105,11 @@ def test_the_verb_from_bags_to_rows_and_again(fleet_folder, tmp_path, engine, ca
 
     def kill(text: str, done: int, total: int) -> None:
         if text.startswith('replaying') and done < total and len(killed) < 2:
-            killed.extend(list(client.run(os.getpid, on_error='ignore').values())[:1])
+            killed.extend(list(engine.on_each(os.getpid).values())[:1])
             os.kill(killed[-1], signal.SIGKILL)
 
     again = Store(tmp_path / 'again')
-    with Client(engine.address, set_as_default=False) as client:
-        update(find([str(fleet_folder)]), again, engine, kill)
+    update(find([str(fleet_folder)]), again, engine, kill)
     assert killed
     assert contents(again.path) == bytes_before
 
