@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks._asked import asked
 from benchmarks._tables import along
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.inference.learning import Seen, _prior, _settings
+from shipdrag_ros.inference.learning import Seen, settings_at
 from shipdrag_ros.inference.rows import LOG, POSITION, SIZE, Noise, Rows, noise_of, whiten
 from shipdrag_ros.posterior.laplace import infer
 from shipdrag_ros.posterior.law import DEPTH, HELD, WIND
@@ -87,7 +87,7 @@ def drawn(rng: np.random.Generator) -> tuple[RunModel, str, Float64]:
     white: Noise = model.white._replace(damping_1_s=damping, inertia=inertia)
     none = np.zeros((1, 1))
     seen = Seen(model.rows, table[:1], none, none, white, model.steady)
-    settings = _settings(rng.standard_normal((1, SIZE)), np.ones(1), _prior(seen, SPEED_M_S))
+    settings = settings_at(seen, SPEED_M_S, rng.standard_normal((1, SIZE)))
     noise = noise_of(settings, 0, model.rows, white, model.steady)
     whitener = np.eye(len(speed))
     whiten(model.rows, whitener, noise)

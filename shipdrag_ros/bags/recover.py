@@ -187,8 +187,9 @@ def _salvaged(
     replaced: Collection[str] = (),
 ) -> Iterator[_Salvage]:
     """Save what can be saved of a bag, into files that vanish unless they are published."""
-    with _Salvaged(output) as sound, _Salvaged(output.with_suffix('.quarantine.mcap')) as doubtful:
-        sound.replaced, salvage = replaced, _Salvage(sound, doubtful, bag, progress)
+    quarantine = output.with_suffix('.quarantine.mcap')
+    with _Salvaged(output, replaced) as sound, _Salvaged(quarantine) as doubtful:
+        salvage = _Salvage(sound, doubtful, bag, progress)
         for file in bag.files:
             salvage.take(file)
         yield salvage
@@ -236,14 +237,14 @@ def _declared(data: Buffer) -> FileSummary:
 class _Salvaged:
     """A bag that is there as a whole, or not at all; nothing is overwritten."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, replaced: Collection[str] = ()) -> None:
         self.path = path
+        self._replaced = replaced  # names of attachments that are not taken
         self.profile = 'ros2'
         self.messages = 0
         self._writer: RecordWriter | None = None
         self.numbers: dict[int, int] = {}
         self._written: set[bytes] = set()
-        self.replaced: Collection[str] = ()  # names of attachments
         self.part = path.with_name(f'.{path.name}{_PART}')
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
@@ -275,7 +276,7 @@ class _Salvaged:
     def once(self, record: Attachment | Metadata) -> None:
         """Write an attachment or metadata; those of several parts are often the same."""
         key = as_bytes(record)
-        if key not in self._written and record.name not in self.replaced:
+        if key not in self._written and record.name not in self._replaced:
             self._written.add(key)
             self.writer.add(record)
 

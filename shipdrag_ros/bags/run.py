@@ -16,7 +16,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate, names_in
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.recover import recover
@@ -208,6 +208,17 @@ class Run:
     def paths(self) -> tuple[Path, ...]:
         """The files of the run."""
         return tuple(part.path for part in self.parts)
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """That of its files, and that of a bag which is a folder itself; a frame lies in none."""
+        first = self.paths[0]
+        if not first.is_file():
+            return ()
+        if not is_bag_folder(names_in(first.parent)):
+            return (first.parent,)
+        bag = first.parent if first.parent.name.strip('.') else first.parent.resolve()
+        return bag, bag.parent
 
     @property
     def span_ns(self) -> tuple[int, int] | None:

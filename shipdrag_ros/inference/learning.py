@@ -371,6 +371,20 @@ def prior(seen: Seen, speed_m_s: float) -> NoisePosterior:
     return _of_prior(_prior(seen, speed_m_s))
 
 
+def settings_at(seen: Seen, speed_m_s: float, points: Float64) -> Settings:
+    """
+    Return the settings at points of the prior, all alike in weight.
+
+    Parameters
+    ----------
+    seen, speed_m_s
+        As `learn`.
+    points : (s, SIZE)
+        Standard normal where drawn from the prior.
+    """
+    return _settings(points, np.full(len(points), 1.0 / len(points)), _prior(seen, speed_m_s))
+
+
 def _of_prior(prior: SizePrior) -> NoisePosterior:
     points = spread_points(len(prior.which))[: 1 + KEPT]
     z = np.zeros((len(points), SIZE))

@@ -249,9 +249,9 @@ class Bridge:
 
     def _take_health(self, health: topics.Health) -> None:
         self._health = health
-        about = health.of('state')
-        since, lead_s = about.number('coastdown since'), about.number('steady lead')
-        coasting = about.values.get('monitor') == 'coastdown'
+        state = health.of('state')
+        since, lead_s = state.number('coastdown since'), state.number('steady lead')
+        coasting = state.values.get('monitor') == 'coastdown'
         if lead_s and not coasting:
             self._lead_at_stop = lead_s
         if coasting and self._coast_ns is None and since:
@@ -260,8 +260,9 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found.values:
-            state, ahead = (found.values.get(each, '') for each in ('state', topics.AHEAD))
-            self.show_verdict(state, found.message.removeprefix(f'{state}: '), ahead)
+            word = found.values.get('state', '')
+            ahead = found.values.get(topics.AHEAD, '')
+            self.show_verdict(word, found.message.removeprefix(f'{word}: '), ahead)
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':

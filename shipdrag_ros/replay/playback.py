@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.bags.mcap_file import METADATA
 from shipdrag_ros.bags.run import RECORDED, Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
@@ -390,9 +389,8 @@ def attached_ship(run: Run) -> Ship | None:
     text = run.attachments.get(SHIP_FILE)
     if text is not None:
         return Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
-    first = run.paths[0]  # a frame lies in no folder, the files of rosbag2 in one of their own
-    near = first.parents[: first.is_file() + (first.parent / METADATA).is_file()]
-    path = next((each / SHIP_FILE for each in near if (each / SHIP_FILE).is_file()), None)
+    near = (each / SHIP_FILE for each in run.folders)
+    path = next((each for each in near if each.is_file()), None)
     if path is None:
         return None
     run.note([f'{path} holds for this run'])

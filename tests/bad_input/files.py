@@ -139,8 +139,8 @@ TABLES = (
     _csv(
         'times that go back',
         _TABLE.replace('\n50,', '\n20,'),
-        '1 rows are stamped before an earlier one; a replay rejects those up to 10 s before it, '
-        'and begins again where the clock was set back further.',
+        '1 rows are stamped before an earlier one; a replay rejects those, or begins '
+        'again where 3 in a row are more than 10 s back.',
         status=0,
     ),
     _csv(

@@ -75,7 +75,8 @@ class _Deltas:
 
     def __init__(self, tally: Tally, options: Mapping[str, Any], own: str) -> None:
         self._tally = tally
-        self._options = options
+        self._gear: Any = options.get('gear')
+        self._transducer: Any = options.get('transducer')
         self._own = own
         self._winds: dict[tuple[str, str], tuple[int, float]] = {}
 
@@ -124,7 +125,6 @@ class _Deltas:
     def _value(self, path: str, value: Any, stamp_ns: int, source: str) -> Reading | None:
         origin = Origin(0, f'{path} {source}'.strip())
         engine = _ENGINE.fullmatch(path)
-        stated: Any = self._options.get('transducer' if path == _BELOW else 'gear')
         if path == _POSITION:
             where = value if isinstance(value, dict) else {}
             latitude, longitude = where.get('latitude'), where.get('longitude')
@@ -136,13 +136,14 @@ class _Deltas:
             return None
         if path in _NUMBERS:
             channel, rank = _NUMBERS[path]
-        elif stated is not None and path == _BELOW:
+        elif path == _BELOW and self._transducer is not None:
             channel, rank = Channel.DEPTH, 1
-        elif stated is not None and engine is not None:
+        elif engine is not None and self._gear is not None:
             channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
         else:
             hint = '' if engine is None else ' (of the engine: --gear RATIO makes it the shaft)'
-            hint = ' (--transducer M makes it the depth)' if path == _BELOW else hint
+            if path == _BELOW:
+                hint = ' (--transducer M makes it the depth)'
             self._tally.not_used[path + hint] += 1
             return None
         if not _is_number(value):
@@ -152,9 +153,9 @@ class _Deltas:
         if channel is Channel.WIND_APPARENT:
             return self._wind(path, number, stamp_ns, source)
         if engine is not None:
-            number = number * 2.0 * pi / stated
+            number = number * 2.0 * pi / self._gear
         elif path == _BELOW:
-            number += stated
+            number += self._transducer
         elif channel is Channel.HEADING:
             number = yaw(number)
         if path == 'navigation.headingMagnetic':
