@@ -246,7 +246,7 @@ class Record(Shown):
         """
         Write a record of one run as a bag, which `read` and the command line take.
 
-        A ship that was given for it is attached.
+        A ship that was given for it is attached, or else the one whose file lies beside it.
 
         Raises
         ------
@@ -259,7 +259,8 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        self.runs[0].save(out, {} if self.given is None else {SHIP_FILE: self.given.to_yaml()})
+        ship = self.given if SHIP_FILE in self.runs[0].attachments else self.ship
+        self.runs[0].save(out, {} if ship is None else {SHIP_FILE: ship.to_yaml()})
         return out
 
     def _lines(self) -> Sequence[str]:

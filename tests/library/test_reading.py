@@ -137,6 +137,10 @@ def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:
     assert speeds(saved).tolist() == speeds(record).tolist()
     with pytest.raises(sd.ShipdragError, match='exists; choose another name'):
         record.save(tmp_path / 'saved.mcap')
+    (tmp_path / 'log').mkdir()
+    bare = sd.read(pd.DataFrame(table()), columns=LOG, time='t').save(tmp_path / 'log/bare.mcap')
+    (tmp_path / 'log/ship.yaml').write_text(SHIP.to_yaml())
+    assert sd.read(sd.read(bare).save(tmp_path / 'away.mcap')).ship == SHIP
 
 
 @pytest.mark.parametrize('packed', ['file', 'message'])
