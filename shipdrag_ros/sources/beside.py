@@ -129,12 +129,13 @@ def sheet_of(run: Run, say: Callable[[str], None]) -> tuple[RunSheet, str]:
     ShipFileError
         If it cannot be used, or there are two.
     """
-    if not run.folders:
+    folders = run.folders
+    if not folders:
         return RunSheet(), ''
-    first, folder = run.folders[0], run.folders[-1]
-    inside = first != folder
+    folder, inside = folders[-1], len(folders) > 1
+    alike = [path.name for path in run.paths if path.parent == folder]
     found = run_file(
-        [first.name] if inside else [path.name for path in run.paths if path.parent == folder],
+        [folders[0].name] if inside else alike,
         lambda name: (folder / name).is_file(),
         partial(_sources_in, folder),
         lambda text: say(f'{folder / RUN_FILE} {text}'),
