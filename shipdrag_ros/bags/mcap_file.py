@@ -263,6 +263,21 @@ def unpacked_file(path: Path, damages: DamageList) -> IO[bytes] | None:
 METADATA = 'metadata.yaml'
 """Of rosbag2, beside the files that make up a bag."""
 
+
+def is_bag_folder(names: Collection[str]) -> bool:
+    """
+    Say whether the files of a folder are those of a bag of rosbag2, by their names.
+    """
+    return any(name == METADATA or name.endswith(('.db3', '.db3.zstd')) for name in names)
+
+
+def names_in(folder: Path) -> list[str]:
+    """
+    Return the names of what is in a folder.
+    """
+    return [each.name for each in folder.iterdir()]
+
+
 PART = re.compile(r'_\d{3,}(_\d+)?(?=\.mcap)')
 """In the name of a file of a recording of the node."""
 

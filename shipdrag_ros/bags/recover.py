@@ -10,7 +10,7 @@ is made compact in the same way: its name holds a whole file at every moment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -108,7 +108,7 @@ def recover(
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
     attachments
-        Text by name, added behind those of the source; of two of a name the last counts.
+        Text by name, in place of those of the source.
     progress
         Called with bytes done, and in all, of each file.
 
@@ -123,7 +123,7 @@ def recover(
             f'{str(source)!r} holds {len(bags)} bags; recover each by itself: '
             f'{", ".join(bag.name for bag in bags)}'
         )
-    with _salvaged(bags[0], output, progress) as salvage:
+    with _salvaged(bags[0], output, progress, attachments) as salvage:
         sound, doubtful, damages = salvage.sound, salvage.doubtful, salvage.damages
         if not salvage.records:
             raise BagError(
@@ -181,10 +181,14 @@ def compact(path: Path, *, messages: int) -> None:
 
 @contextmanager
 def _salvaged(
-    bag: BagFiles, output: Path, progress: PartDone = lambda done, total: None
+    bag: BagFiles,
+    output: Path,
+    progress: PartDone = lambda done, total: None,
+    replaced: Collection[str] = (),
 ) -> Iterator[_Salvage]:
     """Save what can be saved of a bag, into files that vanish unless they are published."""
-    with _Salvaged(output) as sound, _Salvaged(output.with_suffix('.quarantine.mcap')) as doubtful:
+    quarantine = output.with_suffix('.quarantine.mcap')
+    with _Salvaged(output, replaced) as sound, _Salvaged(quarantine) as doubtful:
         salvage = _Salvage(sound, doubtful, bag, progress)
         for file in bag.files:
             salvage.take(file)
@@ -233,8 +237,9 @@ def _declared(data: Buffer) -> FileSummary:
 class _Salvaged:
     """A bag that is there as a whole, or not at all; nothing is overwritten."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, replaced: Collection[str] = ()) -> None:
         self.path = path
+        self._replaced = replaced  # names of attachments that are not taken
         self.profile = 'ros2'
         self.messages = 0
         self._writer: RecordWriter | None = None
@@ -271,10 +276,9 @@ class _Salvaged:
     def once(self, record: Attachment | Metadata) -> None:
         """Write an attachment or metadata; those of several parts are often the same."""
         key = as_bytes(record)
-        if key in self._written:
-            return
-        self._written.add(key)
-        self.writer.add(record)
+        if key not in self._written and record.name not in self._replaced:
+            self._written.add(key)
+            self.writer.add(record)
 
     def publish(self) -> None:
         """Give the file its name."""

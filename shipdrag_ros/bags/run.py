@@ -16,7 +16,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, locate
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate, names_in
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.recover import recover
@@ -103,6 +103,8 @@ BATCH = 1 << 14
 # of one message that rosbag2 has packed for itself; inputs have some hundred bytes
 _MESSAGE_LIMIT_BYTES = 1 << 20
 _ALL_NS = (0, sys.maxsize)
+RECORDED = 'recorded_'
+"""Before the name of what was attached when it was recorded, where another is given since."""
 
 
 @dataclass(frozen=True)
@@ -208,6 +210,17 @@ class Run:
         return tuple(part.path for part in self.parts)
 
     @property
+    def folders(self) -> tuple[Path, ...]:
+        """That of its files, and that of a bag which is a folder itself; a frame lies in none."""
+        first = self.paths[0]
+        if not first.is_file():
+            return ()
+        if not is_bag_folder(names_in(first.parent)):
+            return (first.parent,)
+        bag = first.parent if first.parent.name.strip('.') else first.parent.resolve()
+        return bag, bag.parent
+
+    @property
     def span_ns(self) -> tuple[int, int] | None:
         """First and last time of arrival [ns]; None without messages."""
         spans = [part.span_ns for part in self.parts if part.span_ns is not None]
@@ -260,15 +273,16 @@ class Run:
         out
             File to make.
         attachments
-            Text by name, which counts for what is attached.
+            Text by name, in place of what is attached, which is kept as `recorded_NAME`.
 
         Raises
         ------
         BagError
             If the disk does not take it.
         """
-        new = {k: text for k, text in attachments.items() if self.attachments.get(k) != text}
-        path = self.parts[0].path
+        path, known = self.parts[0].path, self.attachments
+        new = {k: text for k, text in attachments.items() if known.get(k) != text}
+        new |= {RECORDED + k: known.get(RECORDED + k, known[k]) for k in new if k in known}
         if new or self._message_compression or path.suffix == '.zstd':
             recover(Path(self.name) if self._message_compression else path, out, attachments=new)
             return
@@ -468,12 +482,7 @@ class RunSamples:
     ) -> tuple[Block, NDArray[np.intp]]:
         """Return the samples and which message each came from."""
         block, kept, unreadable = decode_batch(
-            sources,
-            messages.channel,
-            messages.data,
-            messages.start,
-            messages.end,
-            messages.log_ns,
+            sources, messages.channel, messages.data, messages.start, messages.end, messages.log_ns
         )
         counts = np.bincount(messages.channel, minlength=len(sources)).tolist()
         for source, count, reasons in zip(sources, counts, unreadable, strict=False):

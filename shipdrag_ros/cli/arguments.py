@@ -8,7 +8,7 @@ Options
     write the result as JSON, NaN as null, to FILE; without FILE: JSON alone on stdout and the
     readable result on stderr
 --ship FILE
-    ship file (YAML) (default: the one attached to the bag)
+    ship file (YAML) (default: the one attached to the bag, else ship.yaml beside it)
 --parameters FILE
     parameters as `name: value` (YAML) (default: those attached to the bag)
 --stop TIME

@@ -12,7 +12,7 @@ Options
 BAG
     MCAP or rosbag2; {PART}
 --ship FILE
-    ship file with a baseline (default: the one attached to the first bag)
+    ship file with a baseline (default: the one attached to the first bag, or beside it)
 --write FILE
     write a ship file with the effect added, where one is named; an existing file is not
     overwritten

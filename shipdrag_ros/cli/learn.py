@@ -191,7 +191,7 @@ def run_learn(options: argparse.Namespace) -> int:
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
     from shipdrag_ros.library.diagnosis import learn_from
-    from shipdrag_ros.replay.playback import SHIP_FILE
+    from shipdrag_ros.replay.playback import attached_ship
 
     output = Output(options.json)
     name = options.name or options.out.stem
@@ -199,7 +199,7 @@ def run_learn(options: argparse.Namespace) -> int:
     given = None if options.ship is None else Ship.load(options.ship)
     bags, kept = _bags(options.bags)
     runs = open_windowed(bags, remap=options.remap, output=output)
-    if given is None and kept and not any(SHIP_FILE in run.attachments for run, _ in runs):
+    if given is None and kept and not any(attached_ship(run) for run, _ in runs):
         given = _one(kept)
     with stages(output) as progress:
         found = learn_from(output, runs, given, name, progress)

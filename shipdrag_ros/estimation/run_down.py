@@ -357,16 +357,24 @@ class RunDown:
         )
 
 
+def chance_told(off_s: float) -> float:
+    """
+    Return the probability that a stop told so long after an onset [s] is that of the onset.
+
+    Else it is told at any time within the hour.
+    """
+    of_both = STOP.sd**2 + TOLD.sd**2
+    density = math.exp(-0.5 * off_s**2 / of_both) / math.sqrt(2.0 * math.pi * of_both)
+    right = TOLD_CHANCE.mean * 3600.0 * density
+    return right / (right + 1.0 - TOLD_CHANCE.mean)
+
+
 def _dated(window: Window) -> tuple[int, float]:
     """Return the stop [ns] and its sd [s], by the onset and by what a person told."""
     if window.told_ns is None:
         return window.start_ns, STOP.sd
     off = (window.told_ns - window.start_ns) / SECOND_NS
-    of_both = STOP.sd**2 + TOLD.sd**2
-    # what is told is the stop, or else it is told at any time within the hour
-    density = math.exp(-0.5 * off**2 / of_both) / math.sqrt(2.0 * math.pi * of_both)
-    right = TOLD_CHANCE.mean * 3600.0 * density
-    p = right / (right + 1.0 - TOLD_CHANCE.mean)
+    p, of_both = chance_told(off), STOP.sd**2 + TOLD.sd**2
     mean, variance = off * STOP.sd**2 / of_both, STOP.sd**2 * TOLD.sd**2 / of_both
     later_s, sd_s = mixture(((p, mean, math.sqrt(variance)), (1.0 - p, 0.0, STOP.sd)))
     return window.start_ns + round(later_s * SECOND_NS), sd_s

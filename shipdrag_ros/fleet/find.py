@@ -19,13 +19,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.bags.mcap_file import METADATA, PART
+from shipdrag_ros.bags.mcap_file import METADATA, PART, is_bag_folder
 from shipdrag_ros.errors import FleetError, ShipFileError, reason_of
 from shipdrag_ros.sources.beside import (
     BAGS,
     FIRST_BYTES,
     RUN_FILE,
-    is_bag_folder,
     is_source,
     run_file,
 )

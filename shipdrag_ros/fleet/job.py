@@ -35,8 +35,7 @@ from shipdrag_ros.fleet.store import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.words import run_warnings
-from shipdrag_ros.ship import LearntTerm, RunSheet, Ship
-from shipdrag_ros.ship.facts import overriding
+from shipdrag_ros.ship import Fact, LearntTerm, RunSheet, Ship
 from shipdrag_ros.simulation.effects import carrying
 from shipdrag_ros.sources.beside import RUN_FILE
 from shipdrag_ros.sources.reading import read_any
@@ -189,9 +188,10 @@ class BagJob(NamedTuple):
 
 
 class _ShipInRun(NamedTuple):
-    """The ship as she was in a run, and what is known of it."""
+    """The ship as she was in a run, the facts of her file alone, and what is known of the run."""
 
     ship: Ship
+    facts: tuple[Fact, ...]
     sheet: RunSheet
     text: str
     warnings: tuple[str, ...]
@@ -232,10 +232,8 @@ def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
     messages = 0
     hull: _ShipInRun | None = None
     for run in runs:
-        hull = _hull(source, run)
-        hull = hull._replace(ship=carrying(hull.ship, job.learnt))
-        told = replace(hull.ship, facts=overriding(hull.ship.facts, hull.sheet.facts))
-        result = replay(run, ship=told, compare=False)
+        hull = _hull(job, run)
+        result = replay(run, ship=hull.ship, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
         found, notes = _coastdowns(job, hull, result)
@@ -324,11 +322,13 @@ def _dismissed(result: ReplayResult, hull: _ShipInRun) -> list[str]:
 
 
 def _held(result: ReplayResult, hull: _ShipInRun, run: CoastRun) -> DiagnosisResult:
-    return diagnose([run], hull.ship, result.parameters, advise=False)
+    ship = replace(hull.ship, facts=hull.facts)
+    return diagnose([run], ship, result.parameters, advise=False)
 
 
-def _hull(source: BagToRead, run: Run) -> _ShipInRun:
+def _hull(job: BagJob, run: Run) -> _ShipInRun:
     """Return the ship as she was in a run: the file beside it or attached, and `run.yaml`."""
+    source = job.sources[0]
     attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
     own, above = (
         Ship.from_yaml(text, subject=f'{SHIP_FILE} {where}') if text else None
@@ -349,7 +349,8 @@ def _hull(source: BagToRead, run: Run) -> _ShipInRun:
             'which is used',
         )
     sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE) if source.run else RunSheet()
-    return _ShipInRun(sheet.of(ship, subject=RUN_FILE), sheet, text, warnings)
+    was = carrying(sheet.of(ship, subject=RUN_FILE), job.learnt)
+    return _ShipInRun(was, ship.facts, sheet, text, warnings)
 
 
 def _name(ship: Ship, source: BagToRead) -> str:

@@ -30,8 +30,8 @@ from shipdrag_ros.replay import (
 )
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
-    SHIP_FILE,
     StopTime,
+    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -86,14 +86,9 @@ def diagnose_runs(
         diagnosis is of another ship, of later runs or of one of these.
     """
     refuse_mixed(runs, given)
-    windowed = any(window is not None for _, window in runs)
+    alone = stop is None and given is None and all(window is None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
-    if (
-        not windowed
-        and stop is None
-        and given is None
-        and not any(SHIP_FILE in run.attachments for run, _ in runs)
-    ):
+    if alone and not any(attached_ship(run) for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
         return asked.unused(sailing, facts), None
@@ -293,8 +288,8 @@ def _found(
     warnings: list[str] = []
     for run, _ in runs:
         refuse_without_input(run)
-    owner = next((run for run, _ in runs if SHIP_FILE in run.attachments), runs[0][0])
-    ship, parameters = ship_of(owner, given), None
+    known = filter(None, (attached_ship(run) for run, _ in runs))
+    ship, parameters = given or next(known, None) or ship_of(runs[0][0], None), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
@@ -312,7 +307,7 @@ def _found(
             for name in clocks_apart(result)
         ]
         if stop is not None:
-            lines.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+            lines.append(told_beside(each, stop, result.coastdowns))
         warnings += [f'{each.name}: {line}' for line in lines]
         windows = coast_windows(result)
         warnings += _ends(each.name, windows)

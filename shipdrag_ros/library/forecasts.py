@@ -286,10 +286,7 @@ def _forecast(
         if why := too_vague(found, parameters):
             return made(None, why)
         forecast = foretell(
-            found,
-            ship,
-            froude_min=parameters.froude_min,
-            speeds_m_s=parameters.forecast_speeds,
+            found, ship, froude_min=parameters.froude_min, speeds_m_s=parameters.forecast_speeds
         )
     except EstimationError as error:
         return made(None, str(error))

@@ -206,11 +206,7 @@ class Record(Shown):
     """
 
     def __init__(
-        self,
-        runs: Sequence[Run],
-        *,
-        given: Ship | None = None,
-        notes: Sequence[str] = (),
+        self, runs: Sequence[Run], *, given: Ship | None = None, notes: Sequence[str] = ()
     ) -> None:
         if not runs:
             raise BagError('no run was read; give a bag, a log or a table of measurements')
@@ -250,7 +246,7 @@ class Record(Shown):
         """
         Write a record of one run as a bag, which `read` and the command line take.
 
-        A ship that was given for it is attached.
+        A ship that was given for it is attached, or else the one whose file lies beside it.
 
         Raises
         ------
@@ -263,7 +259,8 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        self.runs[0].save(out, {} if self.given is None else {SHIP_FILE: self.given.to_yaml()})
+        ship = self.given if SHIP_FILE in self.runs[0].attachments else self.ship
+        self.runs[0].save(out, {} if ship is None else {SHIP_FILE: ship.to_yaml()})
         return out
 
     def _lines(self) -> Sequence[str]:
@@ -374,7 +371,8 @@ def read(
         `shipdrag import` knows, or of a table (CSV); a frame of pandas or polars; or a
         list of these, all of one ship.
     ship
-        The ship, or the path of her file; None: the one attached to the bag.
+        The ship, or the path of her file; None: the one attached to the bag, else `ship.yaml`
+        beside it.
     columns
         Which column of a table or frame is which input, with its unit behind a colon:
         `{'speed_through_water': 'log:kn', 'position': ('lat:deg', 'lon:deg')}`. Without

@@ -26,7 +26,6 @@ from shipdrag_ros.replay.playback import (
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Fact, RunSheet, Ship
-from shipdrag_ros.ship.facts import overriding
 
 _LATE_S = 10.0
 _MOVING_M_S = 0.5
@@ -164,8 +163,7 @@ def ship_in(
     refuse_without_input(run)
     ship = ship_of(run, given)
     sheet, where = sheet_of(run, say or (lambda text: run.note([text])))
-    was = sheet.of(ship, subject=where)
-    return replace(was, facts=overriding(ship.facts, sheet.facts, facts)), sheet
+    return sheet.of(ship, subject=where, facts=facts), sheet
 
 
 def replay_run(
@@ -198,7 +196,7 @@ def replay_run(
         )
     warnings = list(result.warnings)
     if stop is not None:
-        warnings.append(told_beside(each, stop, (one.start_ns for one in result.coastdowns)))
+        warnings.append(told_beside(each, stop, result.coastdowns))
         listener.log(f'{each.name}: {warnings[-1]}')
     if not result.coastdowns:
         warnings.append(_astern(each, result.ship))

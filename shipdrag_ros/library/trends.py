@@ -288,9 +288,7 @@ def _rows(results: Sequence[Resistance]) -> Iterator[dict[str, Any]]:
             yield coastdown_row(coastdown.event, coastdown.ship, diagnosis=None, context=context)
 
 
-def _events(
-    given: Mapping[str, Sequence[tuple[str, str]]],
-) -> dict[str, Sequence[HullEvent]]:
+def _events(given: Mapping[str, Sequence[tuple[str, str]]]) -> dict[str, Sequence[HullEvent]]:
     from shipdrag_ros.fleet.store import read_events
 
     found: dict[str, Sequence[HullEvent]] = {}

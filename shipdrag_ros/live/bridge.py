@@ -260,8 +260,9 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found.values:
+            word = found.values.get('state', '')
             ahead = found.values.get(topics.AHEAD, '')
-            self.show_verdict(found.values.get('state', ''), found.message, ahead)
+            self.show_verdict(word, found.message.removeprefix(f'{word}: '), ahead)
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':

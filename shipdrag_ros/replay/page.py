@@ -222,11 +222,7 @@ def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | No
         sections.append(_all(runs))
     for run in runs:
         sections.extend(_run(run, tables.common_speed_m_s(runs)))
-    write_page(
-        path,
-        'Resistance from coastdowns: ' + ', '.join(names),
-        [*sections, HOW_TO_READ],
-    )
+    write_page(path, 'Resistance from coastdowns: ' + ', '.join(names), [*sections, HOW_TO_READ])
 
 
 def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:

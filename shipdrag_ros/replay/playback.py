@@ -7,7 +7,7 @@ Also one window of it, given by hand, through the same estimator.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from numbers import Real
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, StopMark
+from shipdrag_ros.bags.run import RECORDED, Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -31,6 +31,7 @@ from shipdrag_ros.coastdown.memory import InputTally
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
+from shipdrag_ros.estimation.run_down import chance_told
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS
 from shipdrag_ros.messages.publishing import outputs
 from shipdrag_ros.parameters import Parameters
@@ -375,16 +376,25 @@ def ship_of(run: Run, given: Ship | None) -> Ship:
     """
     ship = given or attached_ship(run)
     if ship is None:
-        raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
+        raise BagError(
+            f'{run.name!r} has no {SHIP_FILE} attached or beside it; give one with --ship FILE'
+        )
     return ship
 
 
 def attached_ship(run: Run) -> Ship | None:
     """
-    Return the ship whose file is attached to a bag, if one is.
+    Return the ship whose file is attached to a bag, or else lies beside it, which is noted.
     """
     text = run.attachments.get(SHIP_FILE)
-    return None if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
+    if text is not None:
+        return Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
+    near = (each / SHIP_FILE for each in run.folders)
+    path = next((each for each in near if each.is_file()), None)
+    if path is None:
+        return None
+    run.note([f'{path} holds for this run'])
+    return Ship.load(path)
 
 
 def recorded_parameters(run: Run) -> Parameters:
@@ -406,7 +416,8 @@ def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
     """Say whether these are what the bag was recorded with, as far as it says so."""
     if run.node is None:
         return False
-    own_ship = SHIP_FILE not in run.attachments or ship_of(run, None).to_yaml() == ship.to_yaml()
+    text = run.attachments.get(RECORDED + SHIP_FILE, run.attachments.get(SHIP_FILE))
+    own_ship = text is None or Ship.from_yaml(text, subject=run.name).to_yaml() == ship.to_yaml()
     return own_ship and (
         PARAMETERS_FILE not in run.attachments or recorded_parameters(run) == parameters
     )
@@ -425,8 +436,7 @@ def told_ns(run: Run, stop: StopTime) -> int:
         raise BagError(f'stop is {stop!r}: expected seconds as a number, or a datetime')
     if isinstance(stop, datetime) and stop.tzinfo is None:  # would be of this computer
         raise BagError(f'stop at {stop.isoformat()}: expected a date with its zone')
-    span = run.span_ns
-    start_ns, end_ns = (0, -1) if span is None else span
+    start_ns, end_ns = run.span_ns or (0, -1)
     said, at_s = (
         (f'{stop} s', stop)
         if not isinstance(stop, datetime)
@@ -441,23 +451,32 @@ def told_ns(run: Run, stop: StopTime) -> int:
     return start_ns + round(at_s * SECOND_NS)
 
 
-def told_beside(run: Run, stop: StopTime, starts_ns: Iterable[int]) -> str:
+def told_beside(run: Run, stop: StopTime, found: Sequence[EndedCoastdown]) -> str:
     """
-    Say where coastdowns begin, beside a stop that was told.
+    Say where coastdowns begin, beside a stop that was told, and what to do if it is of none.
 
     Parameters
     ----------
     run, stop
         As of `told_ns`.
-    starts_ns
-        Of the coastdowns that were found.
+    found
+        The coastdowns.
     """
     told = told_ns(run, stop)
-    begins = ', '.join(f'{utc(each)} ({(each - told) / SECOND_NS:+.0f} s)' for each in starts_ns)
-    return (
+    # by the clock of the stamps, where a coastdown has been told of it
+    at_ns = next((each.told_ns for each in found if each.told_ns is not None), told)
+    starts = [(each.start_ns - at_ns, utc(each.start_ns)) for each in found]
+    begins = ', '.join(f'{said} ({off_ns / SECOND_NS:+.0f} s)' for off_ns, said in starts)
+    off_s = [(at_ns - (each.stop_ns or each.start_ns)) / SECOND_NS for each in found]
+    said = (
         f'the stop that is given, {utc(told)}, is weighed by the regime filter; coastdowns begin '
-        f'at: {begins or "there is none"}; where none is the stop that is meant, check its '
-        'time and zone, or give the window in which she glided'
+        f'at: {begins or "there is none"}'
+    )
+    if any(chance_told(each) > 0.5 for each in off_s):
+        return said
+    return (
+        f'{said}; none of them is of that stop: check its time and zone, or give the window in '
+        'which she glided'
     )
 
 

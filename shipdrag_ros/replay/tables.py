@@ -18,13 +18,7 @@ from shipdrag_ros.replay import words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import Ranking
 
-COLUMNS = (
-    'speed_m_s',
-    'resistance_m_s2',
-    'sigma_m_s2',
-    'sigma_repeatable_m_s2',
-    'froude',
-)
+COLUMNS = ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2', 'sigma_repeatable_m_s2', 'froude')
 OF_CONDITIONS = ('resistance_m_s2', 'sigma_m_s2')
 """Columns that stand once more behind these, of the run's conditions."""
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, section, text_of
-from shipdrag_ros.ship.facts import Fact, fact_list
+from shipdrag_ros.ship.facts import Fact, fact_list, overriding
 from shipdrag_ros.ship.model import Ship, inconsistencies
 
 _FRESH, _SEA = 999.0, 1026.0  # kg/m^3 at 15 degrees
@@ -84,9 +85,9 @@ class RunSheet:
             raise ShipFileError(subject, problems)
         return cls(**accepted)
 
-    def of(self, ship: Ship, *, subject: str) -> Ship:
+    def of(self, ship: Ship, *, subject: str, facts: Sequence[Fact] = ()) -> Ship:
         """
-        Return the ship as she was in the run.
+        Return the ship as she was in the run, with what is known of it.
 
         Parameters
         ----------
@@ -94,6 +95,8 @@ class RunSheet:
             As her file states her; the resistance coefficients stay hers.
         subject
             Names the run in errors.
+        facts
+            Of all runs, which override those of the ship and of the run.
 
         Raises
         ------
@@ -112,6 +115,7 @@ class RunSheet:
             draught_m=self.draught_m or ship.draught_m,
             displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
             water=water,
+            facts=overriding(ship.facts, self.facts, facts),
         )
         problems = list(inconsistencies({name: getattr(changed, name) for name in keys_of(Ship)}))
         if problems:

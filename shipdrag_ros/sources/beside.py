@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import os
 import zlib
 from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.bags.mcap_file import METADATA, PART
+from shipdrag_ros.bags.mcap_file import PART, is_bag_folder, names_in
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.ship import RunSheet
 
@@ -53,13 +52,6 @@ def is_source(name: str, beginning: Callable[[], bytes]) -> bool:
     return bool(first) and any(
         each.by_head and each.score(head) >= CERTAIN for each in formats.found()
     )
-
-
-def is_bag_folder(names: Collection[str]) -> bool:
-    """
-    Say whether the files of a folder are those of a bag of rosbag2, by their names.
-    """
-    return any(name == METADATA or name.endswith(('.db3', '.db3.zstd')) for name in names)
 
 
 def run_file(
@@ -137,16 +129,13 @@ def sheet_of(run: Run, say: Callable[[str], None]) -> tuple[RunSheet, str]:
     ShipFileError
         If it cannot be used, or there are two.
     """
-    first = run.paths[0]
-    if not first.is_file():
+    folders = run.folders
+    if not folders:
         return RunSheet(), ''
-    folder, own = first.parent, [path.name for path in run.paths if path.parent == first.parent]
-    inside = is_bag_folder(_names(folder))
-    if inside:
-        whole = folder if folder.name.strip('.') else Path(os.path.abspath(folder))
-        folder, own = whole.parent, [whole.name]
+    folder, inside = folders[-1], len(folders) > 1
+    alike = [path.name for path in run.paths if path.parent == folder]
     found = run_file(
-        own,
+        [folders[0].name] if inside else alike,
         lambda name: (folder / name).is_file(),
         partial(_sources_in, folder),
         lambda text: say(f'{folder / RUN_FILE} {text}'),
@@ -160,16 +149,12 @@ def sheet_of(run: Run, say: Callable[[str], None]) -> tuple[RunSheet, str]:
     return sheet, str(path)
 
 
-def _names(folder: Path) -> list[str]:
-    return [each.name for each in folder.iterdir()]
-
-
 def _sources_in(folder: Path) -> list[str]:
     """Return the names of all bags and logs in a folder."""
     return [
         each.name
         for each in folder.iterdir()
-        if (each.is_dir() and is_bag_folder(_names(each)))
+        if (each.is_dir() and is_bag_folder(names_in(each)))
         or (each.is_file() and is_source(each.name, partial(_beginning, each)))
     ]
 

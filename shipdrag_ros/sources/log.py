@@ -19,7 +19,15 @@ from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
 from shipdrag_ros.nmea.sentences import fraction_ns
-from shipdrag_ros.samples import SECOND_NS, Block, Channel, Int64, kind_of
+from shipdrag_ros.samples import (
+    BACKWARD_JUMP_NS,
+    SECOND_NS,
+    SET_BACK,
+    Block,
+    Channel,
+    Int64,
+    kind_of,
+)
 
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
@@ -35,6 +43,10 @@ UNDATED = 'The log has no fix that gives the date; its times count from 2000-01-
 ATTACHMENT = 'import.yaml'
 """Where a bag says what it was made from."""
 
+_BACK = (
+    f', or begins again where {SET_BACK} in a row are more than '
+    f'{BACKWARD_JUMP_NS // SECOND_NS} s back'
+)
 _FIRST_LINES = 3
 _LISTED = 20  # kinds that are not used
 _SHOWN = 40  # characters of a cell
@@ -271,8 +283,7 @@ class ImportResult:
     start_ns, end_ns
         First and last time written [ns].
     backward, repeated
-        Samples stamped before, or as, an earlier one of their input; a replay
-        rejects them and says so.
+        Samples stamped before, or as, an earlier one of their input.
     understood
         What each input was taken from.
     notes
@@ -317,11 +328,14 @@ class ImportResult:
             f'{display.duration(length_s)}, from {display.utc(self.start_ns)}',
             *self.notes,
         ]
-        counts = ((self.backward, 'are stamped before'), (self.repeated, 'have the stamp of'))
         what, of = self.counted
+        counts = (
+            (self.backward, 'are stamped before', _BACK),
+            (self.repeated, 'have the stamp of', ''),
+        )
         return lines + [
-            f'{count} {what} {how} an earlier one{of}; a replay rejects those.'
-            for count, how in counts
+            f'{count} {what} {how} an earlier one{of}; a replay rejects those{unless}.'
+            for count, how, unless in counts
             if count
         ]
 

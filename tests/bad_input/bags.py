@@ -147,7 +147,7 @@ CASES = (
     _case(
         'no ship file attached',
         _samples(lambda b: b, ship=False),
-        "'bag.mcap' has no ship.yaml attached; give one with --ship FILE",
+        "'bag.mcap' has no ship.yaml attached or beside it; give one with --ship FILE",
     ),
     _case(
         'a bad ship file attached',

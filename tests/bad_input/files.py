@@ -139,7 +139,8 @@ TABLES = (
     _csv(
         'times that go back',
         _TABLE.replace('\n50,', '\n20,'),
-        '1 rows are stamped before an earlier one; a replay rejects those.',
+        '1 rows are stamped before an earlier one; a replay rejects those, or begins '
+        'again where 3 in a row are more than 10 s back.',
         status=0,
     ),
     _csv(

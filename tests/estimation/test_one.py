@@ -110,14 +110,15 @@ def test_figures_are_those_of_the_window(coast: Any, ship: Ship) -> None:
 
 @pytest.mark.parametrize('current', [-0.4, 0.25])
 def test_a_current_is_found_and_taken_out(coast: Any, ship: Ship, current: float) -> None:
-    # 40 runs, seeds 0..39: 1.02 %, as without current
+    # 40 runs, seeds 0..39: 1.02 %, as without current. The current is 0.22 and 0.24 of its sigma
+    # off (rms), as the log reads true and sigma holds logs that do not: 0.23 +- 3.5 sd of N = 40
     found = [
         estimate(window(with_current(coast.block(500, seed=seed), current)), ship, Parameters())
         for seed in range(RUNS)
     ]
     assert np.sqrt(np.mean([rmse(one, coast, ship) ** 2 for one in found])) < 0.011
     off = np.array([(one.current_m_s - current) / one.current_sigma_m_s for one in found])
-    assert np.mean(np.abs(off) <= 2.0) > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / RUNS)
+    assert 0.14 < np.sqrt(np.mean(off**2)) < 0.32
 
 
 def test_a_factor_of_the_log_is_found(coast: Any, ship: Ship) -> None:
@@ -290,8 +291,8 @@ def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> 
 
 
 def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None:
-    # N = 20, seeds 0..19: the share of the range inside +-2 sigma is 0.84 (0.5 if not widened)
-    covered, said = [], 0
+    # N = 20, seeds 0..19: r is 0.66 of its sigma off (rms); 0.22 of a run, so 0.05 of 20
+    squares, said = [], 0
     for seed in range(20):
         block = coast.block(500, seed=seed)
         rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
@@ -299,10 +300,10 @@ def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None
         block.value[rows, 0] += GaussMarkov(0.05, 60.0).sample(time_s, np.random.default_rng(seed))
         found = estimate_final(cut(block), ship, Parameters())
         away = away_from(found, coast, ship)
-        covered.append(np.mean(np.abs(away) <= 2.0 * found.valid_curve.sigma_repeatable_m_s2))
+        squares.append(np.mean((away / found.valid_curve.sigma_repeatable_m_s2) ** 2))
         said += any('slow disturbances learnt' in note for note in found.notes)
     assert said >= 18
-    assert np.mean(covered) > 0.7
+    assert 0.5 < np.sqrt(np.mean(squares)) < 0.85
 
 
 def test_quadratic_drag_is_found_without_noise(coast, ship) -> None:
@@ -413,11 +414,11 @@ def test_white_noise_is_told_from_a_smooth_signal() -> None:
 def test_a_short_coast_over_few_speeds_is_fitted() -> None:
     # N = 12, seeds 0..11: 9 s in which a ferry slows by a fifth, read behind a filter of 0.3 s.
     # None fails, RMSE below 20 % of the largest r (18 % found: a log's offset is that of
-    # ships), and +-2 sigma holds 70 % or more.
+    # ships), and r is 1.5 of its sigma off (rms; 0.14 is its sd).
     ferry = Ship(length_m=5.0, displaced_volume_m3=1.76)
     time_s, decay = 0.05 * np.arange(181), np.exp(-0.05 / 0.3)
     stamps = np.round(time_s * 1e9).astype(np.int64)
-    squares, covered = [], []
+    squares, off = [], []
     for seed in range(12):
         slow = np.random.default_rng(seed).standard_normal(len(time_s))
         slow[1:] *= np.sqrt(1.0 - decay**2)
@@ -429,7 +430,7 @@ def test_a_short_coast_over_few_speeds_is_fitted() -> None:
         v = curve.speed_m_s
         away = curve.resistance_m_s2 - 0.24 * v**2 * (1.0 + ferry.n_r(v))
         squares.append(np.mean(away**2))
-        covered.append(np.mean(np.abs(away) <= 2.0 * curve.sigma_repeatable_m_s2))
+        off.append(np.mean((away / curve.sigma_repeatable_m_s2) ** 2))
     largest = 0.24 * 0.13**2 * (1.0 + float(ferry.n_r(0.13)))
     assert np.sqrt(np.mean(squares)) < 0.2 * largest
-    assert np.mean(covered) > 0.7
+    assert 1.0 < np.sqrt(np.mean(off)) < 1.9

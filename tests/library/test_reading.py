@@ -6,6 +6,7 @@ from __future__ import annotations
 import gc
 import struct
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
+from mcap.reader import make_reader
 
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Channel
@@ -119,7 +121,13 @@ def test_bags_are_a_run_each(bag: Path, record: sd.Record, tmp_path: Path) -> No
     saved = sd.read(given.save(tmp_path / 'saved.mcap'))
     assert given.ship == saved.ship == other
     assert saved.to_frame().equals(record.to_frame())
-    assert saved.runs[0].attachments.keys() == record.runs[0].attachments.keys()
+    third = replace(other, name='third')
+    path = sd.read(tmp_path / 'saved.mcap', ship=third).save(tmp_path / 'again.mcap')
+    was = record.runs[0].attachments
+    now = was | {'ship.yaml': third.to_yaml(), 'recorded_ship.yaml': was['ship.yaml']}
+    with path.open('rb') as file:  # each of them once
+        held = [(each.name, each.data.decode()) for each in make_reader(file).iter_attachments()]
+    assert sorted(held) == sorted(now.items())
 
 
 def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:
@@ -129,6 +137,10 @@ def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:
     assert speeds(saved).tolist() == speeds(record).tolist()
     with pytest.raises(sd.ShipdragError, match='exists; choose another name'):
         record.save(tmp_path / 'saved.mcap')
+    (tmp_path / 'log').mkdir()
+    bare = sd.read(pd.DataFrame(table()), columns=LOG, time='t').save(tmp_path / 'log/bare.mcap')
+    (tmp_path / 'log/ship.yaml').write_text(SHIP.to_yaml())
+    assert sd.read(sd.read(bare).save(tmp_path / 'away.mcap')).ship == SHIP
 
 
 @pytest.mark.parametrize('packed', ['file', 'message'])

@@ -88,6 +88,9 @@ def test_the_page_shows_the_document_of_the_topic_once_the_node_is_done() -> Non
     bridge.hear(heard(json_text(document(FOUND, None))), 0.0)
     bridge.hear(told('running', 'running'), 0.0)
     assert bridge.parts(0.0)['verdict'] == bare('running', 'running')
+    bridge.hear(told('impossible', 'impossible: Fouling cannot be judged: no baseline'), 0.0)
+    none = bare('impossible', 'Fouling cannot be judged: no baseline')
+    assert bridge.parts(0.0)['verdict'] == none  # the page begins: "No diagnosis: "
     bridge.hear(told('done', 'Missing is one of these'), 0.0)
     assert bridge.parts(0.0)['verdict'] == {**verdict_part(document(FOUND, None)), 'ahead': ''}
 

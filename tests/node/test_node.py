@@ -34,6 +34,13 @@ def speeds(*, count: int = 5, age_s: float = 0.0) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, stamps, 5.0 + 1e-3 * np.arange(count))
 
 
+def send(peer: Any, block: Block | None = None) -> None:
+    """Publish five readings of a speed log, or others, to a node that has found the topic."""
+    block = speeds() if block is None else block
+    peer.player.connect(block)
+    peer.player.publish(block)
+
+
 def topics_in(bag: Path) -> Counter[str]:
     return Counter(row.topic for row in rows(bag))
 
@@ -251,16 +258,14 @@ def test_reports_sim_time_without_a_clock(start_node: Any, peer: Any, diagnostic
     start_node(use_sim_time=True)
     diagnostics.wait_for('state', 'no /clock')
     block = speeds()
-    peer.player.connect(block)
-    peer.player.publish(block)
+    send(peer, block)
     diagnostics.wait_for('input speed_through_water', '5', value=UNUSED)
 
 
 def test_estimates_on_when_the_disk_does_not_take_it(start_node, peer, diagnostics):
     start_node(output_directory='/proc/nowhere')
     block = speeds()
-    peer.player.connect(block)
-    peer.player.publish(block)
+    send(peer, block)
     diagnostics.wait_for('input speed_through_water', '5', value='used')
     diagnostics.wait_for('recording', '6', value='messages in memory only')
     assert diagnostics.wait_for('recording', 'recording failed').level == b'\x02'
@@ -274,9 +279,7 @@ def test_obeys_transitions_and_refuses_illegal_ones(start_node, peer, diagnostic
     assert not peer.change_state('configure')
     assert not peer.change_state('no_such_transition')
     assert peer.state() == 'active'
-    block = speeds()
-    peer.player.connect(block)
-    peer.player.publish(block)
+    send(peer)
     diagnostics.wait_for('input speed_through_water', '5', value='messages')
 
     assert peer.change_state('deactivate')
@@ -287,8 +290,7 @@ def test_obeys_transitions_and_refuses_illegal_ones(start_node, peer, diagnostic
     for transition in ('cleanup', 'configure', 'activate'):
         assert peer.change_state(transition)
     assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 1  # nothing heard, no file
-    peer.player.connect(speeds())
-    peer.player.publish(speeds())
+    send(peer)
     diagnostics.wait_for('recording', '6', value='messages')
     assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 2
     assert peer.change_state('shutdown')
@@ -340,9 +342,7 @@ def test_services_record_and_reset(start_node: Any, peer: Any, diagnostics: Any,
     node = start_node()
     events = peer.listen('/coastdown_node/events', EVENT_TYPE, raw=True)
     peer.spin_until(lambda: peer.node.count_publishers('/coastdown_node/events'))
-    block = speeds()
-    peer.player.connect(block)
-    peer.player.publish(block)
+    send(peer)
     diagnostics.wait_for('input speed_through_water', '5', value='messages')
     answer = peer.trigger('stop_recording')
     assert answer.success

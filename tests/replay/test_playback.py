@@ -38,6 +38,7 @@ from shipdrag_ros.messages import (
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, ReplayResult, coast_windows, replay
+from shipdrag_ros.replay.playback import attached_ship, told_beside
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship, StatedEffect
 from tests.runs import write_run
@@ -260,6 +261,15 @@ def test_what_a_bag_holds_is_not_denied_with_a_stop(tmp_path, recording, capsys)
     assert any(words in each['warning'] for each in json.loads(path.read_text())['warnings'])
 
 
+@pytest.mark.parametrize(('stop', 'denied'), [(405.0, False), (600.0, True), (800.0, False)])
+def test_a_stop_that_one_coastdown_has_is_not_denied(recording, stop, denied):
+    (run,), (_, events) = open_runs([recording[0]]), recording
+    (first,) = (each for each in events if isinstance(each, EndedCoastdown))
+    second = replace(first, start_ns=first.start_ns + 400_000_000_000, stop_ns=None)
+    said = told_beside(run, stop, [first, second])
+    assert ('; none of them is of that stop: check its time and zone' in said) == denied
+
+
 def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voyage, live):
     block = voyage()
     messages = list(encode(block[block.channel != Channel.SHAFT]))
@@ -292,6 +302,24 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(tmp_path, ship, voy
     found = [estimate_final(each, ship, Parameters(update_s=30.0)) for each in windows]
     assert np.array_equal(found[0].calm.resistance_m_s2, found[1].calm.resistance_m_s2)
     assert np.array_equal(found[0].calm.sigma_m_s2, found[1].calm.sigma_m_s2)
+
+
+def test_the_ship_file_beside_a_bag_counts_where_none_is_attached(tmp_path, ship, voyage, capsys):
+    bare = write_run(tmp_path / 'a.mcap', voyage(coast_s=60.0))
+    assert attached_ship(open_runs([bare])[0]) is None
+    beside = replace(ship, name='beside')
+    (tmp_path / 'ship.yaml').write_text(beside.to_yaml())
+    assert attached_ship(open_runs([bare])[0]) == beside
+    own = write_run(tmp_path / 'b.mcap', voyage(coast_s=60.0), ship)
+    assert attached_ship(open_runs([own])[0]) == ship
+    for verb in ('replay', 'forecast'):
+        assert main([verb, str(bare)]) == 0
+        assert f'{tmp_path / "ship.yaml"} holds for this run' in ''.join(capsys.readouterr())
+    about = {'storage_identifier': 'mcap', 'relative_file_paths': ['a.mcap']}
+    (tmp_path / 'bag').mkdir()
+    bare.rename(tmp_path / 'bag' / 'a.mcap')
+    (tmp_path / 'bag/metadata.yaml').write_text(f'rosbag2_bagfile_information: {about}')
+    assert attached_ship(open_runs([tmp_path / 'bag'])[0]) == beside
 
 
 @pytest.mark.parametrize('verb', ['forecast', 'diagnose'])

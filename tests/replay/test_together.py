@@ -57,7 +57,7 @@ def test_of_many_dates_the_least_and_the_most_are_named(run: RunResult) -> None:
 def test_what_is_known_of_a_run_makes_no_other_ship_but_her_load_does(run: RunResult) -> None:
     other = later(run, days=1.0, factor=1.0)
     sheet = RunSheet(facts=(Fact('calm'),), water=RunWater(temperature_c=4.0))
-    known = replace(sheet.of(run.ship, subject='run.yaml'), facts=sheet.facts)
+    known = sheet.of(run.ship, subject='run.yaml')
     assert together([run, replace(other, ship=known)]).combined is not None
     loaded = replace(run.ship, displaced_volume_m3=1.05 * run.ship.displaced_volume_m3)
     assert 'loaded otherwise' in together([run, replace(other, ship=loaded)]).why_not

@@ -22,12 +22,13 @@ water: {temperature_c: 25, density: 1010}
 
 def test_what_is_stated_of_a_run_overrides_the_ship_file() -> None:
     sheet = RunSheet.from_yaml(SHEET, subject='run.yaml')
-    assert sheet.facts == (Fact('calm'),)
-    ship = sheet.of(SHIP, subject='run.yaml')
+    ship = sheet.of(replace(SHIP, facts=(Fact('calm', rate=0.3),)), subject='run.yaml')
+    assert sheet.facts == ship.facts == (Fact('calm'),)
     assert (ship.draught_m, ship.displaced_volume_m3) == (6.0, 4400.0)
     assert ship.water.density_kg_m3 == 1010.0
     assert ship.water.kinematic_viscosity_m2_s == kinematic_viscosity(25.0, 1010.0)
-    assert replace(ship, draught_m=5.5, displaced_volume_m3=4000.0, water=SHIP.water) == SHIP
+    was = replace(ship, draught_m=5.5, displaced_volume_m3=4000.0, water=SHIP.water, facts=())
+    assert was == SHIP
     assert RunSheet().of(SHIP, subject='none') == SHIP
 
 

@@ -36,6 +36,7 @@ from shipdrag_ros.sources.reading import (
 )
 from tests.sources import log_samples as made
 
+BELOW = 'environment.depth.belowTransducer'
 ROOT = Path(__file__).resolve().parents[2]
 FORMAT_OF = {
     'csv': 'csv',
@@ -350,6 +351,12 @@ def test_a_library_that_is_not_there_is_named(files, tmp_path, monkeypatch):
         ('far.gpx', '<!DOCTYPE gpx SYSTEM "http://example.org/x"><gpx></gpx>', 'declares XML'),
         ('nope.gpx', '<?xml version="1.0" encoding="nope"?><gpx></gpx>', 'unknown encoding'),
         ('sjis.gpx', '<?xml version="1.0" encoding="shift_jis"?><gpx></gpx>', 'encodings are not'),
+        (
+            'plan.gpx',
+            '<gpx><trk><trkseg><trkpt lat="1" lon="2"/></trkseg></trk></gpx>',
+            'no time of the point: export the recorded track with its times, or its points as CSV',
+        ),
+        ('way.gpx', '<gpx><rte><rtept/></rte></gpx>', 'no point of a track: export the recorded'),
         ('deep.gpx', '<gpx>' + '<a>' * 5000, 'more than 32 deep'),
         ('deep.jsonl', '{"updates":' + '[' * 100_000, 'too long for a delta'),
         ('cut.bag', '#ROSBAG V2.0\n', 'holds no message'),
@@ -435,6 +442,14 @@ def test_a_line_of_deep_brackets_is_counted(tmp_path: Path) -> None:
     deep = '{"updates":' + '[' * 30_000
     path.write_bytes(made.signalk() + b'\n' + deep.encode())
     assert any('more than 12 brackets deep' in line for line in told(path))
+
+
+def test_a_depth_below_the_transducer_of_signal_k_is_taken_with_its_depth(tmp_path: Path) -> None:
+    path = tmp_path / 'log.jsonl'
+    path.write_bytes(made.signalk().replace(b'environment.wind.speedApparent', BELOW.encode()))
+    assert any(f'{BELOW} (--transducer M makes it the depth)' in line for line in told(path))
+    depth = values(block_of(path, transducer=2.5), Channel.DEPTH)[:, 0]
+    assert depth == pytest.approx([8.12 + 2.5] * made.ROWS)
 
 
 def test_a_packed_bomb_ends_in_an_error(tmp_path: Path) -> None:

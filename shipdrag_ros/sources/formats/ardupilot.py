@@ -15,7 +15,7 @@ from typing import Any
 
 from shipdrag_ros.errors import reason_of
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
+from shipdrag_ros.sources.format import CERTAIN, NO, Job, missing_library
 from shipdrag_ros.sources.log import BASE_NS, DATE_FROM_NS, UNDATED, Tally
 from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 
@@ -23,10 +23,6 @@ from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 _MAGIC = b'\xa3\x95\x80\x80'
 _TYPES = ['GPS', 'POS', 'ATT', 'ESC', 'RPM']
 _FIX = 3
-
-
-def _score(head: Head) -> float:
-    return CERTAIN if head.raw.startswith(_MAGIC) else NO
 
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
@@ -96,6 +92,6 @@ FORMAT = stream_format(
     name='ardupilot',
     kind='a log of ArduPilot (.bin)',
     about=__doc__,
-    score=_score,
+    score=lambda head: CERTAIN if head.raw.startswith(_MAGIC) else NO,
     read=_read,
 )

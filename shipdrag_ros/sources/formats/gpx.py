@@ -25,6 +25,7 @@ _DEEPEST = 32
 _LONGEST = 100  # characters of a time or a speed
 _POSITION = Origin(0, 'trkpt')
 _SPEED = Origin(0, 'speed', 'm/s')
+_DO = 'export the recorded track with its times, or its points as CSV for --rate HZ'
 _NUMBER = re.compile(r'[-+]?\d{1,10}(\.\d{1,40})?([eE][-+]?\d{1,2})?')
 
 
@@ -56,6 +57,8 @@ def _read(job: Job, tally: Tally) -> Iterator[Reading]:
             points.found.clear()
             if job.progress is not None:
                 job.progress(raw.tell(), total)
+    if not tally.records:
+        tally.note(f'It holds no point of a track: {_DO}.')
 
 
 class _Points:
@@ -106,7 +109,7 @@ class _Points:
         lat, lon = point.get('lat', ''), point.get('lon', '')
         stamp_ns = iso_ns(text, UTC)
         if stamp_ns is None:
-            self._tally.reject('time', 'no time' if text else 'no time of the point', text)
+            self._tally.reject('time', 'no time' if text else f'no time of the point: {_DO}', text)
             return
         if _is_coordinate(lat, 90.0) and _is_coordinate(lon, 180.0):
             where = float(lat), float(lon)
@@ -123,10 +126,4 @@ def _is_coordinate(text: str, largest: float) -> bool:
     return _NUMBER.fullmatch(text) is not None and abs(float(text)) <= largest
 
 
-FORMAT = stream_format(
-    name='gpx',
-    kind='a GPX track',
-    about=__doc__,
-    score=_score,
-    read=_read,
-)
+FORMAT = stream_format(name='gpx', kind='a GPX track', about=__doc__, score=_score, read=_read)

@@ -402,7 +402,7 @@ def _depth(fields: _Fields) -> N2kValue:
     if offset is None or offset <= 0.0:  # negative: to the keel, whose depth is not stated
         offset = fields.options.get('transducer')
         if offset is None:
-            raise NoValue('depth of the transducer not stated')
+            raise NoValue('depth below the transducer: give --transducer M')
     return Channel.DEPTH, 0, depth + offset, 0.0
 
 
@@ -433,15 +433,11 @@ _READERS: Mapping[int, Callable[[_Fields], N2kValue]] = {
 }
 
 
-def _score(head: format.Head) -> float:
-    return format.CERTAIN if head.share(parse) > 0.5 else format.NO
-
-
 FORMAT = stream_format(
     name='n2k',
     kind='a log of NMEA 2000',
     about=__doc__,
-    score=_score,
+    score=lambda head: format.CERTAIN if head.share(parse) > 0.5 else format.NO,
     read=_read,
     options=(format.DATE, format.GEAR, format.RATE, format.TRANSDUCER),
 )

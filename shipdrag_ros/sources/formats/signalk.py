@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
 Deltas, one in a line: speedThroughWater, speedOverGround, position, heading, rudder, apparent
-wind, depth below the surface; of the own vessel, each input from one source. Revolutions are
-those of the engine and are taken with --gear.
+wind, depth below the surface, or below the transducer with --transducer; of the own vessel, each
+input from one source. Revolutions are those of the engine and are taken with --gear.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC
 from itertools import accumulate
 from math import pi
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Head, Job
+from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, TRANSDUCER, Head, Job
 from shipdrag_ros.sources.log import Tally, iso_ns
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
@@ -26,6 +26,7 @@ _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')
 _DEEPEST = 12  # brackets in a delta
 _POSITION = 'navigation.position'
+_BELOW = 'environment.depth.belowTransducer'
 _SPEED, _ANGLE = 'environment.wind.speedApparent', 'environment.wind.angleApparent'
 _NUMBERS: dict[str, tuple[Channel, int]] = {
     'navigation.speedThroughWater': (Channel.SPEED_THROUGH_WATER, 0),
@@ -53,7 +54,7 @@ def _score(head: Head) -> float:
 
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
-    deltas = _Deltas(tally, job.options.get('gear'), _own_vessel(job))
+    deltas = _Deltas(tally, job.options, _own_vessel(job))
     lines = Lines(job.source, progress=job.progress)
     for line in counted(lines, tally):
         yield from deltas.of_line(line)
@@ -72,9 +73,10 @@ def _own_vessel(job: Job) -> str:
 class _Deltas:
     """Takes deltas apart, and puts the two halves of a wind together."""
 
-    def __init__(self, tally: Tally, gear: float | None, own: str) -> None:
+    def __init__(self, tally: Tally, options: Mapping[str, Any], own: str) -> None:
         self._tally = tally
-        self._gear = gear
+        self._gear: Any = options.get('gear')
+        self._transducer: Any = options.get('transducer')
         self._own = own
         self._winds: dict[tuple[str, str], tuple[int, float]] = {}
 
@@ -134,10 +136,14 @@ class _Deltas:
             return None
         if path in _NUMBERS:
             channel, rank = _NUMBERS[path]
+        elif path == _BELOW and self._transducer is not None:
+            channel, rank = Channel.DEPTH, 1
         elif engine is not None and self._gear is not None:
             channel, rank = SHAFTS[_SHAFTS.get(engine[1].lower(), 0)], 0
         else:
             hint = '' if engine is None else ' (of the engine: --gear RATIO makes it the shaft)'
+            if path == _BELOW:
+                hint = ' (--transducer M makes it the depth)'
             self._tally.not_used[path + hint] += 1
             return None
         if not _is_number(value):
@@ -146,8 +152,10 @@ class _Deltas:
         number = float(value)
         if channel is Channel.WIND_APPARENT:
             return self._wind(path, number, stamp_ns, source)
-        if engine is not None and self._gear is not None:
+        if engine is not None:
             number = number * 2.0 * pi / self._gear
+        elif path == _BELOW:
+            number += self._transducer
         elif channel is Channel.HEADING:
             number = yaw(number)
         if path == 'navigation.headingMagnetic':
@@ -175,5 +183,5 @@ FORMAT = stream_format(
     about=__doc__,
     score=_score,
     read=_read,
-    options=(GEAR,),
+    options=(GEAR, TRANSDUCER),
 )

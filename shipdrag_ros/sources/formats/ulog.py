@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from shipdrag_ros.errors import ImportDataError, reason_of
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
-from shipdrag_ros.sources.format import CERTAIN, NO, Head, Job, missing_library
+from shipdrag_ros.sources.format import CERTAIN, NO, Job, missing_library
 from shipdrag_ros.sources.log import BASE_NS, UNDATED, Tally
 from shipdrag_ros.sources.stream import Origin, Reading, stream_format, yaw
 
@@ -27,10 +27,6 @@ _TOPICS = ['vehicle_gps_position', 'sensor_gps', 'vehicle_global_position', 'veh
 _TOPICS += ['esc_status']
 _GPS = _TOPICS[:2]
 _FIX = 3
-
-
-def _score(head: Head) -> float:
-    return CERTAIN if head.raw.startswith(_MAGIC) else NO
 
 
 def _read(job: Job, tally: Tally) -> Iterator[Reading]:
@@ -123,6 +119,6 @@ FORMAT = stream_format(
     name='ulog',
     kind='an ULog (PX4)',
     about=__doc__,
-    score=_score,
+    score=lambda head: CERTAIN if head.raw.startswith(_MAGIC) else NO,
     read=_read,
 )

@@ -280,8 +280,8 @@ def test_error_and_coverage(coast: Any, ship: Ship) -> None:
     quadratic drag. N = 60, seeds 0..59. N = 400 gives 0.72, 2.80, 0.69 % and 80, 71, 80 %;
     the bounds leave room for the scatter of 60.
     """
-    bounds = {'s1_speed': (1.0, 70), 's1_position': (3.6, 60), 's1_joint': (1.0, 70)}
-    for estimator, (rmse_bound, cover_bound) in bounds.items():
+    bounds = {'s1_speed': (1.0, 70, 90), 's1_position': (3.6, 60, 82), 's1_joint': (1.0, 70, 90)}
+    for estimator, (rmse_bound, low, high) in bounds.items():
         squares, covers = [], []
         for seed in range(60):
             cut = window(coast.block(500, seed=seed))
@@ -290,7 +290,7 @@ def test_error_and_coverage(coast: Any, ship: Ship) -> None:
             squares.append(np.mean(error**2) / coast.resistance(8.2, ship) ** 2)
             covers.append(np.mean(np.abs(error) <= 2.0 * curve.sigma_repeatable_m_s2))
         assert 100.0 * np.sqrt(np.mean(squares)) < rmse_bound
-        assert 100.0 * np.mean(covers) > cover_bound
+        assert low < 100.0 * np.mean(covers) < high
 
 
 @st.composite
