@@ -272,8 +272,8 @@ def step(bank: Bank, setting: BankSetting) -> float:
         # an engine may drive her astern
         astern = claimed and (rests or all_.row[i].regime == s.AMID)
         way = abs(advance) if astern else advance
-        predict(all_, i, setting, used, decay, way)
-        weigh(all_, i, setting, used, said, bank.first[0], bank.work)
+        slowing = predict(all_, i, setting, used, decay, way)
+        weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
         _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
     shown, before = thin(all_, setting), bank.out[P_STEADY]
     _sum_up(bank, setting)
