@@ -34,9 +34,9 @@ def speeds(*, count: int = 5, age_s: float = 0.0) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, stamps, 5.0 + 1e-3 * np.arange(count))
 
 
-def send(peer: Any, block: Block | None = None) -> None:
-    """Publish five readings of a speed log, or others, to a node that has found the topic."""
-    block = speeds() if block is None else block
+def send(peer: Any) -> None:
+    """Publish five readings of a speed log to a node that has found the topic."""
+    block = speeds()
     peer.player.connect(block)
     peer.player.publish(block)
 
@@ -257,15 +257,13 @@ def test_two_nodes_are_told_apart_and_silence_names_what_may_be_meant(
 def test_reports_sim_time_without_a_clock(start_node: Any, peer: Any, diagnostics: Any) -> None:
     start_node(use_sim_time=True)
     diagnostics.wait_for('state', 'no /clock')
-    block = speeds()
-    send(peer, block)
+    send(peer)
     diagnostics.wait_for('input speed_through_water', '5', value=UNUSED)
 
 
 def test_estimates_on_when_the_disk_does_not_take_it(start_node, peer, diagnostics):
     start_node(output_directory='/proc/nowhere')
-    block = speeds()
-    send(peer, block)
+    send(peer)
     diagnostics.wait_for('input speed_through_water', '5', value='used')
     diagnostics.wait_for('recording', '6', value='messages in memory only')
     assert diagnostics.wait_for('recording', 'recording failed').level == b'\x02'
