@@ -311,14 +311,19 @@ function showTraces() {
   const span = Number(el('span').value);
   if (!rows.length) { charts.speeds.clear(); charts.shafts.clear(); return; }
   drawSpeeds(charts.speeds, rows, span, units, zone, picture.forecast);
-  const last = rows[rows.length - 1];
+  // once the instruments are silent, the last second need not be one in which they were read
+  const lastRead = (quiet, ...columns) => (quiet && rows.findLast(row => columns.some(i => row[i] != null))) || rows[rows.length - 1];
+  const noSpeed = silent('speed through water', 'speed over ground');
+  const last = lastRead(noSpeed, 1, 2, 3);
   const said = [['log', 1], ['over ground', 2], ['estimate', 3]].filter(([, i]) => last[i] != null).map(([name, i]) => `${name} ${units.toSpeed(last[i]).toFixed(1)}`);
-  text('trace-say', said.length ? `${silent('speed through water', 'speed over ground') ? 'Last' : 'Now'}: ${said.join(', ')} ${units.speed}.` : 'Nothing was read in the last second.');
+  text('trace-say', said.length ? `${noSpeed ? 'Last' : 'Now'}: ${said.join(', ')} ${units.speed}.` : 'Nothing was read in the last second.');
   const turning = rows.some(row => row[4] != null);
   el('shafts').hidden = !turning;
   if (turning) {
     drawShafts(charts.shafts, rows, span, zone);
-    text('shaft-say', last[4] == null ? 'Not read in the last second.' : `${silent('shaft') ? 'Last' : 'Now'}: ${Math.round(last[4] * 60 / (2 * Math.PI)) || 0} rpm.`);
+    const noShaft = silent('shaft');
+    const speed_rad_s = lastRead(noShaft, 4)[4];
+    text('shaft-say', speed_rad_s == null ? 'Not read in the last second.' : `${noShaft ? 'Last' : 'Now'}: ${Math.round(speed_rad_s * 60 / (2 * Math.PI)) || 0} rpm.`);
   }
 }
 
