@@ -274,3 +274,4 @@ def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:
     ended = [event for event in events if isinstance(event, EndedCoastdown)]
     standing = [event.ended_by for event in ended if not event.withdrawn]
     assert standing[1:] == [EndedBy.TURN, EndedBy.RECORD_END]
+    assert ended[0].end_ns == START_NS + 600 * S  # where the second record is joined

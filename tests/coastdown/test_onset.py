@@ -324,6 +324,30 @@ def test_a_yacht_needs_no_parameters_of_her_own() -> None:
         assert after_s(ended.end_ns, 480.0) >= 150.0
 
 
+def test_what_slows_a_boat_quickly_is_no_power_reduced() -> None:
+    # 20 m, r with the square of the speed, and instruments that hardly err
+    boat = Ship(length_m=20.0, displaced_volume_m3=40.0)
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 1000.0)
+    after = np.maximum(time - 600.0, 0.0)
+    speed, way = 4.2 / (1.0 + 0.0147 * after), 4.2 * np.minimum(time, 600.0)
+    way += np.log1p(0.0147 * after) / 0.0035
+    stamps = START_NS + np.round(time * 1e9).astype(np.int64)
+    log, ground, along, across = rng.standard_normal((4, len(time)))
+    block = in_arrival_order(
+        [
+            Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed + 0.026 * log),
+            Block.of(Channel.SPEED_OVER_GROUND, stamps, speed + 0.026 * ground),
+            Block.of(Channel.POSITION, stamps, np.stack([way + along, across], axis=1)),
+        ]
+    )
+    monitor = Monitor(boat, Parameters(), estimate=refuse, final=refuse)
+    events = [*monitor.update(block), *monitor.finish()]
+    (ended,) = standing(events)
+    assert dismissed(events) == []
+    assert abs(after_s(ended.start_ns, 600.0)) <= 5.0
+
+
 def test_a_small_craft_with_short_windows() -> None:
     # 1.2 m, 20 Hz, coasting for 27 s: the record of a towing tank
     model = Ship.from_yaml(

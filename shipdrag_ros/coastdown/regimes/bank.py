@@ -13,6 +13,7 @@ from shipdrag_ros.coastdown.regimes import state as s
 from shipdrag_ros.coastdown.regimes.births import (
     amid,
     bear,
+    born,
     brakes,
     driven,
     glides,
@@ -85,6 +86,36 @@ class Bank(NamedTuple):
 
 
 @compiled(uncounted=True)
+def _start(bank: Bank, setting: BankSetting, j: int, speed: float, by_log: bool) -> None:
+    """Put a history where nothing is known but one speed: driven evenly, or not."""
+    all_, hull = bank.histories, setting.hull
+    x, p, f = all_.mean[j], all_.spread[j], all_.row[j]
+    x[:], p[:] = 0.0, 0.0
+    x[s.LN_U] = math.log(speed)
+    p[s.LN_U, s.LN_U] = 0.1**2 if by_log else 0.3**2
+    x[s.LN_A], p[s.LN_A, s.LN_A] = hull.level, hull.level_var
+    x[s.POWER], p[s.POWER, s.POWER] = hull.exponent, hull.exponent_var
+    x[s.WAY] = 0.5 * setting.step_s * speed
+    p[s.WAY, s.WAY] = bank.noise.used[s.N_FIX] ** 2
+    p[s.LAG, s.LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
+    p[s.LONGER, s.LONGER] = n.LOG_LAG_SD**2
+    p[s.CURRENT, s.CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
+    f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
+    f.p0, f.p_var = x[s.POWER], p[s.POWER, s.POWER]
+    f.revs = f.stays = f.stays_way = np.nan
+    driven(all_, j, hull)
+    if f.regime == s.AMID:
+        amid(all_, j, setting, 0 if setting.engine > 0.0 else 1)
+
+
+@compiled(uncounted=True)
+def _sailed(setting: BankSetting, speed: float) -> float:
+    """Return how likely a ship sails so, over the likeliest."""
+    off = (math.log(speed) - setting.hull.sails) / n.SAILS[1]
+    return math.exp(-0.5 * off * off)
+
+
+@compiled(uncounted=True)
 def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     """Give birth to the first histories: driven evenly, or not; any instrument may lie."""
     all_ = bank.histories
@@ -98,41 +129,46 @@ def _begin(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
             speed = max(rest_speed(hull), abs(speed))
         if not speed > 0.0:
             continue
-        off = (math.log(speed) - hull.sails) / n.SAILS[1]
         for regime in (s.DRIVEN, s.AMID):
             if claimed and regime == s.DRIVEN:  # nobody knows
                 continue
             chance = n.AMID[0] if regime == s.AMID else 1.0 - n.AMID[0]
             if liar > 0:
                 chance *= n.LIES_FIRST
-            chance *= math.exp(-0.5 * off * off)
             j = all_.used[0]
             all_.used[0] = j + 1
-            x, p, f = all_.mean[j], all_.spread[j], all_.row[j]
-            x[:], p[:], all_.words[j] = 0.0, 0.0, 0
-            x[s.LN_U] = math.log(speed)
-            p[s.LN_U, s.LN_U] = 0.1**2 if by_log else 0.3**2
-            x[s.LN_A], p[s.LN_A, s.LN_A] = hull.level, hull.level_var
-            x[s.POWER], p[s.POWER, s.POWER] = hull.exponent, hull.exponent_var
-            x[s.WAY] = 0.5 * setting.step_s * speed
-            p[s.WAY, s.WAY] = bank.noise.used[s.N_FIX] ** 2
-            p[s.LAG, s.LAG] = (n.LOG_LAG_S * setting.pace * setting.engine) ** 2
-            p[s.LONGER, s.LONGER] = n.LOG_LAG_SD**2
-            p[s.CURRENT, s.CURRENT] = n.CURRENT[0 if by_log else 1] ** 2
-            f.a0, f.a_var = x[s.LN_A], p[s.LN_A, s.LN_A]
-            f.p0, f.p_var = x[s.POWER], p[s.POWER, s.POWER]
-            f.weight = math.log(chance)
-            f.revs = f.stays = f.stays_way = np.nan
+            all_.words[j] = 0
+            f = all_.row[j]
+            f.weight = math.log(chance * _sailed(setting, speed))
             f.regime, f.liar = regime, liar
-            driven(all_, j, hull)
-            if regime == s.AMID:
-                amid(all_, j, setting, 0 if claimed else 1)
+            _start(bank, setting, j, speed, by_log)
             if claimed:
                 levels(all_, j, setting, -setting.step_s, float(len(n.ENGINE)))
                 if setting.told_s <= 0.0:
                     odds = len(n.ENGINE) * n.TOLD[0] / (1.0 - n.TOLD[0])
                     glides(all_, j, setting, -setting.step_s, (1.0 - n.BRAKED) * odds)
                     brakes(all_, j, setting, -setting.step_s, n.BRAKED * odds)
+
+
+@compiled(uncounted=True)
+def _joined(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
+    """Let the likeliest history end: another record follows, of which nothing is known."""
+    all_ = bank.histories
+    best = 0
+    while all_.row[best].behind < 0.0:
+        best += 1
+    by_log = log > 0.0 and all_.row[best].liar != s.THE_LOG
+    speed = log if by_log else track
+    if not speed > 0.0:
+        return
+    now_s = (all_.clock[0] - 1) * setting.step_s
+    chance = n.JOINED * setting.step_s / 3600.0 * _sailed(setting, speed)
+    for regime in (s.DRIVEN, s.AMID):
+        part = n.AMID[0] if regime == s.AMID else 1.0 - n.AMID[0]
+        j = born(all_, best, now_s, chance * part, regime, 1.0)
+        if j >= 0:
+            all_.row[j].kind, all_.row[j].glided = s.GOVERNED, 0
+            _start(bank, setting, j, speed, by_log)
 
 
 @compiled(uncounted=True)
@@ -252,8 +288,9 @@ def step(bank: Bank, setting: BankSetting) -> float:
     log, ground, way = said[s.LOG], said[s.GROUND], said[s.ADVANCE]
     by_log = not np.isnan(log)
     both = by_log and not (np.isnan(ground) and np.isnan(way))
+    track = way / setting.step_s if np.isnan(ground) else ground
     if all_.used[0] == 0:
-        _begin(bank, setting, log, way / setting.step_s if np.isnan(ground) else ground)
+        _begin(bank, setting, log, track)
         if all_.used[0] == 0:
             return 0.0
         thin(all_, setting)
@@ -264,6 +301,8 @@ def step(bank: Bank, setting: BankSetting) -> float:
     used = bank.noise.used
     if all_.clock[0] > 1:
         bear(all_, setting, both, not (np.isnan(said[s.RATE]) and np.isnan(said[s.RUDDER])))
+        if setting.engine == 0.0:
+            _joined(bank, setting, log, track)
     advance = 0.0 if np.isnan(way) else way
     claimed = setting.engine > 0.0
     decay = decay_of(setting, used)
@@ -272,8 +311,8 @@ def step(bank: Bank, setting: BankSetting) -> float:
         # an engine may drive her astern
         astern = claimed and (rests or all_.row[i].regime == s.AMID)
         way = abs(advance) if astern else advance
-        slowing = predict(all_, i, setting, used, decay, way)
-        weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
+        predict(all_, i, setting, used, decay, way)
+        weigh(all_, i, setting, used, said, bank.first[0], bank.work)
         _pushes_or_not(all_, i, setting, all_.clock[0] * setting.step_s)
     shown, before = thin(all_, setting), bank.out[P_STEADY]
     _sum_up(bank, setting)

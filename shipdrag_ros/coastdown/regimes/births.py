@@ -50,7 +50,7 @@ def switch(bank: Histories, i: int, now_s: float, regime: int, ramp_s: float) ->
 
 
 @compiled(uncounted=True)
-def _born(
+def born(
     bank: Histories,
     i: int,
     now_s: float,
@@ -58,7 +58,9 @@ def _born(
     regime: int,
     ramp_s: float,
 ) -> int:
-    """Copy a history that switches now; return its slot, or -1 where there is no room."""
+    """
+    Copy a history that switches now; return its slot, or -1 where there is no room.
+    """
     j = bank.used[0]
     # one that is not likelier would be dropped at once
     if j >= s.ROOM or not share > 0.0 or bank.row[i].behind + math.log(share) < -LOST:
@@ -113,7 +115,7 @@ def glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         for kind in range(len(n.DRAGGED) if setting.shafts > 0 else s.STUCK):
             part = chance * (1.0 if already else setting.hull.run_down[k]) * n.DRAGGED_SHARE[kind]
             share = part * n.ODD_SHARE[odd] if odds > 1 else part
-            j = _born(bank, i, now_s, share, s.GLIDE, ramp_s)
+            j = born(bank, i, now_s, share, s.GLIDE, ramp_s)
             if j < 0:
                 continue
             if idles:  # it is the same glide
@@ -159,7 +161,7 @@ def _is_let_go(bank: Histories, i: int, setting: BankSetting, now_s: float, chan
     for k in range(len(n.RUN_DOWN_S) if braked else 1):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace if braked else _NO_RAMP_S
         share = chance * setting.hull.run_down[k] if braked else chance
-        j = _born(bank, i, now_s, share, s.GLIDE, ramp_s)
+        j = born(bank, i, now_s, share, s.GLIDE, ramp_s)
         if j >= 0:
             bank.row[j].thrust = thrust
             free(bank, j, s.OPEN, ahead * f.wind, wind_var)
@@ -179,7 +181,7 @@ def _any_power(bank: Histories, i: int, setting: BankSetting, now_s: float, chan
     regime = bank.row[i].regime
     for kind in range(len(n.ENGINE)):
         if regime != s.AMID or bank.row[i].kind != kind:
-            j = _born(bank, i, now_s, chance / len(n.ENGINE), s.AMID, 1.0)
+            j = born(bank, i, now_s, chance / len(n.ENGINE), s.AMID, 1.0)
             if j >= 0:
                 if regime in (s.GLIDE, s.BRAKE, s.GLIDE_TURN):
                     _engages(bank, j)
@@ -192,7 +194,7 @@ def _fades(
 ) -> None:
     """Let the engine give evenly less: the rate is what is left open."""
     for k in range(len(n.FADES)):
-        j = _born(bank, i, now_s, chance / len(n.FADES), s.LEVEL, 600.0 * setting.pace)
+        j = born(bank, i, now_s, chance / len(n.FADES), s.LEVEL, 600.0 * setting.pace)
         if j >= 0:
             bank.row[j].kind = s.FADING
             bank.row[j].ramp_from, bank.row[j].revs = base, np.nan
@@ -203,7 +205,7 @@ def _fades(
 def _fade_ends(bank: Histories, i: int, now_s: float, chance: float) -> None:
     """Let an engine that gave less and less stay where it is."""
     target, by_open = balance(bank.mean[i], bank.row[i], now_s)
-    j = _born(bank, i, now_s, chance, s.LEVEL, 1.0)
+    j = born(bank, i, now_s, chance, s.LEVEL, 1.0)
     if j >= 0:
         bank.row[j].kind = s.GOVERNED
         before = bank.switched[j, bank.row[j].count - 2]
@@ -245,7 +247,7 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
         for m in range(kinds * ramps):
             share = chance * n.LEVELS_SHARE[k] / (kinds * ramps)
             ramp_s = (n.LEVEL_RAMP_S[m // kinds] if engaged else n.ENGAGE_S) * setting.pace
-            j = _born(bank, i, now_s, share, s.LEVEL, ramp_s)
+            j = born(bank, i, now_s, share, s.LEVEL, ramp_s)
             if j < 0:
                 continue
             bank.row[j].kind = m % kinds
@@ -288,7 +290,7 @@ def _keep_wind(bank: Histories, j: int) -> None:
 @compiled(uncounted=True)
 def _turns(bank: Histories, i: int, now_s: float, chance: float, regime: int) -> None:
     for k in range(len(n.TURNS)):
-        j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
+        j = born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
             if regime == s.TURN:
                 f, x, p = bank.row[j], bank.mean[i], bank.spread[i]
@@ -308,7 +310,7 @@ def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     """
     sizes = len(n.BRAKES) + (len(n.STOPPERS) if setting.engine > 0.0 else 0)
     for k in range(sizes):
-        j = _born(bank, i, now_s, chance / sizes, s.BRAKE, 1.0)
+        j = born(bank, i, now_s, chance / sizes, s.BRAKE, 1.0)
         if j >= 0:
             if bank.row[i].regime != s.GLIDE:
                 _glide(bank, j, setting)
@@ -325,7 +327,7 @@ def brakes(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
 @compiled(uncounted=True)
 def _back(bank: Histories, i: int, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
-    j = _born(bank, i, now_s, chance, s.LEVEL, 1.0)
+    j = born(bank, i, now_s, chance, s.LEVEL, 1.0)
     if j >= 0:
         before = bank.row[i].before
         bank.row[j].ramp_from, bank.row[j].revs = before, np.nan
@@ -336,7 +338,7 @@ def _back(bank: Histories, i: int, now_s: float, chance: float) -> None:
 @compiled(uncounted=True)
 def _settles(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """End the manoeuvre that the record began in: she is in balance."""
-    j = _born(bank, i, now_s, chance, s.DRIVEN, 1.0)
+    j = born(bank, i, now_s, chance, s.DRIVEN, 1.0)
     if j >= 0:
         bank.row[j].count = 0
         driven(bank, j, setting.hull)

@@ -132,13 +132,14 @@ def pushes(bank: Histories, i: int, now_s: float) -> bool:
 
 @compiled(inline=True, uncounted=True)
 def _force(
-    free: float, x: Float64, f: np.record, now_s: float, law: float, slope: float
+    x: Float64, f: np.record, now_s: float, law: float, slope: float
 ) -> tuple[float, float, float, float, float]:
     """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
     regime, a = f.regime, math.exp(min(max(law + x[s.LN_A], -20.0), 5.0))
     left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
     if regime in (s.DRIVEN, s.LEVEL, s.TURN):
         target, share = balance(x, f, now_s)
+        free = f.free if regime == s.LEVEL and f.kind == s.TORQUE else 0.0
         rho, by_target = _advance(math.exp(min(target - x[s.LN_U], 1.0)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
@@ -185,18 +186,17 @@ def decay_of(setting: BankSetting, noise: Float64) -> Decay:
 @compiled(uncounted=True)
 def predict(
     bank: Histories, i: int, setting: BankSetting, noise: Float64, decay: Decay, advance: float
-) -> float:
+) -> None:
     """
-    Carry a history to the end of the bin; return its acceleration there [m/s^2].
+    Carry a history to the end of the bin.
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.row[i]
     regime = f.regime
     fades = is_fade(f)
-    free = f.free if regime == s.LEVEL and f.kind == s.TORQUE else 0.0
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b, keep_e, keep_f = decay
-    slowing = mean_u = mean_lag = 0.0
+    mean_u = mean_lag = 0.0
     u = math.exp(x[s.LN_U])
     if regime == s.DRIVEN:  # waves stay as they were learnt until that is forgotten
         law = hull_law(setting.hull, x[s.LN_U])[0]
@@ -204,7 +204,7 @@ def predict(
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[s.LN_U])
-        net, by_u, by_a, by_open, a = _force(free, x, f, now_s, law, slope)
+        net, by_u, by_a, by_open, a = _force(x, f, now_s, law, slope)
         change = min(max(dt * net / u, -0.5), 0.5)
         l_l = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
         l_a, l_o, l_g = dt * by_a / u, dt * by_open / u, dt / u
@@ -266,10 +266,8 @@ def predict(
         x[s.GUST] *= keep_g
         x[s.WANDER] *= keep_b
         x[s.EDDY] *= keep_e
-        slowing = net
     x[s.WAY] -= advance
     f.mean_u, f.mean_lag = mean_u - u, mean_lag - x[s.LAG]
-    return slowing
 
 
 @compiled(inline=True, uncounted=True)
@@ -620,7 +618,7 @@ def _by_shafts(
 
 @compiled(uncounted=True)
 def weigh(
-    bank: Histories, i: int, setting: BankSetting, noise: Float64, said: Float64, slowing: float,
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, said: Float64,
     log_first: float, work: Float64,
 ) -> None:  # fmt: skip
     """
@@ -655,10 +653,16 @@ def weigh(
             h[s.WANDER], h[s.LAG] = 1.0, longer
             h[s.LONGER] = longer * lags if x[s.LONGER] < _LONGEST else 0.0
             expected += x[s.WANDER] + longer * lags
-        else:
+        else:  # of half a bin before, and some more by its filter
+            lag_s = setting.pace * _GROUND_LAG_S
+            law, slope = hull_law(setting.hull, x[s.LN_U])
+            net, by_u, by_a, by_open, _ = _force(x, f, bank.clock[0] * setting.step_s, law, slope)
+            since_s = 0.5 * setting.step_s + lag_s
+            h[s.LN_U], h[s.LN_A] = u - since_s * by_u, -since_s * by_a
+            h[s.OPEN], h[s.GUST] = -since_s * by_open, -since_s
             h[s.CURRENT] = h[s.EDDY] = 1.0
-            expected += x[s.CURRENT] + x[s.EDDY] - setting.pace * _GROUND_LAG_S * slowing
-            sd = noise[s.N_GROUND]
+            expected += x[s.CURRENT] + x[s.EDDY] - lag_s * net
+            sd = math.hypot(noise[s.N_GROUND], n.LOG_LAG_SD * lag_s * net)
         if claimed:
             sd = math.hypot(sd, _at_rest(setting, u))
         shown, excess = _take(x, p, h, work, value - expected, sd * sd, bad, setting.hull)

@@ -131,6 +131,7 @@ WIDE = _grid('WIDE', (0.05, 3.0), '1', 'share of readings that scatter more, and
 LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
 SHAFT_DIES = _number('SHAFT_DIES', 0.01, '1/h', 'the same of the sensor of a shaft')
 LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
+JOINED = _number('JOINED', 0.001, '1/h', 'another record follows, and nobody says so')
 STUCK = _number('STUCK', 0.5, '1', 'share of what is not true that stays where it was')
 AMID = _grid(
     'AMID',
