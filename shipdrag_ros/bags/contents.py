@@ -338,8 +338,7 @@ def _with_message(
     follows = last is not None and last.chunk_start_offset + last.chunk_length == place.offset
     if last is None or not follows or last.chunk_length >= _SEGMENT_BYTES:
         last = summary.add_indexed(mcap.Chunk('', b'', log_ns, log_ns, 0, 0), place.offset, 0)
-    last.chunk_length += place.end - place.offset
-    last.uncompressed_size = last.chunk_length
+    last.uncompressed_size = last.chunk_length = place.end - last.chunk_start_offset
     last.message_start_time = min(last.message_start_time, log_ns)
     last.message_end_time = max(last.message_end_time, log_ns)
     return last

@@ -123,11 +123,9 @@ class LiveFile(BagWriter):
         """
         Say whether the name is still that of this file.
         """
-        try:
-            there = self.path.stat()
-        except FileNotFoundError:
-            return False
-        return os.path.samestat(os.fstat(self._file.fileno()), there)
+        with suppress(FileNotFoundError):
+            return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
+        return False
 
     def vanished(self) -> bool:
         """

@@ -260,13 +260,6 @@ def is_bag_folder(names: Collection[str]) -> bool:
     return any(name == METADATA or name.endswith(('.db3', '.db3.zstd')) for name in names)
 
 
-def names_in(folder: Path) -> list[str]:
-    """
-    Return the names of what is in a folder.
-    """
-    return [each.name for each in folder.iterdir()]
-
-
 PART = re.compile(r'_\d{3,}(_\d+)?(?=\.mcap)')
 """In the name of a file of a recording of the node."""
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import shutil
 import sys
 from collections import Counter
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import zstandard
 
-from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate, names_in
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.recover import recover
@@ -210,7 +211,7 @@ class Run:
         first = self.paths[0]
         if not first.is_file():
             return ()
-        if not is_bag_folder(names_in(first.parent)):
+        if not is_bag_folder(os.listdir(first.parent)):
             return (first.parent,)
         bag = first.parent if first.parent.name.strip('.') else first.parent.resolve()
         return bag, bag.parent
