@@ -120,7 +120,7 @@ class FileSummary:
                     (record.name, record.media_type),
                 )
                 index = mcap.AttachmentIndex(at, length, *times, len(record.data), *about)
-        self.records[key_of(index)] = index
+        self.records[type(index), at] = index
         return index
 
     def count(self, counts: Mapping[int, int], first_ns: int, last_ns: int) -> None:

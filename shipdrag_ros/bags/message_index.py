@@ -165,7 +165,7 @@ def index_messages(
     others = np.empty(len(data) // HEAD_BYTES + 1, np.int64)
     damage = np.empty((len(segments), 3), np.int64)
     # the eight bytes from each place on as a number
-    words = np.ndarray(max(len(data) - 7, 0), np.int64, data.data, strides=1)
+    words = np.ndarray((max(len(data) - 7, 0),), _WORD, data, 0, (1,))
     places, bounds = np.array(offsets, np.int64), _bounds(segments)
     n, m, damaged = _index(data, words, bounds, places, wanted, others, damage, *found.columns)
     notes = [
@@ -178,6 +178,7 @@ def index_messages(
 
 _GIVEN = 'Array({}, 1, "C", readonly=True)'
 OCTETS, PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
+_WORD = np.dtype('<i8')
 _WORDS = 'Array(i8, 1, "A", readonly=True, aligned=False)'
 
 

@@ -138,12 +138,13 @@ IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 
 # fields of each kind: numbers of bytes, and texts led by their length in 4 or 8 bytes
 _SHORT, _LONG = -4, -8
+_TO_END = (MESSAGE_HEAD.size,)  # then a payload, to the end of the record
 _FIELDS: dict[int, tuple[int, ...]] = {
     Opcode.HEADER: (_SHORT, _SHORT),
     Opcode.FOOTER: (20,),
     Opcode.SCHEMA: (2, _SHORT, _SHORT, _SHORT),
     Opcode.CHANNEL: (4, _SHORT, _SHORT, _SHORT),
-    Opcode.MESSAGE: (MESSAGE_HEAD.size,),
+    Opcode.MESSAGE: _TO_END,
     Opcode.CHUNK: (28, _SHORT, _LONG),
     Opcode.MESSAGE_INDEX: (2, _SHORT),
     Opcode.CHUNK_INDEX: (32, _SHORT, 8, _SHORT, 16),
@@ -314,10 +315,10 @@ def _whole(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place | No
 
 def _fields_end(data: Buffer, opcode: int, start: int, limit: int) -> int | None:
     """Return where the fields of a record end by themselves; None if that cannot be read."""
-    if opcode == Opcode.MESSAGE:  # whose payload goes to the end
+    at, fields = start, _FIELDS[opcode]
+    if fields is _TO_END:
         return max(start + MESSAGE_HEAD.size, limit)
-    at = start
-    for size in _FIELDS[opcode]:
+    for size in fields:
         if size > 0:
             at += size
         elif at - size > limit:

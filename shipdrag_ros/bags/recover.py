@@ -371,24 +371,24 @@ class _Salvage:
     def _message(self, content: bytes, offset: int, bag: _Salvaged) -> None:
         head = records.MESSAGE_HEAD
         channel, _, log_ns, _ = head.unpack_from(content)
-        lost = (
-            DamageKind.CONTENT if log_ns >= records.TIME_LIMIT_NS else None
-        )  # no reader takes it
-        text = f'log time {log_ns}'
-        if lost is None and (Channel, channel) not in self._declared.records:
+        if log_ns >= records.TIME_LIMIT_NS:  # no reader takes it
+            self._lose(content, offset, DamageKind.CONTENT, f'log time {log_ns}')
+            return
+        if (Channel, channel) not in self._declared.records:
             bag = self.doubtful
             if channel not in bag.numbers:  # said once; a thousand messages may be of it
                 self.damages.add(offset, 'message', DamageKind.REFERENCE, f'channel {channel}')
-        if lost is None and self._bag.message_compression:
+        if self._bag.message_compression:
             try:
                 payload = records.unpack_zstd(content[head.size :], records.CHUNK_LIMIT_BYTES)
-                content = content[: head.size] + payload
             except (zstandard.ZstdError, ValueError, MemoryError):
-                lost, text = DamageKind.COMPRESSION, ''
-        if lost is not None:
-            self.damages.add(offset, 'message', lost, text)
-            self.bytes_lost += records.HEAD.size + len(content)
-            return
+                self._lose(content, offset, DamageKind.COMPRESSION)
+                return
+            content = content[: head.size] + payload
         number = bag.numbers.get(channel) or bag.number(channel, self._declared)
         bag.writer.add_content(number, content, log_ns=log_ns)
         bag.messages += 1
+
+    def _lose(self, content: bytes, offset: int, why: DamageKind, detail: str = '') -> None:
+        self.damages.add(offset, 'message', why, detail)
+        self.bytes_lost += records.HEAD.size + len(content)
