@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,28 +18,14 @@ import numpy as np
 from mcap import records as mcap
 from mcap.opcode import Opcode
 
+from shipdrag_ros.bags import records
 from shipdrag_ros.bags.contents import DECLARED, INDEXES, FileSummary, key_of
 from shipdrag_ros.bags.mcap_file import locate, not_mcap
-from shipdrag_ros.bags.records import (
-    MAGIC,
-    MESSAGE_HEAD,
-    Buffer,
-    Damage,
-    DamageKind,
-    DamageList,
-    OpenChunk,
-    Place,
-    checksum,
-    scan,
-)
+from shipdrag_ros.bags.records import MAGIC, Buffer, Damage, DamageKind, DamageList, OpenChunk
 from shipdrag_ros.bags.recover import opened
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Int64
-
-_NO_ENTRIES = np.empty((0, 2), np.int64)
-# of which the summary says all
-_LISTED = (*DECLARED, *INDEXES, mcap.Statistics)
 
 
 @dataclass(frozen=True)
@@ -124,11 +109,11 @@ class _Facts:
         self._damages = damages
         self._add = damages.add
         self._expected = FileSummary()
-        self._summary: list[tuple[Place, Any]] = []
+        self._summary: list[tuple[records.Place, Any]] = []
         self._ended = 0
         self._chunk: mcap.ChunkIndex | None = None  # whose message indexes may follow
         self._entries: dict[int, Int64] = {}  # of it: log times [ns] and offsets, by channel
-        self._said: set[str] = set()
+        self._said: set[object] = set()
 
     @property
     def messages(self) -> int:
@@ -140,9 +125,9 @@ class _Facts:
         data, begin = self._data, len(MAGIC)
         if data[:begin] == MAGIC and data[begin : begin + 1] != bytes([Opcode.HEADER]):
             self._add(begin, 'header', DamageKind.MISSING)
-        if data[-len(MAGIC) :] != MAGIC:
+        if data[-begin:] != MAGIC:
             self._add(len(data), 'magic', DamageKind.MISSING, 'not closed, or cut off')
-        for place, item, _ in scan(data, self._damages):
+        for place, item, _ in records.scan(data, self._damages):
             if place.opcode != Opcode.MESSAGE_INDEX:
                 self._close_chunk()
             if not place.readable:
@@ -152,7 +137,7 @@ class _Facts:
                 progress(place.offset, len(data))
                 self._open_chunk(item)
             elif place.opcode == Opcode.MESSAGE:
-                channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
+                channel, _, log_ns, _ = records.MESSAGE_HEAD.unpack_from(data, place.start)
                 self._count({channel: 1}, place.offset, (log_ns, log_ns))
             elif place.opcode == Opcode.MESSAGE_INDEX:
                 self._message_index(place)
@@ -160,7 +145,7 @@ class _Facts:
                 self._item(item, place, place.offset)
         self._close_chunk()
 
-    def _item(self, item: Any, place: Place, offset: int) -> None:
+    def _item(self, item: Any, place: records.Place, offset: int) -> None:
         """Take note of a record, in a file or in a chunk that lies at the offset."""
         match item:
             case mcap.Schema() | mcap.Channel() if not self._ended:
@@ -171,12 +156,12 @@ class _Facts:
             case mcap.Attachment() | mcap.Metadata():
                 self._expected.add_indexed(item, *place.span)
             case mcap.DataEnd():
-                self._once(place, place.name)
+                self._once(place)
                 self._ended = self._ended or place.end
-                if item.data_section_crc not in (0, checksum(self._data, 0, offset)):
+                if not records.agrees(self._data, 0, offset, item.data_section_crc):
                     self._add(offset, place.name, DamageKind.CHECKSUM)
             case mcap.Header():
-                self._once(place, place.name)
+                self._once(place)
             case None:
                 pass
             case _:
@@ -189,16 +174,16 @@ class _Facts:
 
     def _refers(self, offset: int, record: str, kind: type, number: int) -> None:
         """Say once what is not there; a thousand messages may refer to it."""
-        if (kind, number) not in self._expected.records:
-            target = f'{kind.__name__.lower()} {number}'
-            if target not in self._said:
-                self._said.add(target)
-                self._add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
+        key = kind, number
+        if key not in self._expected.records and key not in self._said:
+            self._said.add(key)
+            text = f'{kind.__name__.lower()} {number} is not declared'
+            self._add(offset, record, DamageKind.REFERENCE, text)
 
-    def _once(self, place: Place, key: object) -> None:
-        if f'{place.name} {key}' in self._said:
+    def _once(self, place: records.Place, key: object = None) -> None:
+        if (place.name, key) in self._said:
             self._add(place.offset, place.name, DamageKind.DUPLICATE)
-        self._said.add(f'{place.name} {key}')
+        self._said.add((place.name, key))
 
     def _open_chunk(self, chunk: OpenChunk) -> None:
         offset = chunk.place.offset
@@ -208,59 +193,60 @@ class _Facts:
             return
         for place, item, _ in chunk.scan(self._damages, sound=True):
             self._item(item, place, offset)
-        self._entries = chunk.entries()
-        times_ns = chunk.times_ns
+        self._entries, times_ns = chunk.entries(), chunk.times_ns
         if times_ns is not None:
             self._count({it: len(each) for it, each in self._entries.items()}, offset, times_ns)
         if chunk.chunk is None or chunk.place.damage is not None:
             return
         if not chunk.ended:
             self._add(offset, 'chunk', DamageKind.COMPRESSION)
+        self._chunk = self._expected.add_indexed(chunk.chunk, *chunk.place.span)
         stated = chunk.chunk.message_start_time, chunk.chunk.message_end_time
         if times_ns not in (None, stated):
             text = f'times {stated}, in it are {times_ns}'
             self._add(offset, 'chunk', DamageKind.DISAGREES, text)
-        self._chunk = self._expected.add_chunk(chunk.chunk, *chunk.place.span)
 
-    def _message_index(self, place: Place) -> None:
+    def _message_index(self, place: records.Place) -> None:
         if self._chunk is None:
             return
-        channel = int.from_bytes(self._data[place.start : place.start + 2], 'little')
-        listed = np.frombuffer(self._data[place.start + 6 : place.end], np.uint8)
+        channel, offset = (
+            int.from_bytes(self._data[place.start : place.start + 2], 'little'),
+            place.offset,
+        )
         if channel in self._chunk.message_index_offsets:
-            self._add(place.offset, 'message_index', DamageKind.DUPLICATE)
-        self._chunk.message_index_offsets[channel] = place.offset
-        self._chunk.message_index_length += place.end - place.offset
-        actual = self._entries.get(channel, _NO_ENTRIES)
-        stated = listed[: len(listed) // 16 * 16].view(np.int64).reshape(-1, 2)
-        if not np.array_equal(_sorted(stated), _sorted(actual)):
-            text = f'channel {channel}'
-            self._add(place.offset, 'message_index', DamageKind.MISPLACED, text)
+            self._add(offset, place.name, DamageKind.DUPLICATE)
+        self._chunk.message_index_offsets[channel] = offset
+        self._chunk.message_index_length += place.end - offset
+        listed = self._data[place.start + 6 : place.end]
+        stated = np.frombuffer(listed, np.int64, len(listed) // 16 * 2).reshape(-1, 2)
+        actual = self._entries.get(channel, stated[:0])
+        one, other = (each[np.lexsort(each.T)] for each in (stated, actual))
+        if not np.array_equal(one, other):
+            self._add(offset, place.name, DamageKind.MISPLACED, f'channel {channel}')
 
     def _close_chunk(self) -> None:
         chunk, self._chunk = self._chunk, None
-        if chunk is None or not chunk.message_index_offsets:
-            return
-        missing = sorted(set(self._entries) - set(chunk.message_index_offsets))
-        if missing:
-            text = f'channels {missing}'
-            offset = chunk.chunk_start_offset + chunk.chunk_length
-            self._add(offset, 'message_index', DamageKind.MISSING, text)
+        if chunk is not None and chunk.message_index_offsets:
+            missing = sorted(set(self._entries) - set(chunk.message_index_offsets))
+            if missing:
+                offset = chunk.chunk_start_offset + chunk.chunk_length
+                text = f'channels {missing}'
+                self._add(offset, 'message_index', DamageKind.MISSING, text)
 
     def compare(self) -> None:
         """Compare the summary with what is there."""
-        add = self._add
+        add, expected, end = self._add, self._expected, len(self._data)
         if not self._ended:
-            add(len(self._data), 'data_end', DamageKind.MISSING)
+            add(end, 'data_end', DamageKind.MISSING)
         footers = [(place, it) for place, it in self._summary if isinstance(it, mcap.Footer)]
         if not footers:
-            add(len(self._data), 'footer', DamageKind.MISSING)
+            add(end, 'footer', DamageKind.MISSING)
             return
         (place, footer), start = footers[0], footers[0][1].summary_start
         if start == 0:
             add(place.offset, 'summary', DamageKind.MISSING)
             return
-        if footer.summary_crc not in (0, checksum(self._data, start, place.end - 4)):
+        if not records.agrees(self._data, start, place.end - 4, footer.summary_crc):
             add(place.offset, 'summary', DamageKind.CHECKSUM)
         if start != self._ended:
             text = f'it begins at {self._ended}, not {start}'
@@ -270,53 +256,43 @@ class _Facts:
         for place, record in self._summary:
             self._once(place, key_of(record)[1])
             self._compare(place, record)
-        kinds = {kind for kind, _ in stated}
-        for kind in _LISTED:
-            if kind in DECLARED and kind not in kinds:
-                continue  # none at all is a choice of the writer
-            here = {key for key in self._expected.records.keys() - stated if key[0] is kind}
-            for _, key in sorted(here, key=itemgetter(1)):
+        kinds = {kind for kind, _ in stated}  # no declaration at all is a choice of the writer
+        for kind in (*(it for it in DECLARED if it in kinds), *INDEXES, mcap.Statistics):
+            for key in sorted(at for it, at in expected.records.keys() - stated if it is kind):
                 text = '' if kind is mcap.Statistics else f'of {key}'
-                at = self._ended if kind in (*DECLARED, mcap.Statistics) else key
-                add(at, _name(kind), DamageKind.MISSING, text)
+                add(key if kind in INDEXES else self._ended, _name(kind), DamageKind.MISSING, text)
 
     def _expect_totals(self) -> None:
         """Expect what the summary says of all records, and of itself."""
-        for _, record in self._summary:
+        begin: dict[int, int] = {}
+        for place, record in self._summary:
             if isinstance(record, DECLARED):  # a topic without messages may be declared here alone
                 self._expected.add(record)
-        self._expected.add(self._expected.statistics())
-        begin: dict[int, int] = {}
-        for place, _ in self._summary:
             first = begin.setdefault(place.opcode, place.offset)
             offset = mcap.SummaryOffset(place.opcode, first, place.end - first)
             self._expected.records[key_of(offset)] = offset
+        self._expected.add(self._expected.statistics())
 
-    def _compare(self, place: Place, stated: Any) -> None:
-        if isinstance(stated, mcap.Footer):
-            return
+    def _compare(self, place: records.Place, stated: Any) -> None:
         key = key_of(stated)
         actual = self._expected.records.get(key, ())
-        kind, text = DamageKind.DISAGREES, f'{stated}, in the data {actual}'
-        if isinstance(stated, mcap.Statistics):
-            counts = {number: n for number, n in stated.channel_message_counts.items() if n}
-            stated = replace(
-                stated, channel_message_counts=counts or actual.channel_message_counts
-            )
-            text = f'{stated}, in the data {actual}'
-        elif isinstance(stated, mcap.SummaryOffset):
-            kind, text = DamageKind.MISPLACED, ''
-            actual = actual if stated.group_length else None
-        elif actual == ():
-            kind, text = DamageKind.MISPLACED, f'nothing of that kind is at byte {key[1]}'
+        kind, text = DamageKind.DISAGREES, '{}, in the data {}'
+        match stated:
+            case mcap.Footer():
+                return
+            case mcap.Statistics():
+                counts = {number: n for number, n in stated.channel_message_counts.items() if n}
+                counts = counts or actual.channel_message_counts
+                stated = replace(stated, channel_message_counts=counts)
+            case mcap.SummaryOffset():
+                kind, text = DamageKind.MISPLACED, ''
+                actual = actual if stated.group_length else None
+            case _ if actual == ():
+                kind, text = DamageKind.MISPLACED, f'nothing of that kind is at byte {key[1]}'
         if actual not in (None, stated):  # of a damaged chunk nothing is known
-            self._add(place.offset, place.name, kind, text)
+            self._add(place.offset, place.name, kind, text.format(stated, actual))
 
 
 def _name(kind: type) -> str:
     """Return the name of a kind of records, as in the specification."""
     return re.sub('(?<!^)(?=[A-Z])', '_', kind.__name__).lower()
-
-
-def _sorted(entries: Int64) -> Int64:
-    return entries[np.lexsort(entries.T)]

@@ -18,28 +18,8 @@ from mcap import records as mcap
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 
-from shipdrag_ros.bags.records import (
-    HEAD,
-    MAGIC,
-    MESSAGE_HEAD,
-    READ_ERRORS,
-    TIME_LIMIT_NS,
-    Buffer,
-    Damage,
-    DamageKind,
-    DamageList,
-    OpenChunk,
-    Place,
-    attachment_agrees,
-    footer_of,
-    place_at,
-    read,
-    release,
-    scan,
-    summary_agrees,
-    unpack,
-    walk,
-)
+from shipdrag_ros.bags import records
+from shipdrag_ros.bags.records import MAGIC, Buffer, Damage, DamageKind, DamageList, OpenChunk
 
 _SEGMENT_BYTES = 1 << 20
 _NOT_USED = 'read from its beginning, without an index'
@@ -49,7 +29,12 @@ RECORDING = 'shipdrag_ros'
 """Name of the metadata record that says which recording a file is part of."""
 
 DECLARED = (mcap.Schema, mcap.Channel)
-INDEXES = (mcap.ChunkIndex, mcap.AttachmentIndex, mcap.MetadataIndex)
+INDEXES = {
+    mcap.ChunkIndex: Opcode.CHUNK,
+    mcap.AttachmentIndex: Opcode.ATTACHMENT,
+    mcap.MetadataIndex: Opcode.METADATA,
+}
+"""What each index is about."""
 
 
 def key_of(record: Any) -> tuple[type, int]:
@@ -108,32 +93,34 @@ class FileSummary:
             self._verified.add(key)
         return better or before == record
 
-    def add_indexed(self, record: mcap.Attachment | mcap.Metadata, at: int, length: int) -> None:
+    def add_indexed(self, record: Any, at: int, length: int) -> Any:
         """
-        Take note of a record at a place [bytes].
-        """
-        if isinstance(record, mcap.Metadata):
-            self.add(mcap.MetadataIndex(at, length, record.name))
-            return
-        times, about = (record.log_time, record.create_time), (record.name, record.media_type)
-        self.add(mcap.AttachmentIndex(at, length, *times, len(record.data), *about))
+        Take note of a chunk, an attachment or metadata at a place [bytes]; return its index.
 
-    def add_chunk(self, chunk: mcap.Chunk, at: int, length: int) -> mcap.ChunkIndex:
+        That of a chunk is without its message indexes.
         """
-        Take note of a chunk at a place [bytes]; return its index, but for its message indexes.
-        """
-        index = mcap.ChunkIndex(
-            chunk_length=length,
-            chunk_start_offset=at,
-            compression=chunk.compression,
-            compressed_size=len(chunk.data),
-            message_end_time=chunk.message_end_time,
-            message_index_length=0,
-            message_index_offsets={},
-            message_start_time=chunk.message_start_time,
-            uncompressed_size=chunk.uncompressed_size,
-        )
-        self.records[mcap.ChunkIndex, at] = index
+        match record:
+            case mcap.Chunk():
+                index: Any = mcap.ChunkIndex(
+                    chunk_length=length,
+                    chunk_start_offset=at,
+                    compression=record.compression,
+                    compressed_size=len(record.data),
+                    message_end_time=record.message_end_time,
+                    message_index_length=0,
+                    message_index_offsets={},
+                    message_start_time=record.message_start_time,
+                    uncompressed_size=record.uncompressed_size,
+                )
+            case mcap.Metadata():
+                index = mcap.MetadataIndex(at, length, record.name)
+            case _:
+                times, about = (
+                    (record.log_time, record.create_time),
+                    (record.name, record.media_type),
+                )
+                index = mcap.AttachmentIndex(at, length, *times, len(record.data), *about)
+        self.records[type(index), at] = index
         return index
 
     def count(self, counts: Mapping[int, int], first_ns: int, last_ns: int) -> None:
@@ -225,7 +212,7 @@ def contents_of(data: Buffer) -> Contents:
         other = '' if each.message_encoding == 'cdr' else f' ({each.message_encoding})'
         found.channels[each.id] = topic, names.get(each.schema_id, '') + other
     for each in summary.of(mcap.AttachmentIndex, mcap.MetadataIndex):
-        match read(data, place_at(data, each.offset)):
+        match records.read(data, records.place_at(data, each.offset)):
             case mcap.Attachment() as it:
                 found.attachments[it.name] = it.data
             case mcap.Metadata() as it:
@@ -239,12 +226,12 @@ def _stated(data: Buffer) -> FileSummary | None:
     """Return what the summary says; None where it does not say all, as the format allows."""
     if data[-len(MAGIC) :] != MAGIC or len(data) < 2 * len(MAGIC):
         raise _BadIndexError('the file was not closed, or it is cut off')
-    footer = footer_of(data)
+    footer = records.footer_of(data)
     if footer is None:
         raise _BadIndexError('the footer is damaged')
     if footer.summary_start == 0:
         return None
-    if not summary_agrees(data, footer):
+    if not records.summary_agrees(data, footer):
         raise _BadIndexError('the index has a wrong checksum')
     summary = FileSummary()
     stream = BytesIO(data[footer.summary_start :])
@@ -252,49 +239,39 @@ def _stated(data: Buffer) -> FileSummary | None:
         for record in StreamReader(stream, skip_magic=True, emit_chunks=True).records:
             if not summary.add(record) and isinstance(record, (*DECLARED, *INDEXES)):
                 raise _misplaced(key_of(record)[1])
-    except READ_ERRORS as error:
+    except records.READ_ERRORS as error:
         raise _BadIndexError(f'the index is damaged ({error})') from error
-    for statistics in summary.of(mcap.Statistics):
-        summary.counts.update(statistics.channel_message_counts)
-        if not _says_all(summary, statistics):
+    for stated in summary.of(mcap.Statistics):
+        summary.counts.update(stated.channel_message_counts)
+        listed = summary.statistics()
+        counted = (name for name in vars(stated) if name.endswith('_count') and name != _MESSAGES)
+        # messages outside chunks have no index
+        if stated.message_count and not stated.chunk_count:
+            return None
+        if any(getattr(listed, name) != getattr(stated, name) for name in counted):
             return None
         _follow(data, summary)
         return summary
     return None
 
 
-def _says_all(summary: FileSummary, stated: mcap.Statistics) -> bool:
-    """Say whether everything that the statistics count is indexed."""
-    # messages outside chunks have no index
-    unchunked = stated.chunk_count == 0 and stated.message_count > 0
-    listed = summary.statistics()
-    fields = 'schema_count', 'channel_count', 'chunk_count', 'attachment_count', 'metadata_count'
-    return not unchunked and all(getattr(listed, it) == getattr(stated, it) for it in fields)
+_MESSAGES = 'message_count'
 
 
 def _follow(data: Buffer, summary: FileSummary) -> None:
     """Look whether everything is where the index says, nothing in another."""
-    chunks = summary.of(mcap.ChunkIndex)
-    listed = [(it.chunk_start_offset, it.chunk_length, Opcode.CHUNK) for it in chunks]
-    for kind, opcode in _INDEXED.items():
-        listed += [(it.offset, it.length, opcode) for it in summary.of(kind)]
     end = 0
-    for offset, length, opcode in sorted(listed):
-        place = next(walk(data, offset, len(data)), None)
+    for it in sorted(summary.of(*INDEXES), key=lambda index: key_of(index)[1]):
+        offset, last_ns, length = key_of(it)[1], 0, getattr(it, 'length', 0)
+        if isinstance(it, mcap.ChunkIndex):
+            last_ns, length = max(it.message_start_time, it.message_end_time), it.chunk_length
+        place = next(records.walk(data, offset, len(data)), None)
         begin, end = end, offset + length
-        if offset < begin or place != Place(opcode, offset, offset + HEAD.size, end):
+        expected = records.Place(INDEXES[type(it)], offset, offset + records.HEAD.size, end)
+        if offset < begin or place != expected or last_ns >= records.TIME_LIMIT_NS:
             raise _misplaced(offset)
-        if opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
+        if place.opcode == Opcode.ATTACHMENT and not records.attachment_agrees(data, place):
             raise _BadIndexError(f'the attachment at byte {offset} has a wrong checksum')
-    for it in chunks:
-        if max(it.message_start_time, it.message_end_time) >= TIME_LIMIT_NS:
-            raise _misplaced(it.chunk_start_offset)
-
-
-_INDEXED = {
-    mcap.AttachmentIndex: Opcode.ATTACHMENT,
-    mcap.MetadataIndex: Opcode.METADATA,
-}
 
 
 def _misplaced(offset: int) -> _BadIndexError:
@@ -306,7 +283,7 @@ def _walked(data: Buffer, warnings: list[str]) -> FileSummary:
     summary, damages = FileSummary(), DamageList()
     loose: mcap.ChunkIndex | None = None
     chunked = damaged = False
-    for place, item, sound in scan(data, damages):
+    for place, item, sound in records.scan(data, damages):
         chunked = chunked or isinstance(item, OpenChunk)
         damaged = damaged or place.damage is not None
         loose_message = place.opcode == Opcode.MESSAGE and not (chunked and damaged)
@@ -315,8 +292,8 @@ def _walked(data: Buffer, warnings: list[str]) -> FileSummary:
         if place.opcode == Opcode.DATA_END:
             break
         if loose_message:
-            channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
-            if log_ns < TIME_LIMIT_NS:
+            channel, _, log_ns, _ = records.MESSAGE_HEAD.unpack_from(data, place.start)
+            if log_ns < records.TIME_LIMIT_NS:
                 summary.counts[channel] += 1
                 loose = _with_message(loose, place, log_ns, summary)
             else:
@@ -324,14 +301,15 @@ def _walked(data: Buffer, warnings: list[str]) -> FileSummary:
                     f'the message at byte {place.offset} has no possible log time: left out'
                 )
         elif isinstance(item, OpenChunk):
-            _add_chunk(item, summary)
-            warnings += item.notes
+            if item.damage is None:
+                _add_chunk(item, summary)
+            warnings += item.indexed.damage
         elif isinstance(item, DECLARED):
             summary.add(item)
         elif isinstance(item, mcap.Attachment | mcap.Metadata):
             summary.add_indexed(item, *place.span)
     first = {each.offset: each for each in reversed(damages.listed)}  # of each place
-    warnings += [left_out(each) for each in reversed(first.values())]
+    warnings += map(left_out, reversed(first.values()))
     known = {channel.id for channel in summary.of(mcap.Channel)}
     strangers = sum(n for number, n in summary.counts.items() if number not in known)
     if strangers:
@@ -340,30 +318,27 @@ def _walked(data: Buffer, warnings: list[str]) -> FileSummary:
 
 
 def _add_chunk(opened: OpenChunk, summary: FileSummary) -> None:
-    if opened.chunk is None or opened.damage is not None:
-        return
-    for place in opened.others:
-        record = read(opened.records, place)
+    found, times_ns = opened.indexed, opened.times_ns
+    for at in found.others.tolist():
+        record = records.read(opened.records, records.place_at(opened.records, at))
         if isinstance(record, DECLARED):
             summary.add(record, verified=opened.verified)
-    times_ns = opened.times_ns
     if times_ns is not None:
-        index = summary.add_chunk(opened.chunk, *opened.place.span)
+        index = summary.add_indexed(opened.chunk, *opened.place.span)
         index.message_start_time, index.message_end_time = times_ns
-        counts = Counter(opened.messages.channel.tolist())
+        counts = Counter(found.messages.channel.tolist())
         index.message_index_offsets = dict.fromkeys(counts, 0)
         summary.counts.update(counts)
 
 
 def _with_message(
-    last: mcap.ChunkIndex | None, place: Place, log_ns: int, summary: FileSummary
+    last: mcap.ChunkIndex | None, place: records.Place, log_ns: int, summary: FileSummary
 ) -> mcap.ChunkIndex:
     """Lengthen the last segment by a message outside of chunks, or begin one."""
     follows = last is not None and last.chunk_start_offset + last.chunk_length == place.offset
     if last is None or not follows or last.chunk_length >= _SEGMENT_BYTES:
-        last = summary.add_chunk(mcap.Chunk('', b'', log_ns, log_ns, 0, 0), place.offset, 0)
-    last.chunk_length += place.end - place.offset
-    last.uncompressed_size = last.chunk_length
+        last = summary.add_indexed(mcap.Chunk('', b'', log_ns, log_ns, 0, 0), place.offset, 0)
+    last.uncompressed_size = last.chunk_length = place.end - last.chunk_start_offset
     last.message_start_time = min(last.message_start_time, log_ns)
     last.message_end_time = max(last.message_end_time, log_ns)
     return last
@@ -373,11 +348,11 @@ def opened_segment(data: Buffer, segment: mcap.ChunkIndex) -> OpenChunk:
     """
     Return the records of a segment.
     """
-    place = place_at(data, segment.chunk_start_offset)
+    place = records.place_at(data, segment.chunk_start_offset)
     if place.opcode == Opcode.CHUNK:
-        return unpack(data, place)
+        return records.unpack(data, place)
     place = place._replace(end=place.offset + segment.chunk_length)
-    release(data, place.offset, place.end)
+    records.release(data, place.offset, place.end)
     return OpenChunk(place, records=data[place.offset : place.end])
 
 

@@ -11,12 +11,13 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from time import monotonic
+from typing import Any
 from uuid import uuid4
 
 from mcap.records import DataEnd, Footer
@@ -72,15 +73,10 @@ class LiveFile(BagWriter):
     ) -> None:
         self.synced_bytes = self.synced_messages = self._messages = self._declared_at = 0
         self.first_log_ns: int | None = None
+        about: dict[str, Any] = {'recording_id': recording_id, 'part': part}
+        about |= {'attachments': attachments, 'compression': Compression.NONE}
         try:
-            super().__init__(
-                path,
-                compression=Compression.NONE,
-                chunk_bytes=sys.maxsize,  # `append` ends it
-                recording_id=recording_id,
-                part=part,
-                attachments=attachments,
-            )
+            super().__init__(path, chunk_bytes=sys.maxsize, **about)  # `append` ends a chunk
             self.sync()
             with disk_errors(self.path, 'written'):
                 sync_directory(path.parent)
@@ -127,11 +123,9 @@ class LiveFile(BagWriter):
         """
         Say whether the name is still that of this file.
         """
-        try:
-            there = self.path.stat()
-        except FileNotFoundError:
-            return False
-        return os.path.samestat(os.fstat(self._file.fileno()), there)
+        with suppress(FileNotFoundError):
+            return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
+        return False
 
     def vanished(self) -> bool:
         """
@@ -179,6 +173,7 @@ EARLIER_AT_ONCE = 4096
 KEPT_BEFORE = 100  # messages that wait for a first that makes a file
 QUEUE_BYTES = 64 * 1024 * 1024
 _MESSAGE_BYTES = 400  # of Python, around the content
+_Held = tuple[float, EncodedMessage]
 
 
 @dataclass(frozen=True)
@@ -274,30 +269,26 @@ class DurableRecording:
         earlier: Iterable[EncodedMessage] = (),
         queue_bytes: int = QUEUE_BYTES,
     ) -> None:
-        self._directory = directory
-        self._stem = stem
-        self._attachments = attachments
-        self._limits = limits
+        self._directory, self._stem, self._limits = directory, stem, limits
+        self._about: dict[str, Any] = {'recording_id': uuid4().hex, 'attachments': attachments}
         self._earlier: Iterator[EncodedMessage] | None = iter(earlier)
         self._queue_bytes = queue_bytes
-        self._recording_id = uuid4().hex
         self._file: LiveFile | None = None
         self._told = RecordingProgress(directory)
         self._lock = threading.Lock()
-        # what is not safe yet, in order, each with the moment it came; the first are in the file
-        self._held: list[tuple[float, EncodedMessage]] = []
+        # what is not safe yet, each with the moment it came: handed over, and taken from there or
+        # from the earlier, in order, of which the first are in the file
+        self._queue: list[_Held] = []
+        self._taken: list[_Held] = []
         self._held_bytes = self._written = 0
-        self._before = 0  # of these, those that came before all that were handed over
         self._begun_s: float | None = None  # since when there is something worth a file
         self._synced_s = monotonic()
         self._retry_s = 0.0
         self._uncompacted: list[LiveFile] = []
-        self._compactor: threading.Thread | None = None
+        self._compacting = threading.Lock()
         self._ending = threading.Event()
         self._tried = threading.Event()
-        # a disk that hangs for ever must not keep the process: what is on it is whole
-        self._thread = threading.Thread(target=self._run, name='recording', daemon=True)
-        self._thread.start()
+        self._thread = _beside(self._run)
 
     def put(self, message: EncodedMessage, *, begins: bool = True) -> None:
         """
@@ -314,12 +305,12 @@ class DurableRecording:
         with self._lock:
             if begins and self._begun_s is None:
                 self._begun_s = monotonic()
-            elif self._begun_s is None and len(self._held) >= KEPT_BEFORE:
-                self._let_go(1)
+            elif self._begun_s is None and len(self._queue) >= KEPT_BEFORE:
+                self._let_go(self._queue, 1)
             if self._held_bytes + _bytes_of(message) > self._queue_bytes:
                 self._told.lost += 1
             else:
-                self._hold(len(self._held), [message])
+                self._hold(self._queue, [message])
 
     def stop(self) -> None:
         """
@@ -346,23 +337,23 @@ class DurableRecording:
         """
         with self._lock:
             begun_s, now_s = self._begun_s, monotonic()
-            waiting = 0 if begun_s is None else len(self._held)
+            waiting = [] if begun_s is None else self._taken + self._queue
             return replace(
                 self._told,
-                waiting=waiting,
-                oldest_s=now_s - max(begun_s or 0.0, self._held[0][0]) if waiting else 0.0,
+                waiting=len(waiting),
+                oldest_s=now_s - max(begun_s or 0.0, waiting[0][0]) if waiting else 0.0,
                 uncompacted=len(self._uncompacted),
                 why_uncompacted=self._told.why_uncompacted if self._uncompacted else '',
             )
 
-    def _hold(self, place: int, messages: Sequence[EncodedMessage]) -> None:
+    def _hold(self, where: list[_Held], messages: Sequence[EncodedMessage]) -> None:
         now_s = monotonic()
-        self._held[place:place] = [(now_s, message) for message in messages]
+        where += ((now_s, message) for message in messages)
         self._held_bytes += sum(map(_bytes_of, messages))
 
-    def _let_go(self, count: int) -> None:
-        self._held_bytes -= sum(_bytes_of(message) for _, message in self._held[:count])
-        del self._held[:count]
+    def _let_go(self, where: list[_Held], count: int) -> None:
+        self._held_bytes -= sum(_bytes_of(message) for _, message in where[:count])
+        del where[:count]
 
     def _run(self) -> None:
         while True:
@@ -381,17 +372,20 @@ class DurableRecording:
         self._finish()
 
     def _take(self) -> None:
-        """Take some of the earlier messages, and put them before what was handed over."""
-        if self._earlier is None or self._before > self._written:
-            return
-        some = list(islice(self._earlier, EARLIER_AT_ONCE))
+        """Take some of the earlier messages, or behind them all that was handed over."""
+        some: list[EncodedMessage] = []
+        if self._earlier is not None:
+            if self._written < len(self._taken):
+                return
+            some = list(islice(self._earlier, EARLIER_AT_ONCE))
+            self._earlier = self._earlier if some else None
         with self._lock:
-            if some and self._begun_s is None:
-                self._begun_s = monotonic()
-            self._hold(self._before, some)
-        self._before += len(some)
-        if not some:
-            self._earlier = None
+            if some:
+                self._begun_s = self._begun_s or monotonic()
+                self._hold(self._taken, some)
+            elif self._begun_s is not None:
+                self._taken += self._queue
+                self._queue.clear()
 
     def _write(self) -> None:
         if self._begun_s is None:
@@ -399,17 +393,18 @@ class DurableRecording:
             self._tried.set()
             return
         file = self._file or self._open()
-        with self._lock:
-            end = len(self._held) if self._earlier is None else self._before
-            due = [message for _, message in self._held[self._written : end]]
+        due = [message for _, message in self._taken[self._written :]]
         while due:
             fitting = self._fitting(file, due)
             if fitting:
                 file.append(due[:fitting])
                 self._written += fitting
                 del due[:fitting]
-            else:
-                self._end_part(file)
+            else:  # go on in the next part
+                self._sync()
+                file.close()
+                self._leave(file)
+                _beside(self._compact)
                 file = self._open()
 
     def _fitting(self, file: LiveFile, due: Sequence[EncodedMessage]) -> int:
@@ -432,8 +427,7 @@ class DurableRecording:
             with self._lock:
                 self._told.messages += self._written
                 self._told.size_bytes = self._file.synced_bytes
-                self._let_go(self._written)
-            self._before -= self._written
+                self._let_go(self._taken, self._written)
             self._written = 0
         self._synced_s = monotonic()
         self._told.error = ''
@@ -441,22 +435,17 @@ class DurableRecording:
     def _open(self) -> LiveFile:
         """Make the next file, under a name that no other recording has taken."""
         self._make_directory()
-        name, part = f'{self._stem}_{self._told.part:03d}', self._told.part
-        for number in count(1):
-            path = self._directory / f'{name}{f"_{number}" if number > 1 else ""}.mcap'
+        part = self._told.part
+        for again in chain([''], map('_{}'.format, count(2))):
+            path = self._directory / f'{self._stem}_{part:03d}{again}.mcap'
             with suppress(NameTakenError):
-                self._file = LiveFile(
-                    path,
-                    recording_id=self._recording_id,
-                    part=part,
-                    attachments=self._attachments,
-                )
+                file = LiveFile(path, part=part, **self._about)
                 break
-        assert self._file is not None
         with self._lock:
-            self._told.path, self._told.size_bytes = path, self._file.synced_bytes
+            self._told.path, self._told.size_bytes = path, file.synced_bytes
         self._tried.set()
-        return self._file
+        self._file = file
+        return file
 
     def _make_directory(self) -> None:
         try:
@@ -469,17 +458,8 @@ class DurableRecording:
         if not os.access(self._directory, os.W_OK | os.X_OK):
             raise BagError(f'{str(self._directory)!r}: Permission denied')
 
-    def _end_part(self, file: LiveFile) -> None:
-        self._sync()
-        file.close()
-        self._leave(file)
-        if self._compactor is None or not self._compactor.is_alive():
-            self._compactor = threading.Thread(
-                target=self._compact, name='compaction', daemon=True
-            )
-            self._compactor.start()
-
     def _leave(self, file: LiveFile) -> None:
+        """Go on with the next part, and let a compaction have this one."""
         self._uncompacted.append(file)
         self._file = None
         self._told.part += 1
@@ -504,23 +484,23 @@ class DurableRecording:
             except Exception as error:  # what is safe already is counted below
                 self._fail(error)
         with self._lock:
-            self._told.lost += 0 if self._begun_s is None else len(self._held)
-            self._let_go(len(self._held))
-        if self._compactor is not None:
-            self._compactor.join()
+            left = self._taken + self._queue
+            self._told.lost += 0 if self._begun_s is None else len(left)
+            self._taken, self._queue, self._held_bytes = [], [], 0
         self._compact()
         for file in self._uncompacted:
             file.release()
 
     def _compact(self) -> None:
-        for file in tuple(self._uncompacted):
-            try:
-                if not self._gone(file):
-                    compact(file.path, messages=file.synced_messages)
-                    file.release()
-                self._uncompacted.remove(file)
-            except Exception as error:  # it is tried again with the next part, and counted
-                self._told.why_uncompacted = reason_of(error)
+        with self._compacting:
+            for file in tuple(self._uncompacted):
+                try:
+                    if not self._gone(file):
+                        compact(file.path, messages=file.synced_messages)
+                        file.release()
+                    self._uncompacted.remove(file)
+                except Exception as error:  # it is tried again with the next part, and counted
+                    self._told.why_uncompacted = reason_of(error)
 
     def _gone(self, file: LiveFile) -> bool:
         """Say whether somebody removed a file; what was in it is lost, and counted."""
@@ -536,3 +516,10 @@ class DurableRecording:
 
 def _bytes_of(message: EncodedMessage) -> int:
     return len(message.payload) + _MESSAGE_BYTES
+
+
+def _beside(work: Callable[[], None]) -> threading.Thread:
+    """Begin some work; a disk that hangs for ever must not keep the process."""
+    thread = threading.Thread(target=work, name='recording', daemon=True)
+    thread.start()
+    return thread

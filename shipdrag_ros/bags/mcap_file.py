@@ -20,24 +20,17 @@ from dataclasses import dataclass
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 import zstandard
 from mcap.records import ChunkIndex
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.bags import records
 from shipdrag_ros.bags.contents import contents_of, left_out, opened_segment
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
-from shipdrag_ros.bags.records import (
-    CHUNK_LIMIT_BYTES,
-    MAGIC,
-    Buffer,
-    Damage,
-    DamageKind,
-    DamageList,
-    OpenChunk,
-)
+from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC, Buffer, DamageKind, DamageList
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.samples import UInt8
 
@@ -130,13 +123,10 @@ class McapFile:
                 least_bytes = max(_WORTHWHILE_BYTES, len(waiting.data) if waiting else 0)
                 loaded = self._load(data, left, table, least_bytes)
                 read += len(loaded)
-                if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
-                    loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
-                if waiting is not None:
-                    loaded = waiting.followed_by(loaded)
-                    waiting = None
-                loaded = loaded.in_arrival_order()
-                ready = len(loaded)
+                outside = (loaded.log_ns < start_ns) | (loaded.log_ns > end_ns)
+                loaded = loaded[~outside] if outside.any() else loaded
+                loaded = (waiting.followed_by(loaded) if waiting else loaded).in_arrival_order()
+                ready, waiting = len(loaded), None
                 if left:  # the next may begin before this one ends
                     ready = int(np.searchsorted(loaded.log_ns, left[0].message_start_time))
                 if ready < len(loaded):
@@ -156,17 +146,16 @@ class McapFile:
         self, data: Buffer, left: deque[ChunkIndex], wanted: UInt8, least_bytes: int
     ) -> Messages:
         """Take segments off the queue, as many as are worth it."""
-        sound: list[OpenChunk] = []
+        sound: dict[int, bytes] = {}  # by place
         size = 0
         while left and size < least_bytes:
             chunk = opened_segment(data, left.popleft())
             size += len(chunk.records)
             if chunk.damage is None:
-                sound.append(chunk)
+                sound[chunk.place.offset] = chunk.records
             else:
-                self._warn(left_out(Damage(chunk.place.offset, 'chunk', chunk.damage)))
-        places = [chunk.place.offset for chunk in sound]
-        indexed = index_messages([chunk.records for chunk in sound], places, wanted)
+                self._warn(left_out(records.Damage(chunk.place.offset, 'chunk', chunk.damage)))
+        indexed = index_messages(list(sound.values()), list(sound), wanted)
         for text in indexed.damage:
             self._warn(text)
         return indexed.messages
@@ -271,13 +260,6 @@ def is_bag_folder(names: Collection[str]) -> bool:
     return any(name == METADATA or name.endswith(('.db3', '.db3.zstd')) for name in names)
 
 
-def names_in(folder: Path) -> list[str]:
-    """
-    Return the names of what is in a folder.
-    """
-    return [each.name for each in folder.iterdir()]
-
-
 PART = re.compile(r'_\d{3,}(_\d+)?(?=\.mcap)')
 """In the name of a file of a recording of the node."""
 
@@ -341,8 +323,17 @@ def locate(path: Path) -> list[BagFiles]:
 
 
 def _rosbag2(path: Path) -> BagFiles:
-    where = str(path / METADATA)
-    about = _metadata(path / METADATA)
+    about_path = path / METADATA
+    where = repr(str(about_path))
+    try:
+        about = strict_yaml.load(about_path.read_text())['rosbag2_bagfile_information']
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BagError(
+            f'{where} is no metadata of rosbag2 ({error}); remove it to read the .mcap '
+            'files beside it'
+        ) from error
+    if not isinstance(about, dict):
+        raise BagError(f'{where} holds {about!r}, expected the metadata of rosbag2')
     storage = about.get('storage_identifier')
     packed = str(about.get('compression_format') or '')
     listed = about.get('relative_file_paths') or []
@@ -353,34 +344,22 @@ def _rosbag2(path: Path) -> BagFiles:
         raise BagError(f'{str(path)!r} is compressed with {packed!r}; {CONVERT}')
     if not isinstance(listed, list):
         raise BagError(
-            f'{where!r}: relative_file_paths is {listed!r}, expected a list '
+            f'{where}: relative_file_paths is {listed!r}, expected a list '
             'of files; remove metadata.yaml to read the .mcap files beside it'
         )
-    files, missing = [], []
-    for name in listed:
-        # older versions put the directory before the name, or leave the compression out
-        file = path / Path(str(name)).name
-        found = [each for each in (file, Path(f'{file}.zstd')) if each.is_file()]
-        files += found[:1]
-        if not found:
-            missing.append(f'{file.name} is listed in metadata.yaml and is not there')
+    # older versions put the directory before the name, or leave the compression out
+    names = [path / Path(str(name)).name for name in listed]
+    there = [next(filter(Path.is_file, (it, Path(f'{it}.zstd'))), None) for it in names]
+    missing = [
+        f'{name.name} is listed in metadata.yaml and is not there'
+        for name, file in zip(names, there, strict=True)
+        if file is None
+    ]
+    files = tuple(filter(None, there))
     if not files:
-        raise BagError(f'{where!r} lists no file that is there; restore them')
+        raise BagError(f'{where} lists no file that is there; restore them')
     each = packed if str(about.get('compression_mode') or '').lower() == 'message' else ''
-    return BagFiles(str(path), tuple(files), message_compression=each, warnings=tuple(missing))
-
-
-def _metadata(path: Path) -> dict[str, Any]:
-    try:
-        about = strict_yaml.load(path.read_text())['rosbag2_bagfile_information']
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BagError(
-            f'{str(path)!r} is no metadata of rosbag2 ({error}); remove it to read the .mcap '
-            'files beside it'
-        ) from error
-    if not isinstance(about, dict):
-        raise BagError(f'{str(path)!r} holds {about!r}, expected the metadata of rosbag2')
-    return about
+    return BagFiles(str(path), files, message_compression=each, warnings=tuple(missing))
 
 
 def _without_metadata(path: Path) -> list[BagFiles]:
@@ -413,7 +392,5 @@ def _instead(folder: Path) -> str:
 
 def _natural_order(path: Path) -> list[tuple[int, str]]:
     """Put part_10 behind part_9."""
-    return [
-        (int(piece), '') if piece.isdigit() else (-1, piece)
-        for piece in re.split(r'(\d+)', path.name)
-    ]
+    pieces = re.split(r'(\d+)', path.name)
+    return [(int(piece), '') if piece.isdigit() else (-1, piece) for piece in pieces]

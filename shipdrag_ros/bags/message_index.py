@@ -31,10 +31,7 @@ _DAMAGE = {
     _NO_TIME: 'a message has no possible log time',
 }
 
-# an unsigned index spares the test for a negative one, and the bytes become one load
-_U = np.uint64
-
-
+_U = np.uint64  # an unsigned index spares the test for a negative one
 _COLUMNS: tuple[Any, ...] = (np.int64, np.int64, np.uint16, np.int64, np.int64)
 
 
@@ -167,8 +164,10 @@ def index_messages(
     found = Messages(data, *(np.empty(most, kind) for kind in _COLUMNS))
     others = np.empty(len(data) // HEAD_BYTES + 1, np.int64)
     damage = np.empty((len(segments), 3), np.int64)
-    places = np.array(offsets, np.int64)
-    n, m, damaged = _index(data, _bounds(segments), places, wanted, others, damage, *found.columns)
+    # the eight bytes from each place on as a number
+    words = np.ndarray((max(len(data) - 7, 0),), _WORD, data, 0, (1,))
+    places, bounds = np.array(offsets, np.int64), _bounds(segments)
+    n, m, damaged = _index(data, words, bounds, places, wanted, others, damage, *found.columns)
     notes = [
         f'{_DAMAGE[kind]} at byte {at} of the chunk at byte {offset}: '
         'only what lies before it is used'
@@ -179,30 +178,18 @@ def index_messages(
 
 _GIVEN = 'Array({}, 1, "C", readonly=True)'
 OCTETS, PLACES = _GIVEN.format('u1'), _GIVEN.format('i8')
-
-
-@compiled(inline=True, uncounted=True)
-def _long_word(data: Any, place: int) -> Any:
-    at = _U(place)
-    return (
-        _U(data[at])
-        | _U(data[at + _U(1)]) << _U(8)
-        | _U(data[at + _U(2)]) << _U(16)
-        | _U(data[at + _U(3)]) << _U(24)
-        | _U(data[at + _U(4)]) << _U(32)
-        | _U(data[at + _U(5)]) << _U(40)
-        | _U(data[at + _U(6)]) << _U(48)
-        | _U(data[at + _U(7)]) << _U(56)
-    )
+_WORD = np.dtype('<i8')
+_WORDS = 'Array(i8, 1, "A", readonly=True, aligned=False)'
 
 
 @compiled(
-    f'UniTuple(i8, 3)({OCTETS}, {PLACES}, {PLACES}, {OCTETS}, '
+    f'UniTuple(i8, 3)({OCTETS}, {_WORDS}, {PLACES}, {PLACES}, {OCTETS}, '
     'i8[::1], i8[:, ::1], i8[::1], i8[::1], u2[::1], i8[::1], i8[::1])',
     uncounted=True,
 )
 def _index(
     data: UInt8,
+    words: Int64,
     bounds: Int64,
     offsets: Int64,
     wanted: UInt8,
@@ -224,7 +211,7 @@ def _index(
             if content > limit:
                 kind = _CUT_OFF
             else:
-                length = np.int64(_long_word(data, at + 1))
+                length = words[_U(at + 1)]
                 if data[_U(at)] == 0:
                     kind = _NO_RECORD
                 elif length < 0 or length > limit - content:  # from 2^63 on it is negative
@@ -237,7 +224,7 @@ def _index(
                     kind = _TOO_SHORT
                 else:
                     number = data[_U(content)] | np.uint16(data[_U(content + 1)]) << 8
-                    time = np.int64(_long_word(data, content + 6))
+                    time = words[_U(content + 6)]
                     if time < 0:
                         kind = _NO_TIME
                     elif wanted[number]:

@@ -30,7 +30,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, Footer
 from mcap.stream_reader import StreamReader
 
-from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Messages, index_messages
+from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
 from shipdrag_ros.samples import Int64
 
 _LISTED = 10_000  # of a file that is damaged everywhere; the others are counted
@@ -138,12 +138,13 @@ IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 
 # fields of each kind: numbers of bytes, and texts led by their length in 4 or 8 bytes
 _SHORT, _LONG = -4, -8
+_TO_END = (MESSAGE_HEAD.size,)  # then a payload, to the end of the record
 _FIELDS: dict[int, tuple[int, ...]] = {
     Opcode.HEADER: (_SHORT, _SHORT),
     Opcode.FOOTER: (20,),
     Opcode.SCHEMA: (2, _SHORT, _SHORT, _SHORT),
     Opcode.CHANNEL: (4, _SHORT, _SHORT, _SHORT),
-    Opcode.MESSAGE: (MESSAGE_HEAD.size,),  # then its payload, to the end
+    Opcode.MESSAGE: _TO_END,
     Opcode.CHUNK: (28, _SHORT, _LONG),
     Opcode.MESSAGE_INDEX: (2, _SHORT),
     Opcode.CHUNK_INDEX: (32, _SHORT, 8, _SHORT, 16),
@@ -258,15 +259,15 @@ def footer_of(data: Buffer) -> Footer | None:
     return footer if isinstance(footer, Footer) else None
 
 
-def checksum(data: Buffer, start: int, end: int) -> int:
+def agrees(data: Buffer, start: int, end: int, stated: int) -> bool:
     """
-    Return the CRC-32 of a span of any size.
+    Say whether a span of any size has the CRC-32 that is stated, if any.
     """
     value = 0
-    for at in range(start, end, _CRC_BYTES):
+    for at in range(start, end if stated else start, _CRC_BYTES):
         value = crc32(data[at : min(at + _CRC_BYTES, end)], value)
         release(data, at, min(at + _CRC_BYTES, end))
-    return value
+    return value == stated
 
 
 def summary_agrees(data: Buffer, footer: Footer) -> bool:
@@ -274,16 +275,15 @@ def summary_agrees(data: Buffer, footer: Footer) -> bool:
     Say whether the summary of a closed file has the checksum that it states, if any.
     """
     # which covers the footer too, up to itself
-    end = len(data) - len(MAGIC) - 4
-    return footer.summary_crc in (0, checksum(data, footer.summary_start, end))
+    return agrees(data, footer.summary_start, len(data) - len(MAGIC) - 4, footer.summary_crc)
 
 
 def attachment_agrees(data: Buffer, place: Place) -> bool:
     """
     Say whether an attachment has the checksum that it states, if any.
     """
-    stated = int.from_bytes(data[place.end - 4 : place.end], 'little')
-    return stated in (0, checksum(data, place.start, place.end - 4))
+    end = place.end - 4
+    return agrees(data, place.start, end, int.from_bytes(data[end : place.end], 'little'))
 
 
 def release(data: Buffer, start: int, end: int) -> None:
@@ -306,23 +306,19 @@ def _whole(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place | No
     if stop > end:
         return None
     if opcode in kinds:
-        sound = _fills(data, opcode, start, stop)
+        sound = _fields_end(data, opcode, start, stop) == stop
     else:  # of a private one nothing is known but what follows
         follows = stop < end and data[stop] in kinds and _whole(data, stop, end, kinds) is not None
         sound = opcode >= _PRIVATE and (follows or data[stop:end] in (b'', MAGIC))
     return Place(opcode, at, start, stop) if sound else None
 
 
-def _fills(data: Buffer, opcode: int, start: int, stop: int) -> bool:
-    if opcode == Opcode.MESSAGE:
-        return stop - start >= MESSAGE_HEAD.size
-    return _fields_end(data, opcode, start, stop) == stop
-
-
 def _fields_end(data: Buffer, opcode: int, start: int, limit: int) -> int | None:
     """Return where the fields of a record end by themselves; None if that cannot be read."""
-    at = start
-    for size in _FIELDS[opcode]:
+    at, fields = start, _FIELDS[opcode]
+    if fields is _TO_END:
+        return max(start + MESSAGE_HEAD.size, limit)
+    for size in fields:
         if size > 0:
             at += size
         elif at - size > limit:
@@ -365,7 +361,9 @@ def _inferred(
         if stop <= end and _goes_on(data, stop, end, kinds):
             # its length is right, and something else is not
             near = (opcode ^ 1 << bit for bit in range(8))
-            mended = [it for it in near if it in kinds and _fills(data, it, start, stop)]
+            mended = [
+                it for it in near if it in kinds and _fields_end(data, it, start, stop) == stop
+            ]
             if known and Opcode.MESSAGE in mended:  # which anything fills
                 mended.remove(Opcode.MESSAGE)
             kind = DamageKind.OPCODE if mended or not known else DamageKind.CONTENT
@@ -452,12 +450,8 @@ class OpenChunk:
         Whether its own checksum vouches for the records.
     ended
         Whether the packed bytes end as they should; else other readers refuse it.
-    messages
-        Those in `records` once it is indexed, up to the first damage in them.
-    others
-        Places in `records` that hold something else, up to the same.
-    notes
-        A sentence where the records are not whole.
+    indexed
+        What a scan found in the records, up to the first damage in them.
     """
 
     place: Place
@@ -466,38 +460,28 @@ class OpenChunk:
     damage: DamageKind | None = None
     verified: bool = False
     ended: bool = True
-    messages: Messages = field(init=False)
-    others: tuple[Place, ...] = field(init=False)
-    notes: list[str] = field(init=False)
-
-    def index(self) -> None:
-        """
-        Find what is in the records.
-        """
-        self.messages, others, self.notes = index_messages(
-            [self.records], [self.place.offset], EVERY_CHANNEL
-        )
-        self.others = tuple(place_at(self.records, at) for at in others.tolist())
+    indexed: Indexed = field(init=False)
 
     @property
     def times_ns(self) -> tuple[int, int] | None:
         """First and last log time [ns]; None without messages."""
-        times_ns = self.messages.log_ns
+        times_ns = self.indexed.messages.log_ns
         return (int(times_ns.min()), int(times_ns.max())) if len(times_ns) else None
 
     def entries(self) -> dict[int, Int64]:
         """
         Return what an index lists: log time [ns] and offset, (n, 2), by channel.
         """
-        channel = self.messages.channel
-        offsets = self.messages.start - (HEAD.size + MESSAGE_HEAD.size)
-        listed = np.column_stack((self.messages.log_ns, offsets))
+        messages, channel = self.indexed.messages, self.indexed.messages.channel
+        offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
+        listed = np.column_stack((messages.log_ns, offsets))
         return {number: listed[channel == number] for number in np.unique(channel).tolist()}
 
     @property
     def whole(self) -> bool:
         """Whether the records are what may stand in a chunk, up to their end."""
-        return not self.notes and all(each.opcode in IN_CHUNK for each in self.others)
+        others = self.indexed.others.tolist()
+        return not self.indexed.damage and all(self.records[at] in IN_CHUNK for at in others)
 
     def scan(self, damages: DamageList, *, sound: bool) -> Iterator[FoundRecord]:
         """
@@ -510,8 +494,9 @@ class OpenChunk:
         sound
             Whether the chunk is; else what is damaged in it is the doing of its own damage.
         """
-        data, offset, whole = self.records, self.place.offset, sound and self.whole
-        for place in self.others if whole else walk(data, 0, len(data), IN_CHUNK):
+        data, offset = self.records, self.place.offset
+        others = (place_at(data, at) for at in self.indexed.others.tolist())
+        for place in others if sound and self.whole else walk(data, 0, len(data), IN_CHUNK):
             if place.damage is not None and sound:
                 where = f'at byte {place.offset} of the unpacked chunk'
                 damages.add(offset, place.name, place.damage, where)
@@ -544,7 +529,7 @@ def scan(data: Buffer, damages: DamageList, *, partly: bool = False) -> Iterator
             damages.add(offset, place.name, place.damage)
         if place.opcode == Opcode.CHUNK and place.start > offset:
             item, chunked = unpack(data, place, partly=partly), True
-            item.index()
+            item.indexed = index_messages([item.records], [offset], EVERY_CHANNEL)
             # of a chunk that cannot be read it matters only to those who unpack what is left of it
             if item.damage not in (None, place.damage) and (partly or place.readable):
                 damages.add(offset, place.name, item.damage)
@@ -579,14 +564,7 @@ def read_noting(data: Buffer, place: Place, offset: int, damages: DamageList) ->
     return record, record is not None
 
 
-class _OfThread(threading.local):
-    """What takes longer to make than a chunk to unpack, and serves one thread."""
-
-    def __init__(self) -> None:
-        self.zstd = zstandard.ZstdDecompressor()
-
-
-_of_thread = _OfThread()
+_of_thread = threading.local()  # a decoder takes longer to make than a chunk to unpack
 
 
 def unpack(data: Buffer, place: Place, *, partly: bool = False) -> OpenChunk:
@@ -649,7 +627,9 @@ def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
     # the library trusts the size that a frame states, and takes that memory
     if zstandard.frame_content_size(packed) > limit_bytes:
         raise ValueError(f'it unpacks to more than {limit_bytes} bytes')
-    return _of_thread.zstd.decompress(packed, max_output_size=limit_bytes)
+    if not hasattr(_of_thread, 'zstd'):
+        _of_thread.zstd = zstandard.ZstdDecompressor()
+    return bytes(_of_thread.zstd.decompress(packed, max_output_size=limit_bytes))
 
 
 def _decompress(chunk: Chunk) -> tuple[bytes, bool]:
@@ -666,13 +646,11 @@ def _decompress(chunk: Chunk) -> tuple[bytes, bool]:
 
 def _decompress_partly(chunk: Chunk) -> bytes:
     """Unpack piece by piece, up to the damage or beyond the limit."""
-    decoder: Any
-    if chunk.compression == 'zstd':
-        decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
-    elif chunk.compression == 'lz4':
-        decoder = lz4.frame.LZ4FrameDecompressor()
-    else:
+    if not chunk.compression:
         return bytes(chunk.data[: CHUNK_LIMIT_BYTES + 1])
+    zstd = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES)
+    packed = chunk.compression == 'zstd'
+    decoder: Any = zstd.decompressobj() if packed else lz4.frame.LZ4FrameDecompressor()
     out: list[bytes] = []
     size = 0
     with suppress(*_UNPACKING_ERRORS):

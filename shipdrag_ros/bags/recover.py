@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,39 +22,13 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
+from shipdrag_ros.bags import records, writer
 from shipdrag_ros.bags.contents import FileSummary
 from shipdrag_ros.bags.mcap_file import BagFiles, locate, mapped, unpacked_file
-from shipdrag_ros.bags.records import (
-    CHUNK_LIMIT_BYTES,
-    GARBAGE,
-    HEAD,
-    MAGIC,
-    MESSAGE_HEAD,
-    TIME_LIMIT_NS,
-    Buffer,
-    Damage,
-    DamageKind,
-    DamageList,
-    FoundRecord,
-    OpenChunk,
-    footer_of,
-    read,
-    scan,
-    summary_agrees,
-    unpack_zstd,
-    walk,
-)
-from shipdrag_ros.bags.writer import (
-    CHUNK_RANGE,
-    RecordWriter,
-    as_bytes,
-    attachment,
-    sync_directory,
-)
+from shipdrag_ros.bags.records import MAGIC, Buffer, Damage, DamageKind, DamageList, OpenChunk
+from shipdrag_ros.bags.writer import RecordWriter, as_bytes, sync_directory
 from shipdrag_ros.errors import BagError, disk_errors
 from shipdrag_ros.progress import PartDone
-
-_PART = '.part'
 
 
 @dataclass(frozen=True)
@@ -130,7 +105,7 @@ def recover(
                 f'{str(source)!r} holds no record of MCAP, nothing can be saved; give a .mcap file'
             )
         for name, text in attachments.items():
-            sound.writer.add(attachment(name, text))
+            sound.writer.add(writer.attachment(name, text))
         sound.publish()
         if doubtful.used:
             doubtful.publish()
@@ -189,9 +164,9 @@ def _salvaged(
     """Save what can be saved of a bag, into files that vanish unless they are published."""
     quarantine = output.with_suffix('.quarantine.mcap')
     with _Salvaged(output, replaced) as sound, _Salvaged(quarantine) as doubtful:
-        salvage = _Salvage(sound, doubtful, bag, progress)
+        salvage = _Salvage(sound, doubtful, bag)
         for file in bag.files:
-            salvage.take(file)
+            salvage.take(file, progress)
         yield salvage
 
 
@@ -222,13 +197,13 @@ def opened(path: Path, damages: DamageList) -> Iterator[Buffer]:
 def _declared(data: Buffer) -> FileSummary:
     """Return the schemas and channels that stand outside of chunks, wherever they do."""
     declared = FileSummary()
-    footer = footer_of(data)
+    footer = records.footer_of(data)
     begin = len(data)
-    if footer is not None and footer.summary_crc and summary_agrees(data, footer):
+    if footer is not None and footer.summary_crc and records.summary_agrees(data, footer):
         begin = footer.summary_start
-    for place in walk(data, 0, len(data)):
+    for place in records.walk(data, 0, len(data)):
         if place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL) and place.damage is None:
-            record = read(data, place)
+            record = records.read(data, place)
             if record is not None:
                 declared.add(record, verified=place.offset >= begin)
     return declared
@@ -239,36 +214,30 @@ class _Salvaged:
 
     def __init__(self, path: Path, replaced: Collection[str] = ()) -> None:
         self.path = path
-        self._replaced = replaced  # names of attachments that are not taken
+        self.part = path.with_name(f'.{path.name}.part')
         self.profile = 'ros2'
         self.messages = 0
-        self._writer: RecordWriter | None = None
         self.numbers: dict[int, int] = {}
+        self.used = False  # whether anything was written
+        self._replaced = replaced  # names of attachments that are not taken
         self._written: set[bytes] = set()
-        self.part = path.with_name(f'.{path.name}{_PART}')
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
 
-    @property
-    def used(self) -> bool:
-        """Whether anything was written."""
-        return self._writer is not None
-
-    @property
+    @cached_property
     def writer(self) -> RecordWriter:
         """Makes the file when it is first needed."""
-        if self._writer is None:
-            with suppress(OSError):
-                self.part.unlink()  # of an attempt that was killed
-            self._writer = RecordWriter(self.part, profile=self.profile)
-        return self._writer
+        with suppress(OSError):
+            self.part.unlink()  # of an attempt that was killed
+        made = RecordWriter(self.part, profile=self.profile)
+        self.used = True
+        return made
 
     def number(self, number: int, declared: FileSummary) -> int:
         """Return the number here of a channel of the source, known or not."""
         if number not in self.numbers:
-            channel = declared.records.get((Channel, number))
-            if channel is None:
-                channel = Channel(number, f'/unknown_channel_{number}', 'cdr', {}, 0)
+            stranger = Channel(number, f'/unknown_channel_{number}', 'cdr', {}, 0)
+            channel = declared.records.get((Channel, number), stranger)
             schema = declared.records.get((Schema, channel.schema_id))
             self.numbers[number] = self.writer.declare(channel, schema)
         return self.numbers[number]
@@ -295,9 +264,9 @@ class _Salvaged:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._writer is not None:
+        if self.used:
             with suppress(BagError):
-                self._writer.close()
+                self.writer.close()
             with suppress(OSError):
                 self.part.unlink()
 
@@ -305,30 +274,31 @@ class _Salvaged:
 class _Salvage:
     """One pass over the files of a bag."""
 
-    def __init__(
-        self, sound: _Salvaged, doubtful: _Salvaged, bag: BagFiles, progress: PartDone
-    ) -> None:
+    def __init__(self, sound: _Salvaged, doubtful: _Salvaged, bag: BagFiles) -> None:
         self.damages = DamageList()
-        self.bytes_read = 0
-        self.bytes_lost = 0
-        self.records = 0
-        self.sound = sound
-        self.doubtful = doubtful
+        self.bytes_read = self.bytes_lost = self.records = 0
+        self.sound, self.doubtful = sound, doubtful
         self._bag = bag
-        self._progress = progress
         self._declared = FileSummary()
         for warning in bag.warnings:
             self.damages.add(0, 'file', DamageKind.MISSING, warning)
 
-    def take(self, file: Path) -> None:
+    def take(self, file: Path, progress: PartDone) -> None:
         """Write what can be saved of a file."""
         self.damages.file = file.name if len(self._bag.files) > 1 else ''
         with opened(file, self.damages) as data:
             self.bytes_read += len(data)
             self._declared = _declared(data)
             self._forget()
-            for found in scan(data, self.damages, partly=True):
-                self._take(data, found)
+            for found in records.scan(data, self.damages, partly=True):
+                place, item, sound = found
+                if isinstance(item, OpenChunk):
+                    progress(place.offset, len(data))
+                    self._chunk(item, sound=sound)
+                elif place.readable:
+                    self._record(data, found, place.offset)
+                elif place.damage is not None or place.opcode != records.GARBAGE:
+                    self.bytes_lost += place.end - place.offset
             if self.sound.used:
                 for channel in self._declared.of(Channel):  # also those without a message
                     self.sound.number(channel.id, self._declared)
@@ -339,43 +309,34 @@ class _Salvage:
         self.sound.numbers.clear()
         self.doubtful.numbers.clear()
 
-    def _take(self, data: Buffer, found: FoundRecord) -> None:
-        place, item, sound = found
-        if isinstance(item, OpenChunk):
-            self._progress(place.offset, len(data))
-            self._chunk(item, sound=sound)
-        elif place.readable:
-            self._record(data, found, place.offset)
-        elif place.damage is not None or place.opcode != GARBAGE:
-            self.bytes_lost += place.end - place.offset
-
     def _chunk(self, chunk: OpenChunk, *, sound: bool) -> None:
-        records, offset, used = chunk.records, chunk.place.offset, 0
+        unpacked, offset, used = chunk.records, chunk.place.offset, 0
         inside = []
         for found in chunk.scan(self.damages, sound=sound):
             if found.place.readable:
                 used += found.place.end - found.place.offset
                 inside += [] if found.place.opcode == Opcode.MESSAGE else [found.item]
-                self._record(records, found, offset, verified=chunk.verified)
+                self._record(unpacked, found, offset, verified=chunk.verified)
         if not (sound and chunk.whole):
-            packed = chunk.place.end - chunk.place.start
-            size = len(records) or 1
+            packed, size = chunk.place.end - chunk.place.start, len(unpacked) or 1
             self.bytes_lost += packed * (size - used) // size
         elif not self._copy(chunk, inside):
-            messages = chunk.messages
-            starts = (messages.start - MESSAGE_HEAD.size).tolist()
+            messages = chunk.indexed.messages
+            starts = (messages.start - records.MESSAGE_HEAD.size).tolist()
             for start, end in zip(starts, messages.end.tolist(), strict=True):
-                self._message(records[start:end], offset, self.sound)
+                self._message(unpacked[start:end], offset, self.sound)
 
     def _copy(self, chunk: OpenChunk, inside: list[Any]) -> bool:
         """Write a chunk as it is, if it needs no other numbers and is worth it; say whether."""
-        record, times_ns = chunk.chunk, chunk.times_ns
-        as_it_is = chunk.verified and chunk.damage is None and not self._bag.message_compression
-        if record is None or times_ns is None or not as_it_is or not chunk.ended:
+        record, bag, known = chunk.chunk, self.sound, self._declared.records
+        times_ns = chunk.times_ns
+        if record is None or times_ns is None or self._bag.message_compression:
             return False
-        if not record.compression and len(record.data) < CHUNK_RANGE[0]:  # a small one
+        if not chunk.verified or chunk.damage is not None or not chunk.ended:
             return False
-        entries, bag, known = chunk.entries(), self.sound, self._declared.records
+        if not record.compression and len(record.data) < writer.CHUNK_RANGE[0]:  # a small one
+            return False
+        entries, (first, last) = chunk.entries(), times_ns
         numbers = {*entries, *(it.id for it in inside if isinstance(it, Channel))}
         if any((Channel, it) not in known for it in entries) or any(
             bag.number(it, self._declared) != it for it in numbers
@@ -383,15 +344,14 @@ class _Salvage:
             return False
         if not all(it is not None and bag.writer.says(it) for it in inside):
             return False
-        first, last = times_ns
-        self.sound.writer.add_chunk(
+        bag.writer.add_chunk(
             replace(record, message_start_time=first, message_end_time=last), entries
         )
-        self.sound.messages += len(chunk.messages)
+        bag.messages += len(chunk.indexed.messages)
         return True
 
     def _record(
-        self, data: Buffer, found: FoundRecord, offset: int, *, verified: bool = False
+        self, data: Buffer, found: records.FoundRecord, offset: int, *, verified: bool = False
     ) -> None:
         self.records += 1
         place, record, sound = found
@@ -409,10 +369,10 @@ class _Salvage:
                 bag.once(record)
 
     def _message(self, content: bytes, offset: int, bag: _Salvaged) -> None:
-        channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(content)
-        if log_ns >= TIME_LIMIT_NS:  # no reader takes it
-            self.damages.add(offset, 'message', DamageKind.CONTENT, f'log time {log_ns}')
-            self.bytes_lost += HEAD.size + len(content)
+        head = records.MESSAGE_HEAD
+        channel, _, log_ns, _ = head.unpack_from(content)
+        if log_ns >= records.TIME_LIMIT_NS:  # no reader takes it
+            self._lose(content, offset, DamageKind.CONTENT, f'log time {log_ns}')
             return
         if (Channel, channel) not in self._declared.records:
             bag = self.doubtful
@@ -420,12 +380,15 @@ class _Salvage:
                 self.damages.add(offset, 'message', DamageKind.REFERENCE, f'channel {channel}')
         if self._bag.message_compression:
             try:
-                payload = unpack_zstd(content[MESSAGE_HEAD.size :], CHUNK_LIMIT_BYTES)
+                payload = records.unpack_zstd(content[head.size :], records.CHUNK_LIMIT_BYTES)
             except (zstandard.ZstdError, ValueError, MemoryError):
-                self.damages.add(offset, 'message', DamageKind.COMPRESSION)
-                self.bytes_lost += HEAD.size + len(content)
+                self._lose(content, offset, DamageKind.COMPRESSION)
                 return
-            content = content[: MESSAGE_HEAD.size] + payload
+            content = content[: head.size] + payload
         number = bag.numbers.get(channel) or bag.number(channel, self._declared)
         bag.writer.add_content(number, content, log_ns=log_ns)
         bag.messages += 1
+
+    def _lose(self, content: bytes, offset: int, why: DamageKind, detail: str = '') -> None:
+        self.damages.add(offset, 'message', why, detail)
+        self.bytes_lost += records.HEAD.size + len(content)

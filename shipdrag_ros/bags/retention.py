@@ -11,20 +11,21 @@ stays.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, LOCK_UN, flock
+from itertools import pairwise
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import IO
 
 from shipdrag_ros.bags.contents import contents_of
 from shipdrag_ros.bags.mcap_file import PART
-from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC, Buffer
+from shipdrag_ros.bags.records import CHUNK_LIMIT_BYTES, MAGIC
 from shipdrag_ros.bags.recover import SUFFIX
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import reason_of
@@ -149,17 +150,13 @@ class Retention:
             return []
         parts = self._parts()
         worth = self._worth_keeping(parts)
-        old = set()
-        if self._keep.days:
-            limit_s = now_s - self._keep.days * DAY_S
-            old = {part for part in parts if part.changed_s < limit_s} - worth
+        oldest_s = now_s - self._keep.days * DAY_S if self._keep.days else -math.inf
+        old = {part for part in parts if part.changed_s < oldest_s} - worth
         # a default takes no coastdown: somebody must have said how much to keep
-        order = [part for part in parts if part not in worth]
-        order += [part for part in parts if part in worth and self._keep.size_bytes]
-        limit = self._limit_bytes()
-        total = sum(part.size_bytes for part in parts)
+        order = [part for part in parts if part not in worth or self._keep.size_bytes]
+        limit, total = self._limit_bytes(), sum(part.size_bytes for part in parts)
         removed = []
-        for part in sorted(order, key=lambda part: part not in old):
+        for part in sorted(order, key=lambda part: (part not in old, part in worth)):
             if part in old:
                 why = f'older than {self._keep.days:g} days'
             elif limit and total > limit:
@@ -196,24 +193,33 @@ class Retention:
 
     def _worth_keeping(self, parts: list[_BagPart]) -> set[_BagPart]:
         self._holds = {part: self._holds[part] for part in parts if part in self._holds}
-        worth = set()
-        before: _BagPart | None = None
-        for part in parts:
-            if part.left:
-                continue
-            if part not in self._holds and not _is_written(part.path):
-                self._holds[part] = self._judged(part.path)
+        worth: set[_BagPart] = set()
+        for before, part in pairwise([None, *(part for part in parts if not part.left)]):
+            assert part is not None
+            if part not in self._holds:
+                judged = self._judged(part.path)
+                self._holds |= {} if judged is None else {part: judged}
             if self._holds.get(part, True):
                 worth.add(part)
                 if before is not None and before.recording == part.recording:
                     worth.add(before)
-            before = part
         return worth
 
-    def _judged(self, path: Path) -> bool:
-        """Say whether a file is kept as one that holds a coastdown; so is one not understood."""
+    def _judged(self, path: Path) -> bool | None:
+        """
+        Say whether a file is kept as one that holds a coastdown; so is one not understood.
+
+        None while a process still writes it, which has locked it.
+        """
         try:
-            return _holds_coastdown(path)
+            with open(path, 'rb', opener=_no_link) as file:
+                with suppress(OSError):
+                    try:
+                        flock(file, LOCK_SH | LOCK_NB)
+                        flock(file, LOCK_UN)  # at once: who has just made it locks it next
+                    except BlockingIOError:
+                        return None
+                return _holds_coastdown(file)
         except Exception as error:  # whatever is in it, the others are looked at too
             self._complain(path, f'cannot be read ({reason_of(error)}), so that it stays')
             return True
@@ -240,42 +246,22 @@ def _no_link(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)
 
 
-def _is_written(path: Path) -> bool:
-    """Say whether a process still writes a file, which is locked then."""
-    with suppress(OSError), open(path, 'rb', opener=_no_link) as file:
-        try:
-            flock(file, LOCK_SH | LOCK_NB)
-            flock(file, LOCK_UN)  # at once: who has just made it locks it next
-        except BlockingIOError:
-            return True
-    return False
-
-
-@contextmanager
-def _loaded(file: IO[bytes]) -> Iterator[Buffer]:
+def _holds_coastdown(file: IO[bytes]) -> bool:
     """
-    Give the content of a file.
+    Say whether figures were published in it; of a file that is no bag, yes.
 
     One of `CHUNK_LIMIT_BYTES` at most is read: where its disk is pulled out, or somebody cuts
     it, that is an error then, while a page of a mapped file that is gone ends the process.
-    """
-    if os.fstat(file.fileno()).st_size <= CHUNK_LIMIT_BYTES:
-        yield file.read(CHUNK_LIMIT_BYTES)
-    else:
-        with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
-            yield data
-
-
-def _holds_coastdown(path: Path) -> bool:
-    """
-    Say whether figures were published in it; of a file that is no bag, yes.
 
     Raises
     ------
     OSError
         If it cannot be read.
     """
-    with open(path, 'rb', opener=_no_link) as file, _loaded(file) as data:
+    small = os.fstat(file.fileno()).st_size <= CHUNK_LIMIT_BYTES
+    mapping = nullcontext() if small else mmap(file.fileno(), 0, access=ACCESS_READ)
+    with mapping as mapped:
+        data = mapped or file.read(CHUNK_LIMIT_BYTES)
         if data[: len(MAGIC)] != MAGIC:
             return True
         contents = contents_of(data)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+import os
 import shutil
 import sys
 from collections import Counter
@@ -14,9 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
-from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate, names_in
+from shipdrag_ros.bags.mcap_file import BagFiles, McapFile, is_bag_folder, locate
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
 from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.bags.recover import recover
@@ -88,14 +88,10 @@ def _in_order(bag: BagFiles, parts: list[McapFile]) -> tuple[BagFiles, list[Mcap
             )
         numbered[number] = part
     missing = sorted(set(range(min(numbered), max(numbered))) - set(numbered))
-    warnings = tuple(f'part {number} of the recording is missing' for number in missing)
-    ordered = [numbered[number] for number in sorted(numbered)]
-    joined = BagFiles(
-        str(ordered[0].path),
-        tuple(part.path for part in ordered),
-        warnings=bag.warnings + warnings,
-    )
-    return joined, ordered
+    ordered = [part for _, part in sorted(numbered.items())]
+    warnings = (f'part {number} of the recording is missing' for number in missing)
+    files = tuple(part.path for part in ordered)
+    return BagFiles(str(files[0]), files, warnings=(*bag.warnings, *warnings)), ordered
 
 
 # messages decoded at once: a chunk as writers make them, and of a giant one a part
@@ -215,7 +211,7 @@ class Run:
         first = self.paths[0]
         if not first.is_file():
             return ()
-        if not is_bag_folder(names_in(first.parent)):
+        if not is_bag_folder(os.listdir(first.parent)):
             return (first.parent,)
         bag = first.parent if first.parent.name.strip('.') else first.parent.resolve()
         return bag, bag.parent
@@ -226,11 +222,8 @@ class Run:
         spans = [part.span_ns for part in self.parts if part.span_ns is not None]
         if not spans:
             return None
-        first, last = self._limits_ns
-        return (
-            max(first, min(start for start, _ in spans)),
-            min(last, max(end for _, end in spans)),
-        )
+        starts, ends = zip(*spans, strict=True)
+        return max(self._limits_ns[0], min(starts)), min(self._limits_ns[1], max(ends))
 
     @property
     def duration_s(self) -> float:
@@ -351,11 +344,8 @@ class Run:
         """
         if self.node is None:
             return
-        wanted = [
-            (topic.under(self.node), topic.type)
-            for topic in OUTPUT_TOPICS
-            if types.is_stamped(topic.type)
-        ]
+        stamped = (topic for topic in OUTPUT_TOPICS if types.is_stamped(topic.type))
+        wanted = [(topic.under(self.node), topic.type) for topic in stamped]
         for batch in self.messages(wanted):
             for number, place in enumerate(batch.channel.tolist()):
                 topic, type_name = wanted[place]
@@ -377,12 +367,10 @@ class Run:
         """
         start_ns, end_ns = max(start_ns, self._limits_ns[0]), min(end_ns, self._limits_ns[1])
         for part in self.parts:
+            known = part.contents.channels.items()
+            wanted = {number: keys.index(key) for number, key in known if key in keys}
             place_of = np.zeros(CHANNELS, np.uint16)
-            wanted = []
-            for number, key in part.contents.channels.items():
-                if key in keys:
-                    place_of[number] = keys.index(key)
-                    wanted.append(number)
+            place_of[list(wanted)] = list(wanted.values())
             for batch in part.messages(wanted, start_ns=start_ns, end_ns=end_ns):
                 found = replace(batch, channel=place_of[batch.channel])
                 yield _unpacked(found) if self._message_compression else found
@@ -398,14 +386,9 @@ class Run:
         )
 
     def _find_node(self, keys: set[tuple[str, str]]) -> str | None:
-        nodes = sorted(
-            {
-                topic.removesuffix(f'/{output.name}')
-                for output in (EVENTS, RESISTANCE)
-                for topic, type_name in keys
-                if type_name == output.type and topic.endswith(f'/{output.name}')
-            }
-        )
+        ends = {output.type: f'/{output.name}' for output in (EVENTS, RESISTANCE)}
+        own = ((topic, ends[kind]) for topic, kind in keys if kind in ends)
+        nodes = sorted({topic.removesuffix(end) for topic, end in own if topic.endswith(end)})
         if len(nodes) > 1:
             self._warnings.append(
                 f'outputs of {len(nodes)} nodes, {", ".join(nodes)}: none of them is compared'
@@ -463,8 +446,16 @@ class RunSamples:
         return concatenate([item for item in self if isinstance(item, Block)])
 
     def _items(self, messages: Messages, sources: tuple[Source, ...]) -> Iterator[Block | Mark]:
-        """Cut at the marks."""
-        block, places = self._decode(messages, sources)
+        """Decode, and cut at the marks."""
+        block, places, unreadable = decode_batch(
+            sources, messages.channel, messages.data, messages.start, messages.end, messages.log_ns
+        )
+        counts = np.bincount(messages.channel, minlength=len(sources)).tolist()
+        for source, count, reasons in zip(sources, counts, unreadable, strict=False):
+            if count:
+                self.messages[source.input] += count
+            for reason, number in reasons.items():
+                self.unreadable.setdefault(source.input, Counter())[reason.value] += number
         done = 0
         for number in np.flatnonzero(messages.channel == len(sources)).tolist():
             mark = _mark(messages.payload(number))
@@ -477,21 +468,6 @@ class RunSamples:
         if len(block) > done:
             yield block[done:]
 
-    def _decode(
-        self, messages: Messages, sources: tuple[Source, ...]
-    ) -> tuple[Block, NDArray[np.intp]]:
-        """Return the samples and which message each came from."""
-        block, kept, unreadable = decode_batch(
-            sources, messages.channel, messages.data, messages.start, messages.end, messages.log_ns
-        )
-        counts = np.bincount(messages.channel, minlength=len(sources)).tolist()
-        for source, count, reasons in zip(sources, counts, unreadable, strict=False):
-            if count:
-                self.messages[source.input] += count
-            for reason, number in reasons.items():
-                self.unreadable.setdefault(source.input, Counter())[reason.value] += number
-        return block, kept
-
 
 def _is_own(parts: Sequence[McapFile]) -> bool:
     """Whether a node of this package recorded it: each type that it holds was subscribed."""
@@ -503,12 +479,13 @@ def _mark(payload: bytes) -> Mark | None:
         note = read_event(payload)
     except MalformedMessage:
         return None
-    if note.kind is EventKind.RESET_REQUEST:
-        return ResetMark(note.stamp_ns, note.text)
-    if note.kind is EventKind.SILENCE:
-        return SilenceMark(note.stamp_ns, note.text)
-    if note.kind is EventKind.ENGINE_STOPPED:
-        return StopMark(note.stamp_ns)
+    match note.kind:
+        case EventKind.RESET_REQUEST:
+            return ResetMark(note.stamp_ns, note.text)
+        case EventKind.SILENCE:
+            return SilenceMark(note.stamp_ns, note.text)
+        case EventKind.ENGINE_STOPPED:
+            return StopMark(note.stamp_ns)
     return None
 
 

@@ -59,9 +59,7 @@ def attachment(name: str, text: str) -> mcap.Attachment:
     Return the record of an attached text.
     """
     kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
-    return mcap.Attachment(
-        create_time=0, log_time=0, name=name, media_type=kind, data=text.encode()
-    )
+    return mcap.Attachment(0, 0, name, kind, text.encode())
 
 
 def as_bytes(*records: Any) -> bytes:
@@ -293,14 +291,8 @@ class RecordWriter:
         if not self._chunk:
             return
         records, (first_ns, last_ns) = bytes(self._chunk), self._times
-        chunk = mcap.Chunk(
-            compression=self._compression.value,
-            data=_PACKERS[self._compression](records),
-            message_end_time=last_ns,
-            message_start_time=first_ns,
-            uncompressed_crc=crc32(records),
-            uncompressed_size=len(records),
-        )
+        packed, kind = _PACKERS[self._compression](records), self._compression.value
+        chunk = mcap.Chunk(kind, packed, last_ns, first_ns, crc32(records), len(records))
         entries = {number: np.array(each, np.int64) for number, each in self._entries.items()}
         self._chunk.clear()
         self._entries.clear()
@@ -322,7 +314,7 @@ class RecordWriter:
         self._write(record)
         if not self.indexed:
             return
-        index = self._summary.add_chunk(chunk, at, len(record))
+        index = self._summary.add_indexed(chunk, at, len(record))
         counts = {number: each.size // 2 for number, each in entries.items()}
         self._summary.count(counts, chunk.message_start_time, chunk.message_end_time)
         for number, each in entries.items():
@@ -426,16 +418,11 @@ class BagWriter(RecordWriter):
         if not types.is_known(type_name):
             raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
         latched = (topic.rpartition('/')[2], type_name) in _LATCHED
-        channel = mcap.Channel(
-            id=0,
-            topic=topic,
-            message_encoding='cdr',
-            schema_id=0,
-            metadata={
-                'offered_qos_profiles': _LATCHED_QOS if latched else '',
-                'topic_type_hash': types.type_hash(type_name),
-            },
-        )
+        metadata = {
+            'offered_qos_profiles': _LATCHED_QOS if latched else '',
+            'topic_type_hash': types.type_hash(type_name),
+        }
+        channel = mcap.Channel(0, topic, 'cdr', metadata, 0)
         text = types.definition(type_name).encode()
         schema = mcap.Schema(id=0, name=type_name, encoding='ros2msg', data=text)
         self._channels[key] = self.declare(channel, schema)

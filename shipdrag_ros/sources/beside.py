@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.bags.mcap_file import PART, is_bag_folder, names_in
+from shipdrag_ros.bags.mcap_file import PART, is_bag_folder
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.ship import RunSheet
 
@@ -154,7 +155,7 @@ def _sources_in(folder: Path) -> list[str]:
     return [
         each.name
         for each in folder.iterdir()
-        if (each.is_dir() and is_bag_folder(names_in(each)))
+        if (each.is_dir() and is_bag_folder(os.listdir(each)))
         or (each.is_file() and is_source(each.name, partial(_beginning, each)))
     ]
 

@@ -321,11 +321,12 @@ def test_damage_is_named_by_place_and_kind(writer: str, samples: Samples, tmp_pa
         assert (record.offset, name(record.opcode), 'length') in named
 
 
-def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(samples, save):
+def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(samples, save, damage_of):
     sample = samples['zstd']
     first = next(record for record in sample.records if record.opcode == Opcode.CHUNK)
     content = bytearray(sample.content)
     content[first.offset : first.end] = bytes(first.end - first.offset)
+    assert ('channel', 'duplicate') not in damage_of(bytes(content))
     saved = save(bytes(content))
     assert saved.sound == sample.untouched(first)
     # without a summary the messages are there, under names of their own
