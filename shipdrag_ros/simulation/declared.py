@@ -20,9 +20,9 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
 from shipdrag_ros.ship.expression import PURE, Formula
+from shipdrag_ros.ship.model import friction_n, viscous_n
 from shipdrag_ros.simulation import effect
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.hydrodynamics import friction_n, viscous_n
+from shipdrag_ros.simulation.effect import Action
 from shipdrag_ros.simulation.scenario import Turn
 
 _KNOTS = 24  # of a force in time: straight between them
