@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -256,6 +257,7 @@ def _also_s(
     return times
 
 
+@lru_cache(maxsize=8)
 def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
     """Return the length of a step where no thrust runs down."""
     r = float(ship.resistance_n(speed_m_s)) / ship.mass_kg

@@ -23,7 +23,7 @@ from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Action, Frame
 from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.kernel import COLUMN, LEG, Records, SurgeLaw, follow
-from shipdrag_ros.simulation.scenario import GaussMarkov, Scenario
+from shipdrag_ros.simulation.scenario import GaussMarkov, Scenario, shares
 
 _LULL = 0.1  # of the stall speed, within which a shaft stops
 _STALLS = 0.12  # of its free revs, at which the torque of a propeller is largest: B4-70, B6-80
@@ -390,9 +390,9 @@ def columns_of(
         record['current_north_m_s'] = north + action.current_m_s[1]
         record['change_east_m_s2'] = action.current_change_m_s[0] * per_s
         record['change_north_m_s2'] = action.current_change_m_s[1] * per_s
-        record['run_down_s'] = run_down_s(ship, action)
-        for name in _AS_THEY_ARE:
-            record[name] = getattr(action, name)
+    records['run_down_s'] = [run_down_s(ship, action) for action in actions]
+    for name in _AS_THEY_ARE:
+        records[name] = [getattr(action, name) for action in actions]
     return records
 
 
@@ -452,15 +452,19 @@ def legs_of(
     legs['thrust_ordered'] = [scenario.thrust_ordered(start) for start in edges_s[:-1]]
     legs['yaw_rad'] = scenario.heading(edges[:-1])
     quarters = edges[:-1] + np.array([[0.25], [0.75]]) * length - scenario.lead_in_s
-    for turn in scenario.turns:
+    if scenario.turns:
         # linear within a leg, and at its ends perhaps a step
-        early, late = turn.share(quarters)
+        early, late = shares(scenario.turns, quarters).transpose(1, 0, 2)
         per_s = 2.0 * (late - early) / length
         share = early - 0.25 * length * per_s
-        area_1_m = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg
-        if turn.rate_rad_s:
-            legs['yaw_rate_rad_s'] += turn.rate_rad_s * share
-            legs['yaw_rate_rad_s2'] += turn.rate_rad_s * per_s
-        legs['turning_1_m'] += area_1_m * share
-        legs['turning_1_m_s'] += area_1_m * per_s
+        rates = np.array([[turn.rate_rad_s] for turn in scenario.turns])
+        areas = np.array([[turn.drag_area_m2] for turn in scenario.turns])
+        areas_1_m = 0.5 * ship.water.density_kg_m3 * areas / ship.mass_kg
+        for name, each in (
+            ('yaw_rate_rad_s', rates * share),
+            ('yaw_rate_rad_s2', rates * per_s),
+            ('turning_1_m', areas_1_m * share),
+            ('turning_1_m_s', areas_1_m * per_s),
+        ):
+            legs[name] += np.add.accumulate(each)[-1]  # in their order, to the last bit
     return legs
