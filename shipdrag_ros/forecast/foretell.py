@@ -83,7 +83,7 @@ ROUGHER = _families(
 )
 PRIORS = (
     *(each.declared for each in (FORMS, WIDTHS, ROUGHER)),
-    *(each for each in vars().copy().values() if isinstance(each, Declared)),
+    *(LEVEL, EXPONENT, SMOOTH, ALIKE, GUST, ANOTHER_RUN, FORM_OFF),
 )
 """What docs/results/priors.md prints; times of gusts, slow water and log: those of noise."""
 
