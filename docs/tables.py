@@ -15,7 +15,7 @@ from pathlib import Path
 from shipdrag_ros.coastdown import numbers as vouching_numbers
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.fields import keys_of
-from shipdrag_ros.forecast import priors as forecast_priors
+from shipdrag_ros.forecast import foretell
 from shipdrag_ros.inference import priors as noise_priors
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameter import Declared, Parameter
@@ -198,7 +198,7 @@ def model_forecast() -> str:
     """
     Return the table of the priors of the forecast.
     """
-    return _declared(forecast_priors.TABLE)
+    return _declared(foretell.PRIORS)
 
 
 def _declared(rows_of: Iterable[Declared]) -> str:

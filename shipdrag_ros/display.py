@@ -22,7 +22,8 @@ T = TypeVar('T')
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
-M_S_PER_KNOT = 1852.0 / 3600.0
+MILE_M = 1852.0
+M_S_PER_KNOT = MILE_M / 3600.0
 _UNITS_M_S = {'m/s': 1.0, 'knots': M_S_PER_KNOT, 'km/h': 1.0 / 3.6, 'mph': 0.44704}
 UNIT_RATIOS = {
     of / other: f'{shown} over {meant}'
@@ -190,6 +191,35 @@ def duration(seconds: float) -> str:
     if seconds < 600.0:
         return f'{seconds:.4g} s'
     return f'{seconds:.0f} s ({seconds / 60.0:.0f} min)'
+
+
+def clock(seconds: float) -> str:
+    """
+    Return a length of time as minutes and seconds; below ten seconds with a tenth.
+
+    Examples
+    --------
+    >>> clock(460.0), clock(8.31), clock(4000.0)
+    ('7:40', '0:08.3', '66:40')
+    """
+    if seconds < 9.95:
+        return f'0:{seconds:04.1f}'
+    minutes, rest = divmod(round(seconds), 60)
+    return f'{minutes}:{rest:02d}'
+
+
+def way(metres: float, mass_kg: float, largest_m: float = 0.0) -> str:
+    """
+    Return a distance in nautical miles, of a light craft or beside no long way in metres.
+
+    Examples
+    --------
+    >>> way(-1852.0, 2e7), way(-81.7, 2e7)
+    ('-1.00 nm', '-81.7 m')
+    """
+    if mass_kg < LIGHT_KG or max(abs(metres), largest_m) < 0.1 * MILE_M:
+        return f'{metres:.3g} m'
+    return f'{metres / MILE_M:.2f} nm'
 
 
 def plus_minus(value: float, spread: float) -> str:

@@ -12,7 +12,7 @@ PACKAGE = """
 from dataclasses import replace
 from shipdrag_ros.studies.s1.estimators.s1_speed import ESTIMATOR as PUBLISHED
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Action
 from shipdrag_ros.simulation.effect import Effect, Scope
 
 def act(frame, force):

@@ -19,7 +19,7 @@ from benchmarks import ROOT
 from benchmarks._asked import asked
 from benchmarks._tables import put, table
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
-from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
+from shipdrag_ros.ship.model import QuadraticDrag
 from shipdrag_ros.studies.cable import drag
 from shipdrag_ros.studies.cable.face.verb import LINES, RANGE_COLOR, SURFACES
 

@@ -19,10 +19,9 @@ from tempfile import TemporaryDirectory
 
 from benchmarks import ROOT, _verbs
 from benchmarks._asked import asked
-from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.store import Store
-from shipdrag_ros.fleet.update import update
+from shipdrag_ros.fleet.update import Engine, update
 
 SHIP = ROOT / 'config' / 'vitus_bering.yaml'
 

@@ -29,10 +29,9 @@ from typing import Any
 from benchmarks import ROOT
 from benchmarks._asked import asked
 from shipdrag_ros.cli import main as shipdrag
-from shipdrag_ros.fleet.engine import Engine
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, find
 from shipdrag_ros.fleet.store import Store
-from shipdrag_ros.fleet.update import update
+from shipdrag_ros.fleet.update import Engine, update
 
 OUT = ROOT / 'benchmarks' / 'out' / 'fleet_throughput'
 DISTINCT = 20

@@ -66,9 +66,10 @@ _SUMMARIES = {
 }
 _SHARED = {  # modules of more than one verb
     '.bags': ('info', 'check', 'recover'),
+    '.effects': ('diagnose', 'baseline', 'learn', 'effect'),
     '.fleet': ('fleet', 'trend', 'poster'),
     '.installation': ('doctor', 'completion'),
-    '.learn': ('baseline', 'learn', 'effect'),
+    '.on_board': ('node', 'watch'),
     '.simulate': ('simulate', 'simulate-fleet'),
 }
 _MODULES = {'import': '.import_'} | {name: m for m, names in _SHARED.items() for name in names}

@@ -14,9 +14,8 @@ from shipdrag_ros.bags import Run
 from shipdrag_ros.bags.check import FileCheck, check
 from shipdrag_ros.bags.records import Damage
 from shipdrag_ros.bags.recover import Recovery, recover
-from shipdrag_ros.cli.arguments import add, bag, new_file
+from shipdrag_ros.cli.arguments import add, add_bags, bag, new_file, open_parts
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import add_bags, open_parts
 from shipdrag_ros.display import Table
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.samples import FURTHER

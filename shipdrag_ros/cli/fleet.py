@@ -69,10 +69,9 @@ def run_fleet(options: argparse.Namespace) -> int:
     shipdrag fleet records -o store --workers 1
     shipdrag fleet records -o store --json fleet.json
     """
-    from shipdrag_ros.fleet.engine import Engine
     from shipdrag_ros.fleet.find import find
     from shipdrag_ros.fleet.store import Store
-    from shipdrag_ros.fleet.update import update
+    from shipdrag_ros.fleet.update import Engine, update
 
     output = Output(options.json)
     found = find(options.folders, without=options.out)

@@ -27,11 +27,10 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add, number
+from shipdrag_ros.cli.arguments import add, add_bags, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.replay import replayed
-from shipdrag_ros.cli.windowed import add_bags
-from shipdrag_ros.forecast import words
+from shipdrag_ros.display import clock
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.library import forecasts
 
@@ -88,11 +87,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _show(output: Output, each: forecasts.GlideForecast) -> None:
     one = forecasts.Forecasts((each,))
-    output.heading(f'{each.bag}, {words.clock(each.after_s)} after the stop')
+    output.heading(f'{each.bag}, {clock(each.after_s)} after the stop')
     for line in one.summary().splitlines():
         output.say(line)
     if each.checked is not None:
-        output.table(words.table(each.checked.milestones, each.ship.mass_kg))
+        output.table(forecasts.milestone_table(each.checked.milestones, each.ship.mass_kg))
 
 
 def document(found: forecasts.Forecasts) -> dict[str, Any]:

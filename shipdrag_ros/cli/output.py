@@ -6,11 +6,12 @@ from __future__ import annotations
 import io
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -19,8 +20,11 @@ from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
 from shipdrag_ros.compiled import when_compiling
-from shipdrag_ros.display import Table, duration, json_text
+from shipdrag_ros.display import Section, Table, duration, json_text
 from shipdrag_ros.progress import PartDone, Progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _EVERY_S = 3.0  # between lines
 _COMPILES = 'compiling, once after an installation or an update; this takes about a minute'
@@ -247,3 +251,65 @@ class CheckResult(NamedTuple):
     state: CheckState
     found: str
     do: str = ''
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """
+    A result as its verb prints it and its page shows it.
+
+    Attributes
+    ----------
+    title
+        Of the page.
+    sentence
+        What was found.
+    sections
+        With their headings, without pictures.
+    pictures
+        Heading of the section, figure and caption of each; drawn one by one, for a page alone.
+    source, foot
+        Of the page: where the data come from, and the formulas.
+    """
+
+    title: str
+    sentence: str
+    sections: Sequence[Section]
+    pictures: Iterator[tuple[str, Figure, str]]
+    source: str = ''
+    foot: str = ''
+
+
+def show(output: Output, shown: Presentation, report: Path | None) -> None:
+    """
+    Print a result, and write its page where one was asked for.
+    """
+    output.say(shown.sentence)
+    for part in shown.sections:
+        for text in part.text:
+            output.say(text)
+        for caption, table in part.tables:
+            output.heading(caption)
+            output.table(table)
+        for line in part.lines:
+            output.say(f'- {line}')
+    if report is None:
+        return
+    from shipdrag_ros.report.document import write_page  # takes long to import
+    from shipdrag_ros.report.drawing import picture
+
+    drawn = [(heading, picture(figure, caption)) for heading, figure, caption in shown.pictures]
+    sections = [
+        replace(part, pictures=[each for heading, each in drawn if heading == part.heading])
+        for part in shown.sections
+    ]
+    about = {'sentence': shown.sentence, 'source': shown.source, 'foot': shown.foot}
+    write_page(report, shown.title, sections, **about)
+    output.log(f'report in {report}')
+
+
+def by_columns(columns: Mapping[str, Iterable[str]]) -> Table:
+    """
+    Return a table from the cells of each column, by its head.
+    """
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)))

@@ -32,21 +32,18 @@ from pathlib import Path
 
 from shipdrag_ros.bags import WindowedRun
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import add
+from shipdrag_ros.cli.arguments import add, add_bags, open_windowed
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import add_bags, open_windowed
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import json_text
-from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.imports import need
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
-from shipdrag_ros.replay.document import document
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import Ranking, Together, rank, together
+from shipdrag_ros.replay.run_result import Ranking, RunResult, Together, rank, together
+from shipdrag_ros.replay.tables import document
 from shipdrag_ros.ship import Ship
 
 REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'
@@ -177,12 +174,12 @@ def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -
     estimate = coastdown.estimate
     curve = None if estimate is None else estimate.valid_curve
     if curve is not None and len(curve):
-        output.table(estimate_tables.force_table(curve, run.ship))
+        output.table(estimate_words.force_table(curve, run.ship))
         output.say('')
     output.say(lines[-1])
     if curve is not None and len(curve):
         truth = None if run.truth is None else run.truth.at
-        output.table(estimate_tables.curve_table(curve, truth=truth))
+        output.table(estimate_words.curve_table(curve, truth=truth))
         output.say('')
     output.table(tables.facts(coastdown))
     if estimate is not None:
@@ -205,8 +202,8 @@ def show_together(output: Output, found: Together, runs: Sequence[RunResult]) ->
     force = Force.of(found.combined, ship)
     output.heading(f'{found.combined.runs} coastdowns together')
     output.say(force.at(force.near(tables.common_speed_m_s(runs))))
-    output.table(estimate_tables.force_table(found.combined, ship))
+    output.table(estimate_words.force_table(found.combined, ship))
     output.say('')
-    output.table(estimate_tables.combined_table(found.combined))
+    output.table(estimate_words.combined_table(found.combined))
     for note in words.combined_notes(found.combined):
         output.say(f'- {note}')

@@ -314,7 +314,8 @@ class Context:
         yaw = np.zeros((len(actions), len(after)))
         for i, action in enumerate(actions):
             for turn in action.turns:
-                yaw[i] += turn.turned_rad(after)
+                if turn.rate_rad_s:  # a force that goes by the time is many turns without one
+                    yaw[i] += turn.turned_rad(after)
         parts.append(yaw)
         if self.run_down_s is not None:
             parts.append(np.array([[self._log_fall(self.run_down_s, each)] for each in actions]))

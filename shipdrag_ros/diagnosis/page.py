@@ -14,11 +14,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.diagnosis import tables, words
+from shipdrag_ros.diagnosis import words
 from shipdrag_ros.diagnosis.result import Compared, DiagnosisResult
 from shipdrag_ros.diagnosis.words import Answer, probability
 from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Section, Table, dated, speed_unit
-from shipdrag_ros.estimation import tables as estimate_tables
+from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.pictures import curves_picture, power_picture
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.words import in_service
@@ -251,7 +251,7 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     )
     if found.facts:
         caption = 'Facts of the log book; each may be wrong'
-        yield Section('Facts that were given', tables=[(caption, tables.facts(found))])
+        yield Section('Facts that were given', tables=[(caption, words.facts_table(found))])
     if found.would_decide:
         yield Section('What would decide', lines=words.advice(found))
 
@@ -284,7 +284,7 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
         tables=[
             (
                 f'{date}: resistance and effective power',
-                estimate_tables.force_table(curve, ship),
+                estimate_words.force_table(curve, ship),
             )
             for date, curve in curves
         ],
@@ -301,7 +301,7 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
         'How large it is',
         text=() if found.effects else ('Of each candidate, were it the one:',),
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
-        tables=[('In SI; sd is one standard deviation', tables.sizes(found))],
+        tables=[('In SI; sd is one standard deviation', words.sizes_table(found))],
     )
 
 
@@ -314,7 +314,7 @@ def _limits(found: DiagnosisResult) -> Iterator[Section]:
         'with its other parameters as usual, nine of ten such runs would have named it. - : no '
         'size is named, as another effect leaves about the same trace'
     )
-    yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
+    yield Section('What can be there all the same', tables=[(caption, words.limits_table(found))])
 
 
 def _motions(found: DiagnosisResult, ship: Ship | None) -> Section:
@@ -334,7 +334,7 @@ def _motions(found: DiagnosisResult, ship: Ship | None) -> Section:
     return Section(
         'Measured against simulated' if drawn else 'How far model and data are apart',
         pictures=drawn,
-        tables=[(gaps, tables.gaps(found))],
+        tables=[(gaps, words.gaps_table(found))],
     )
 
 
@@ -369,7 +369,7 @@ def _known(found: DiagnosisResult, ship: Ship | None) -> Section:
         caption = (
             'Noise of the measurements, means over some seconds each; sd is one standard deviation'
         )
-        shown.append((caption, tables.noise(found.traces)))
+        shown.append((caption, words.noise_table(found.traces)))
     text.append(f'Baseline: {words.baseline(found, ship)}.')
     if ship is not None and ship.effects:
         stated = ', '.join(effect.name for effect in ship.effects)

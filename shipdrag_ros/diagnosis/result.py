@@ -449,6 +449,6 @@ class DiagnosisResult:
         """
         Show how probable each answer is.
         """
-        from shipdrag_ros.diagnosis import tables
+        from shipdrag_ros.diagnosis import words
 
-        return tables.probabilities(self)
+        return words.probabilities_table(self)

@@ -13,11 +13,11 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.distance import along_track
+from shipdrag_ros.estimation.record import right
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.forecast.result import Band, Forecast, Milestone
 from shipdrag_ros.posterior import priors
-from shipdrag_ros.posterior.rows import right
 from shipdrag_ros.samples import SECOND_NS, Float64, kind_of
 
 OUTSIDE = 0.1

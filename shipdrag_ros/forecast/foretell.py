@@ -28,9 +28,9 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast import priors
 from shipdrag_ros.forecast.result import Forecast, Z
 from shipdrag_ros.inference import priors as noise
+from shipdrag_ros.parameter import Declared, normal
 from shipdrag_ros.parameters import SPEEDS_M_S
 from shipdrag_ros.posterior.law import parts_n
 from shipdrag_ros.posterior.priors import LEFT_S, RUN_DOWN
@@ -40,6 +40,52 @@ from shipdrag_ros.ship.sections import Propulsion
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.scenario import Scenario
+
+_WORLD = 'world A, records'
+
+LEVEL = Declared('d', 'level of d: the size of r is what was measured', normal(1.0), '', _WORLD)
+EXPONENT = Declared('d', 'exponent of r over u, beside that of the form', normal(0.15), '', _WORLD)
+SMOOTH = Declared('d', 'a smooth rest of d', normal(0.06), '', _WORLD)
+ALIKE = Declared('d', 'over how much of ln u that rest is alike', 0.4, '', _WORLD)
+GUST = Declared('-', 'gust, of the deceleration at the stop', normal(0.04), '', _WORLD)
+ANOTHER_RUN = Declared(
+    '-',
+    'r of the next run over that last known, less one: `--if-stopped-now`',
+    normal(0.05),
+    '',
+    'runs of one hull on one day',
+)
+FORM_OFF = Declared('-', 'form of r of a baseline, relative', normal(0.01), '', 'judgement')
+
+
+class WeighedFamilies(NamedTuple):
+    """Values with their probabilities, and what is printed of them."""
+
+    of: tuple[tuple[float, float], ...]
+    declared: Declared
+
+
+def _families(letter: str, meaning: str, *of: tuple[float, float]) -> WeighedFamilies:
+    said = ', '.join(f'{value:g} ({chance:g})' for value, chance in of)
+    expected = sum(value * chance for value, chance in of)
+    text = f'{meaning}, mean of families (with their probabilities): {said}'
+    return WeighedFamilies(of, Declared(letter, text, round(expected, 3), '', _WORLD))
+
+
+FORMS = _families(
+    'f',
+    'share of a constant force in the deceleration at the stop',
+    *((0.0, 0.7), (0.03, 0.1), (0.1, 0.08), (0.3, 0.05), (0.6, 0.04), (0.9, 0.03)),
+)
+WIDTHS = _families('-', 'exponent and rest are wider by', (1.0, 0.85), (3.0, 0.12), (10.0, 0.03))
+ROUGHER = _families(
+    '-', 'errors of the estimate and gusts are larger by', (1.0, 0.6), (2.0, 0.25), (4.0, 0.15)
+)
+PRIORS = (
+    *(each.declared for each in (FORMS, WIDTHS, ROUGHER)),
+    *(LEVEL, EXPONENT, SMOOTH, ALIKE, GUST, ANOTHER_RUN, FORM_OFF),
+)
+"""What docs/results/priors.md prints; times of gusts, slow water and log: those of noise."""
 
 _POINTS = 25  # of the curve, evenly in ln u
 _ALIKE_RANGE = (0.03, 3.0)  # of ln u, over which errors of the estimate may be alike
@@ -110,7 +156,7 @@ def deceleration(known: KnownCurve, ship: Ship, speed_m_s: Float64) -> Decelerat
     u = np.concatenate([np.exp(x), speed_m_s])
     hull = parts_n(ship, u).sum(axis=0) / (1.0 + ship.n_r(u))
     (share, of_form), (width, of_width), (rougher, of_rougher) = (
-        np.array(each.of).T for each in (priors.FORMS, priors.WIDTHS, priors.ROUGHER)
+        np.array(each.of).T for each in (FORMS, WIDTHS, ROUGHER)
     )
     base = measured[-1] + np.log(np.outer(hull / hull[_POINTS - 1], 1.0 - share) + share)
     off = measured[:, None] - base[:_POINTS]
@@ -138,9 +184,9 @@ def deceleration(known: KnownCurve, ship: Ship, speed_m_s: Float64) -> Decelerat
 def _prior(x: Float64, width: Float64) -> Float64:
     """Return the covariance of d from the top on, of each width."""
     apart = x[:, None] - x
-    shape = priors.EXPONENT.sd**2 * np.outer(x, x)
-    shape += priors.SMOOTH.sd**2 * np.exp(-0.5 * (apart / priors.ALIKE.mean) ** 2)
-    return np.asarray(priors.LEVEL.sd**2 + width[:, None, None] ** 2 * shape)
+    shape = EXPONENT.sd**2 * np.outer(x, x)
+    shape += SMOOTH.sd**2 * np.exp(-0.5 * (apart / ALIKE.mean) ** 2)
+    return np.asarray(LEVEL.sd**2 + width[:, None, None] ** 2 * shape)
 
 
 def _measured(known: KnownCurve, ship: Ship, u: Float64) -> tuple[Float64, Float64]:
@@ -363,7 +409,7 @@ def _variance(weights: Float64, covariance: Float64) -> Float64:
 
 def _gusts(u: Float64, a: Float64, time: Float64) -> Float64:
     """Return the covariance of a Gauss-Markov force, in parts of the deceleration."""
-    size = priors.GUST.sd * a[-1] / a[:-1]
+    size = GUST.sd * a[-1] / a[:-1]
     damping = 2.0 * a[0] / u[0]
     length = noise.GUST_TIME.mean / math.sqrt(damping)
     return np.asarray(np.outer(size, size) * np.exp(-np.abs(time[:, None] - time) / length))
@@ -423,8 +469,8 @@ class HullNow:
         """
         Take the curve of a coastdown that has ended; the next run differs from it.
         """
-        alike = np.full(len(speed_m_s), priors.ALIKE.mean)
-        level_sd = priors.ANOTHER_RUN.sd
+        alike = np.full(len(speed_m_s), ALIKE.mean)
+        level_sd = ANOTHER_RUN.sd
         return cls(KnownCurve(speed_m_s, resistance_m_s2, sigma_m_s2, alike, level_sd), source)
 
     @classmethod
@@ -459,10 +505,8 @@ class HullNow:
             source = f'the ship file, with {", ".join(each.name for each in ship.effects)}'
         r = (newtons + added) / mass
         # a file errs alike at all speeds
-        level_sd = float(np.hypot(priors.ANOTHER_RUN.sd, np.mean(sd / (newtons + added))))
-        return cls(
-            KnownCurve(speed, r, priors.FORM_OFF.sd * r, np.ones(_OF_FILE), level_sd), source
-        )
+        level_sd = float(np.hypot(ANOTHER_RUN.sd, np.mean(sd / (newtons + added))))
+        return cls(KnownCurve(speed, r, FORM_OFF.sd * r, np.ones(_OF_FILE), level_sd), source)
 
 
 def _relative_sd(effect: StatedEffect) -> float:

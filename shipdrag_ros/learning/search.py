@@ -34,8 +34,8 @@ from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.declared import TermParameter
+from shipdrag_ros.ship.model import drag_n
 from shipdrag_ros.ship.term import LearntTerm, TermEvidence, TermLimit
-from shipdrag_ros.simulation.hydrodynamics import drag_n
 
 _FITTED, _KINDS = 16, 10  # forms that are fitted, the best of so many kinds first
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there

@@ -9,8 +9,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.bags import WindowedRun, WindowSpan
-from shipdrag_ros.diagnosis import tables, with_effects
-from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis import with_effects, words
 from shipdrag_ros.diagnosis.document import EarlierDiagnosis, document, read_earlier
 from shipdrag_ros.diagnosis.result import Candidate, Compared, DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.display import Table, speed_unit
@@ -118,7 +117,7 @@ class Diagnosis(Shown):
         return document(self.found, self.ship)
 
     def _lines(self) -> Sequence[str]:
-        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+        return (*self.found.summary(), *words.advice(self.found), *self.notes)
 
     def table(self) -> Table:
         """
@@ -130,7 +129,7 @@ class Diagnosis(Shown):
         """
         Show how far model and data are apart, before and after.
         """
-        return tables.gaps(self.found)
+        return words.gaps_table(self.found)
 
     def plot(self, ax: Axes | None = None, *, run: int = 0, quantity: str | None = None) -> Axes:
         """
@@ -156,7 +155,7 @@ class Diagnosis(Shown):
         scale = (1.0, 'm')
         if compared.quantity.startswith('speed'):
             scale = speed_unit(0.0 if self.ship is None else self.ship.mass_kg)
-        added = diagnosis_words.added(self.found)
+        added = words.added(self.found)
         with drawing(ax) as axis:
             draw_difference(axis, compared, scale, labels=('model as stated', added))
             axis.legend()
@@ -214,10 +213,10 @@ def _first(found: DiagnosisResult) -> str:
     if found.question:
         return in_python(found.question)
     if found.effects:
-        names = diagnosis_words.names_text([each.name for each in found.effects])
-        return f'{names} ({diagnosis_words.least_probable(found)})'
-    answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
-    return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
+        names = words.names_text([each.name for each in found.effects])
+        return f'{names} ({words.least_probable(found)})'
+    answer = max(words.answers(found), key=lambda each: each.probability)
+    return f'{answer.words} ({words.probability(answer.probability)})'
 
 
 def _earlier(given: str | PathLike[str] | Diagnosis, place: int) -> EarlierDiagnosis:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,14 +13,13 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.coastdown.running import too_vague
-from shipdrag_ros.display import Table, ship_speed, speed_unit, utc
+from shipdrag_ros.display import Table, clock, ship_speed, speed_unit, utc, way
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.window import Series
-from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Checked, Followed, Passed
 from shipdrag_ros.forecast.foretell import HullNow, foretell, if_stopped
-from shipdrag_ros.forecast.result import Forecast, Milestone
+from shipdrag_ros.forecast.result import Band, Forecast, Milestone
 from shipdrag_ros.library.shown import Shown, drawing
 from shipdrag_ros.replay import accepted_samples
 from shipdrag_ros.replay.coasts import coast_windows
@@ -115,9 +114,9 @@ class Forecasts(Shown):
         rows: list[tuple[str, ...]] = []
         for each in self.made:
             if each.checked is not None:
-                part = words.table(each.checked.milestones, each.ship.mass_kg)
+                part = milestone_table(each.checked.milestones, each.ship.mass_kg)
                 columns = ('made after', *part.columns)
-                rows += [(words.clock(each.after_s), *row) for row in part.rows]
+                rows += [(clock(each.after_s), *row) for row in part.rows]
         return Table(columns, tuple(rows))
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -199,11 +198,13 @@ def milestone_columns(milestones: Sequence[Milestone]) -> dict[str, Any]:
 
 
 def _line(each: GlideForecast) -> str:
-    head = f'{words.clock(each.after_s)} after the stop of {utc(each.stop_ns)}'
+    head = f'{clock(each.after_s)} after the stop of {utc(each.stop_ns)}'
     if each.checked is None:
         return f'{head}: no forecast: {each.why}.'
-    shown = words.apart(each.checked.milestones, each.ship.mass_kg)
-    said = '; '.join(words.sentence(one.foretold, each.ship.mass_kg, one.was_s) for one in shown)
+    shown = _apart(each.checked.milestones, each.ship.mass_kg)
+    said = '; '.join(
+        milestone_sentence(one.foretold, each.ship.mass_kg, one.was_s) for one in shown
+    )
     inside = each.checked.inside
     judged = '' if inside is None else f' {inside:.0%} of what followed lies inside the bands.'
     beside = f' Not compared: {each.why}.' if each.why else ''
@@ -312,7 +313,7 @@ class IfStopped(Shown):
         Name of the last run.
     ship
     hull
-        Where the hull as last known is from, in words.
+        Where the hull as last known is from, in
     measured
         What kind of speed it begins from.
     gliding
@@ -338,8 +339,8 @@ class IfStopped(Shown):
     def _lines(self) -> Sequence[str]:
         mass = self.ship.mass_kg
         now = ship_speed(float(self.forecast.speed_m_s[0]), mass)
-        shown = words.apart(self.passed, mass)
-        said = '; '.join(words.sentence(each.foretold, mass) for each in shown)
+        shown = _apart(self.passed, mass)
+        said = '; '.join(milestone_sentence(each.foretold, mass) for each in shown)
         when = f'at {utc(self.forecast.made_ns)}'
         begun = f'Gliding already {when}' if self.gliding else f'If the engine were stopped {when}'
         return (f'{begun}, at {now} {self.measured}, by {self.hull}: {said}.',)
@@ -353,7 +354,7 @@ class IfStopped(Shown):
         """
         Show when and how far on she would have each lower speed.
         """
-        return words.table(self.passed, self.ship.mass_kg, followed=False)
+        return milestone_table(self.passed, self.ship.mass_kg, followed=False)
 
     def _title(self) -> str:
         return f'if stopped at {utc(self.forecast.made_ns)}'
@@ -438,3 +439,53 @@ def _recent(run: RunResult) -> tuple[Window, Series, str]:
         'not known; give a bag that ends with readings of speed_through_water or '
         'speed_over_ground'
     )
+
+
+def milestone_sentence(milestone: Milestone, mass_kg: float, was_s: float | None = None) -> str:
+    """
+    Say when she has a speed and how far on: `3.9 knots in 7:40 (6:50 to 8:30), 0.71 nm`.
+    """
+    time = milestone.time_s
+    text = (
+        f'{ship_speed(milestone.speed_m_s, mass_kg)} in {clock(time.median)} '
+        f'({clock(time.low)} to {clock(time.high)}), {way(milestone.distance_m.median, mass_kg)}'
+    )
+    if was_s is None:
+        return text
+    return f'{text}; was {clock(was_s)}' if was_s >= 0.0 else f'{text}; passed before'
+
+
+def _was(value: float | None, was_s: float | None, show: Callable[[float], str]) -> str:
+    """Return what was; a speed may have been passed before it was foretold."""
+    if value is None or was_s is None:
+        return 'not shown'
+    return show(value) if was_s >= 0.0 else 'before'
+
+
+def _cells(band: Band, show: Callable[[float], str]) -> tuple[str, ...]:
+    """Return a median, and its band."""
+    return show(band.median), f'{show(band.low)} to {show(band.high)}'
+
+
+def _apart(compared: Sequence[Passed], mass_kg: float) -> list[Passed]:
+    """Return milestones without those whose speed reads as that of one before."""
+    first: dict[str, Passed] = {}
+    for each in compared:
+        first.setdefault(ship_speed(each.foretold.speed_m_s, mass_kg), each)
+    return list(first.values())
+
+
+def milestone_table(compared: Sequence[Passed], mass_kg: float, *, followed: bool = True) -> Table:
+    """
+    Show milestones, a line each; beside what followed, or alone.
+    """
+    rows = []
+    for each in _apart(compared, mass_kg):
+        far = partial(way, mass_kg=mass_kg, largest_m=each.foretold.distance_m.high)
+        time, distance = _cells(each.foretold.time_s, clock), _cells(each.foretold.distance_m, far)
+        if followed:
+            time += (_was(each.was_s, each.was_s, clock),)
+            distance += (_was(each.was_m, each.was_s, far),)
+        rows.append((ship_speed(each.foretold.speed_m_s, mass_kg), *time, *distance))
+    was = ('was',) if followed else ()
+    return Table(('down to', 'in [min:s]', '90 %', *was, 'after', '90 %', *was), tuple(rows))

@@ -18,10 +18,17 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Job, Option
-from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import FORMAT as TABLE
 from shipdrag_ros.sources.formats.csv.importer import read_csv
-from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, TableRows, are_numbers, written
+from shipdrag_ros.sources.formats.csv.table import (
+    Cells,
+    LogTable,
+    TableRows,
+    are_numbers,
+    parse_input,
+    parse_time,
+    written,
+)
 from shipdrag_ros.sources.log import ImportResult, Log
 from shipdrag_ros.sources.reading import LogRun, format_of, join
 

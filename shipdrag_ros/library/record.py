@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown import events
 from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.display import Table, dated, duration, speed_unit, utc
 from shipdrag_ros.errors import BagError, EstimationError
-from shipdrag_ros.estimation import tables as estimate_tables
+from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ForceCurve, ResistanceCurve
@@ -28,10 +28,9 @@ from shipdrag_ros.library.replaying import Notes, refuse_two_ships, replay_run
 from shipdrag_ros.library.shown import Shown, ShownResistance, drawing, says_it_in_python, writing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
-from shipdrag_ros.replay.document import document
 from shipdrag_ros.replay.playback import SHIP_FILE, StopTime, attached_ship
-from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve
-from shipdrag_ros.replay.together import together
+from shipdrag_ros.replay.run_result import ATTACHMENT, RunResult, TrueCurve, together
+from shipdrag_ros.replay.tables import document
 from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 
@@ -587,7 +586,7 @@ class Resistance(ShownResistance):
         Show points of the one r(v); of several coastdowns that have none, a line each.
         """
         try:
-            return estimate_tables.force_table(self.curve, self.ship)
+            return estimate_words.force_table(self.curve, self.ship)
         except EstimationError:
             return tables.coastdowns_table(self.runs)
 

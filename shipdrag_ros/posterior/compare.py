@@ -50,8 +50,7 @@ from shipdrag_ros.posterior.hypotheses import (
 from shipdrag_ros.posterior.problem import EXACT
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Scope
+from shipdrag_ros.simulation.effect import Action, Effect, Scope
 from shipdrag_ros.simulation.effects import checked
 
 _ITERATIONS = 30  # of Gauss and Newton

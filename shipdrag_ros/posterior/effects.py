@@ -21,8 +21,7 @@ from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope
+from shipdrag_ros.simulation.effect import Action, Effect, Frame, Scope
 from shipdrag_ros.simulation.effects import effects_of
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0

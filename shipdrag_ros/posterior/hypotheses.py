@@ -27,8 +27,7 @@ from shipdrag_ros.posterior.effects import EffectWay, retardation_of
 from shipdrag_ros.posterior.motion import EXTRAS
 from shipdrag_ros.posterior.problem import EXACT, RunModel
 from shipdrag_ros.samples import Float64, Int64
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame
+from shipdrag_ros.simulation.effect import Action, Effect, Frame
 
 IN_SPEED, IN_TIME, QUICK_IN_TIME = 'u', 't', 't, quick'
 IN_LOG, QUICK_IN_LOG, IN_GROUND = 'log', 'log, quick', 'ground'

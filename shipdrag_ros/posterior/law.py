@@ -19,14 +19,14 @@ from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
-from shipdrag_ros.ship.sections import TableBaseline
-from shipdrag_ros.simulation.hydrodynamics import (
+from shipdrag_ros.ship.model import (
     USUAL_FORM_FACTOR,
     drag_n,
     friction_n,
     surface_m2,
     viscous_n,
 )
+from shipdrag_ros.ship.sections import TableBaseline
 
 _NODES = 97  # of the grid of speeds
 ABOVE = 1.25  # of the highest speed that a fit may try

@@ -27,8 +27,7 @@ from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.posterior.weather import Weather
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame
+from shipdrag_ros.simulation.effect import Action, Effect, Frame
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.simulation.scenario import Scenario
 

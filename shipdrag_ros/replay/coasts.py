@@ -30,10 +30,11 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.given_window import margin_around_ns, parts_of_one_clock
 from shipdrag_ros.replay.playback import (
     ReplayResult,
     feed,
+    margin_around_ns,
+    parts_of_one_clock,
     recorded_parameters,
     refuse_without_input,
 )

@@ -21,14 +21,12 @@ from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import EndedCoastdown, Regimes
 from shipdrag_ros.display import Picture, Section, Table, speed_unit
 from shipdrag_ros.estimation import pictures as estimate_pictures
-from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
 from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
 from shipdrag_ros.replay import tables, words
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import RankedHull, Ranking, of_one_ship, together
+from shipdrag_ros.replay.run_result import RankedHull, Ranking, RunResult, of_one_ship, together
 from shipdrag_ros.replay.words import StretchSpan, cut_lines, inside, stretch
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, picture
@@ -260,10 +258,8 @@ def _coastdown(
         truth = None if run.truth is None else run.truth.at
         curve = estimate.valid_curve
         if len(curve):
-            found.append((estimate_tables.FORCE, estimate_tables.force_table(curve, run.ship)))
-            found.append(
-                (estimate_tables.SPECIFIC, estimate_tables.curve_table(curve, truth=truth))
-            )
+            found.append((estimate_words.FORCE, estimate_words.force_table(curve, run.ship)))
+            found.append((estimate_words.SPECIFIC, estimate_words.curve_table(curve, truth=truth)))
     found.append(('How it was found', tables.facts(coastdown)))
     cuts = cut_lines(coastdown, run.run.span_ns)
     lines = words.summary(coastdown, run.ship)
@@ -355,8 +351,8 @@ def _all(runs: Sequence[RunResult]) -> Section:
         )
         lines = list(words.combined_notes(found.combined))
         shown += [
-            (estimate_tables.FORCE, estimate_tables.force_table(found.combined, ship)),
-            (estimate_tables.SPECIFIC, estimate_tables.combined_table(found.combined)),
+            (estimate_words.FORCE, estimate_words.force_table(found.combined, ship)),
+            (estimate_words.SPECIFIC, estimate_words.combined_table(found.combined)),
         ]
     elif found.why_not:
         lead.append(f'Not combined: {found.why_not}.')

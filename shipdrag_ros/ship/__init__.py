@@ -4,8 +4,8 @@
 from shipdrag_ros.ship.facts import Fact as Fact
 from shipdrag_ros.ship.facts import parse_fact as parse_fact
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3 as AIR_DENSITY_KG_M3
+from shipdrag_ros.ship.model import RunSheet as RunSheet
 from shipdrag_ros.ship.model import Ship as Ship
-from shipdrag_ros.ship.run_sheet import RunSheet as RunSheet
 from shipdrag_ros.ship.sections import GRAVITY_M_S2 as GRAVITY_M_S2
 from shipdrag_ros.ship.sections import AddedMass as AddedMass
 from shipdrag_ros.ship.sections import Air as Air

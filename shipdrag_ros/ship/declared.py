@@ -332,7 +332,11 @@ class DeclaredTerm:
         Return a value of a variable, inside of what is valid.
         """
         valid = self.term.valid.get(name)
-        return np.asarray(np.clip(value, *valid) if valid else value, np.float64)
+        if valid and isinstance(value, float):  # as of most names, thousands of times
+            value = min(max(value, valid[0]), valid[1])
+        elif valid:
+            value = np.clip(value, *valid)
+        return np.asarray(value, np.float64)
 
 
 def worth(expression: str, names: Mapping[str, Float64 | float]) -> Float64:

@@ -12,7 +12,7 @@ import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -67,6 +67,7 @@ class Algebra(Protocol[T]):
         ...
 
 
+_Walk = Callable[[Any, Mapping[str, Any]], Any]
 _SIGNS = {ast.Add: '+', ast.Sub: '-', ast.Mult: '*', ast.Div: '/'}
 
 
@@ -80,12 +81,13 @@ class Formula:
     text
     names
         That it needs, sorted.
-    tree
+    walked
+        From an algebra and what it has for each name to the whole.
     """
 
     text: str
     names: tuple[str, ...]
-    tree: ast.expr = field(repr=False, compare=False)
+    walked: _Walk = field(repr=False, compare=False)
 
     @classmethod
     @lru_cache(512)  # a fit needs one formula some thousand times
@@ -103,7 +105,7 @@ class Formula:
         if len(nodes) > 3 * MOST_NODES:
             raise FormulaError(f'has more than {MOST_NODES} parts; write a shorter one')
         names = _check(tree, 0)
-        return cls(text, tuple(sorted(names)), tree)
+        return cls(text, tuple(sorted(names)), _walked(tree))
 
     def walk(self, algebra: Algebra[T], names: Mapping[str, T]) -> T:
         """
@@ -119,7 +121,8 @@ class Formula:
             raise FormulaError(
                 f'{", ".join(unknown)} is not known; known are {", ".join(sorted(names))}'
             )
-        return _walk(self.tree, algebra, names)
+        result: T = self.walked(algebra, names)
+        return result
 
 
 def _tree(text: str) -> ast.expr:
@@ -161,32 +164,36 @@ def _check(node: ast.expr, depth: int) -> set[str]:
     )
 
 
-def _walk(node: ast.expr, algebra: Algebra[T], names: Mapping[str, T]) -> T:
-    """Return a part of a tree that was checked in some algebra."""
-    if isinstance(node, ast.Name):
-        return names[node.id]
-    if isinstance(node, ast.Constant):
-        assert isinstance(node.value, int | float)
-        return algebra.number(float(node.value))
-    if isinstance(node, ast.UnaryOp):
-        value = _walk(node.operand, algebra, names)
-        if isinstance(node.op, ast.UAdd):
-            return value
-        return algebra.binary('*', algebra.number(-1.0), value)
-    if isinstance(node, ast.Call):
-        assert isinstance(node.func, ast.Name)
-        return algebra.call(node.func.id, [_walk(each, algebra, names) for each in node.args])
+def _walked(node: ast.expr) -> _Walk:
+    """Return what walks a part of a tree that was checked, looked at once."""
+    match node:
+        case ast.Name(id=name):
+            return lambda algebra, names: names[name]
+        case ast.Constant(value=int() | float() as value):
+            return lambda algebra, names: algebra.number(float(value))
+        case ast.UnaryOp(op=op, operand=operand):
+            inner = _walked(operand)
+            if isinstance(op, ast.UAdd):
+                return inner
+            return lambda a, names: a.binary('*', a.number(-1.0), inner(a, names))
+        case ast.Call(func=ast.Name(id=name), args=values):
+            parts = [*map(_walked, values)]
+            return lambda a, names: a.call(name, [part(a, names) for part in parts])
     assert isinstance(node, ast.BinOp)
-    left = _walk(node.left, algebra, names)
-    exponent = _literal(node.right) if isinstance(node.op, ast.Pow) else None
+    left, right = _walked(node.left), _walked(node.right)
+    if not isinstance(node.op, ast.Pow):
+        sign = _SIGNS[type(node.op)]
+        return lambda a, names: a.binary(sign, left(a, names), right(a, names))
+    exponent = _literal(node.right)
     if exponent is None:
-        right = _walk(node.right, algebra, names)
-        if isinstance(node.op, ast.Pow):
-            return algebra.power_of(left, right)
-        return algebra.binary(_SIGNS[type(node.op)], left, right)
+        return lambda a, names: a.power_of(left(a, names), right(a, names))
+    return lambda a, names: a.power(left(a, names), _no_steeper(exponent))
+
+
+def _no_steeper(exponent: float) -> float:
     if abs(exponent) > _STEEPEST:
         raise FormulaError(f'has the exponent {exponent:g}, at most {_STEEPEST:g} is allowed')
-    return algebra.power(left, exponent)
+    return exponent
 
 
 def _literal(node: ast.expr) -> float | None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The ship: what the ship file says, and what follows from it.
+The ship: what the ship file says, what follows from it, and where a run of hers differs.
 
 Particulars are checked against each other. A length in feet or a volume in tonnes is a
 plausible number by itself; beside the other particulars it is not.
@@ -9,11 +9,12 @@ plausible number by itself; beside the other particulars it is not.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, replace
 from functools import cached_property
 from importlib import resources
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ from shipdrag_ros.fields import (
     text_of,
 )
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.facts import Fact, fact_list
+from shipdrag_ros.ship.facts import Fact, fact_list, overriding
 from shipdrag_ros.ship.sections import (
     GRAVITY_M_S2,
     AddedMass,
@@ -52,6 +53,7 @@ from shipdrag_ros.ship.sections import (
     Water,
     added_mass,
     baseline,
+    ittc57,
     n_r_polynomial,
 )
 from shipdrag_ros.ship.term import LearntTerm, learnt_terms
@@ -60,6 +62,9 @@ SLENDERNESS = (2.0, 15.0)  # L / V^(1/3): car to racing shell
 SLENDERNESS_MERCHANT = (4.0, 8.0)  # outside it the merchant n_r is meaningless
 SLENDERNESS_MERCHANT_TRUSTED = (4.5, 7.0)
 _FROUDE = np.linspace(0.0, 0.4, 41)  # of displacement ships, for the sign of n_r
+ROPES = (0.01, 0.04)  # C0 of towed ropes in practice
+USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
+_FRESH, _SEA = 999.0, 1026.0  # kg/m^3 at 15 degrees
 
 
 def slenderness(length_m: float, displaced_volume_m3: float) -> float:
@@ -498,3 +503,206 @@ class Ship:
             return np.zeros_like(wind)
         area = self.air.frontal_area_m2 * self.air.drag_coefficient
         return 0.5 * AIR_DENSITY_KG_M3 * area * wind * np.abs(wind)
+
+
+def friction_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return (1 + k) C_F times the pressure on the wetted surface [N].
+
+    Parameters
+    ----------
+    speed_m_s
+        Through water, 0 or more.
+
+    Notes
+    -----
+    ITTC-57. A baseline that is a table has no form factor: k = 0.2.
+    """
+    base = ship.baseline
+    k = base.form_factor if isinstance(base, CoefficientBaseline) else USUAL_FORM_FACTOR
+    reynolds = speed_m_s * ship.length_m / ship.water.kinematic_viscosity_m2_s
+    return (1.0 + k) * ittc57(reynolds) * _force_n(ship, speed_m_s)
+
+
+def viscous_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return the friction with the correlation allowance [N].
+    """
+    base = ship.baseline
+    allowance = base.correlation_allowance if isinstance(base, CoefficientBaseline) else 0.0
+    return friction_n(ship, speed_m_s) + allowance * _force_n(ship, speed_m_s)
+
+
+def drag_n(ship: Ship, drag_area_m2: float, speed_m_s: Float64) -> Float64:
+    """
+    Return 0.5 rho A v^2 [N] in the water of a ship.
+    """
+    return QuadraticDrag(drag_area_m2, ship.water.density_kg_m3).force_n(speed_m_s)
+
+
+@dataclass(frozen=True)
+class QuadraticDrag:
+    """
+    A drag that grows with the square of the speed.
+
+    Attributes
+    ----------
+    drag_area_m2
+        C0 l d.
+    density_kg_m3
+        Of the water.
+    """
+
+    drag_area_m2: float
+    density_kg_m3: float
+
+    def force_n(self, speed_m_s: Float64) -> Float64:
+        """
+        Return 0.5 rho A v^2 [N] at speeds of 0 or more; S2 (11).
+        """
+        return 0.5 * self.density_kg_m3 * self.drag_area_m2 * speed_m_s**2
+
+
+def _force_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    return drag_n(ship, surface_m2(ship), speed_m_s)
+
+
+def surface_m2(ship: Ship) -> float:
+    """
+    Return the wetted surface, the usual one of her length and volume where none is stated.
+    """
+    return ship.wetted_surface_m2 or usual_wetted_surface_m2(
+        ship.length_m, ship.displaced_volume_m3
+    )
+
+
+@dataclass(frozen=True)
+class RunWater:
+    """
+    The water of one run.
+    """
+
+    temperature_c: float | None = declare(
+        number(-2.0, 40.0, 'degC'), 'temperature, from which the viscosity follows', default=None
+    )
+    density_kg_m3: float | None = declare(number(900.0, 1100.0, 'kg/m^3'), 'density', default=None)
+    density: float | None = declare(
+        number(900.0, 1100.0, 'kg/m^3'), 'the same in other words', default=None
+    )
+
+
+@dataclass(frozen=True)
+class RunSheet:
+    """
+    One run, where it differs from the ship file.
+
+    `load` and `from_yaml` check every value; constructing one directly does not.
+    """
+
+    facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of it', default=())
+    draught_m: float | None = declare(number(0.01, 40.0, 'm'), 'draught', default=None)
+    displaced_volume_m3: float | None = declare(
+        number(1e-4, 1e6, 'm^3'), 'displaced volume', default=None
+    )
+    water: RunWater | None = declare(section(RunWater), 'the water', default=None)
+
+    @property
+    def temperature_c(self) -> float | None:
+        """Temperature of the water [degC]; None where it is not stated."""
+        return None if self.water is None else self.water.temperature_c
+
+    @classmethod
+    def load(cls, path: Path) -> RunSheet:
+        """
+        Read a file.
+
+        Raises
+        ------
+        ShipFileError
+            Naming every problem of the file at once.
+        """
+        content = text_of(path, what='a run file', error=ShipFileError)
+        return cls.from_yaml(content, subject=str(path))
+
+    @classmethod
+    def from_yaml(cls, content: str, *, subject: str) -> RunSheet:
+        """
+        Read a text; `subject` names it in errors.
+
+        Raises
+        ------
+        ShipFileError
+            Naming every problem of the text at once.
+        """
+        data = parse(content, subject=subject, error=ShipFileError)
+        problems: list[str] = []
+        accepted = read_keys(keys_of(cls), data, '', problems)
+        water = accepted.get('water')
+        if water and water.density is not None and water.density_kg_m3 is not None:
+            problems.append('water: density and density_kg_m3 are the same; keep one')
+        if problems:
+            raise ShipFileError(subject, problems)
+        return cls(**accepted)
+
+    def of(self, ship: Ship, *, subject: str, facts: Sequence[Fact] = ()) -> Ship:
+        """
+        Return the ship as she was in the run, with what is known of it.
+
+        Parameters
+        ----------
+        ship
+            As her file states her; the resistance coefficients stay hers.
+        subject
+            Names the run in errors.
+        facts
+            Of all runs, which override those of the ship and of the run.
+
+        Raises
+        ------
+        ShipFileError
+            If what is overridden does not fit the rest of the ship file.
+        """
+        water = ship.water
+        if self.water is not None:
+            density = self.water.density_kg_m3 or self.water.density or ship.water.density_kg_m3
+            viscosity = ship.water.kinematic_viscosity_m2_s
+            if self.water.temperature_c is not None:
+                viscosity = kinematic_viscosity(self.water.temperature_c, density)
+            water = replace(ship.water, density_kg_m3=density, kinematic_viscosity_m2_s=viscosity)
+        changed = replace(
+            ship,
+            draught_m=self.draught_m or ship.draught_m,
+            displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
+            water=water,
+            facts=overriding(ship.facts, self.facts, facts),
+        )
+        problems = list(inconsistencies({name: getattr(changed, name) for name in keys_of(Ship)}))
+        if problems:
+            raise ShipFileError(subject, problems)
+        return changed
+
+
+def kinematic_viscosity(temperature_c: float, density_kg_m3: float) -> float:
+    """
+    Return the kinematic viscosity of water [m^2/s].
+
+    Parameters
+    ----------
+    temperature_c
+        Of the water [degC].
+    density_kg_m3
+        From that of fresh water to that of the sea: how salt it is.
+
+    Returns
+    -------
+    float
+        Between fresh and sea water by the density.
+
+    Notes
+    -----
+    The formulas of the ITTC 1978 performance prediction method for fresh and for
+    sea water; within 2 % of ITTC 7.5-02-01-03 from 0 to 30 degrees.
+    """
+    fresh = (0.000585 * (temperature_c - 12.0) - 0.03361) * (temperature_c - 12.0) + 1.2350
+    sea = (0.000659 * (temperature_c - 1.0) - 0.05076) * (temperature_c - 1.0) + 1.7688
+    return 1e-6 * float(np.interp(density_kg_m3, (_FRESH, _SEA), (fresh, sea)))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surge motion of a ship and the sensors that read it."""
 
-from shipdrag_ros.simulation.action import Action as Action
 from shipdrag_ros.simulation.columns import Columns as Columns
 from shipdrag_ros.simulation.columns import simulate_columns as simulate_columns
+from shipdrag_ros.simulation.effect import Action as Action
 from shipdrag_ros.simulation.effect import Effect as Effect
 from shipdrag_ros.simulation.effect import Frame as Frame
 from shipdrag_ros.simulation.effect import Scope as Scope

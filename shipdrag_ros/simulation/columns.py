@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -18,12 +19,22 @@ from numpy.typing import NDArray
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import terms
-from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Action
 from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
 from shipdrag_ros.simulation.sensors import lagged, log_reading
-from shipdrag_ros.simulation.surge import own_action, steps_of
+from shipdrag_ros.simulation.surge import (
+    acted,
+    columns_of,
+    edges_of,
+    extra_of,
+    law_of,
+    legs_of,
+    outside,
+    own_action,
+    run_down_s,
+    steps_of,
+)
 
 RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left, which is none
 _STEPS_A_RUN_DOWN = 4
@@ -87,7 +98,7 @@ class _Prepared:
         """Return what `follow` does, a path a motion (p, m, 5)."""
         paths = np.empty((len(self.records), len(time_s), 5))
         follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
-        lost = np.maximum.accumulate(terms.outside(self.law, paths[:, :, 0]), axis=1)
+        lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
         paths[lost] = np.nan
         return paths
 
@@ -177,9 +188,9 @@ def simulate_columns(
 def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
     longest = _longest_step_s(ship, scenario.speed_m_s)
-    run_down_s = terms.run_down_s(ship, Action())
+    run_down = run_down_s(ship, Action())
     # what changes at once is smooth later
-    first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
+    first = min(longest, run_down / _LOOKS_A_RUN_DOWN if run_down else longest)
     count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
     steps = first * _LOOKS_GROW ** np.arange(count)
     looks = [np.array([0.0, scenario.length_s])]
@@ -197,7 +208,7 @@ def _prepare(
     speed_m_s: Float64 | None,
     step_s: float | None,
 ) -> _Prepared:
-    law = terms.law_of(ship, scenario.speed_m_s)
+    law = law_of(ship, scenario.speed_m_s)
     speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
     longest = _longest_step_s(ship, scenario.speed_m_s)
@@ -205,17 +216,17 @@ def _prepare(
     places: dict[tuple[Turn, ...], tuple[int, int]] = {}
     for action in actions:
         if action.turns not in places:
-            of_column = terms.acted(scenario, action) if action.turns else scenario
-            edges = terms.edges_of(of_column, also_s=also)
+            of_column = acted(scenario, action) if action.turns else scenario
+            edges = edges_of(of_column, also_s=also)
             steps = (
                 _steps(ship, of_column, edges, longest)
                 if step_s is None
                 else steps_of(ship, of_column, edges, step_s=step_s)
             )
             first = sum(map(len, legs))
-            legs.append(terms.legs_of(ship, of_column, edges, steps))
+            legs.append(legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)
-    records = terms.columns_of(ship, scenario, actions, speed_m_s=speeds)
+    records = columns_of(ship, scenario, actions, speed_m_s=speeds)
     motions: dict[tuple[object, ...], int] = {}
     motion = [
         motions.setdefault((record.tobytes(), action.resistance, action.turns), len(motions))
@@ -227,7 +238,7 @@ def _prepare(
         np.array(motion),
         law,
         records[once],
-        terms.extra_of(ship, law, moving),
+        extra_of(ship, law, moving),
         np.concatenate(legs),
         np.array([places[action.turns] for action in moving]),
     )
@@ -246,6 +257,7 @@ def _also_s(
     return times
 
 
+@lru_cache(maxsize=8)
 def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
     """Return the length of a step where no thrust runs down."""
     r = float(ship.resistance_n(speed_m_s)) / ship.mass_kg
@@ -254,7 +266,7 @@ def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
 
 def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: float) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    run_down_s = terms.run_down_s(ship, Action())
+    run_down = run_down_s(ship, Action())
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
     counts = []
@@ -262,8 +274,8 @@ def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: floa
         step = longest
         # by its middle: the end of a run-down is an edge, to the last bit or not
         middle = 0.5 * (start + end)
-        if any(0.0 <= middle - order < RUN_DOWNS * run_down_s for order in orders):
-            step = min(step, run_down_s / _STEPS_A_RUN_DOWN)
+        if any(0.0 <= middle - order < RUN_DOWNS * run_down for order in orders):
+            step = min(step, run_down / _STEPS_A_RUN_DOWN)
         # before anything happens the speed is steady, and a step of any length exact
         counts.append(1 if end <= quiet_s else max(1, int(np.ceil((end - start) / step))))
     return counts

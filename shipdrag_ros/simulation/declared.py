@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -20,9 +20,9 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, LearntTerm, Ship
 from shipdrag_ros.ship.declared import TermParameter, TermPart, as_found, worth
 from shipdrag_ros.ship.expression import PURE, Formula
+from shipdrag_ros.ship.model import friction_n, viscous_n
 from shipdrag_ros.simulation import effect
-from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.hydrodynamics import friction_n, viscous_n
+from shipdrag_ros.simulation.effect import Action
 from shipdrag_ros.simulation.scenario import Turn
 
 _KNOTS = 24  # of a force in time: straight between them
@@ -204,11 +204,12 @@ class _Acting:
         inside = self.term.inside('u', speed_m_s)
         force = np.broadcast_to(self.at(inside), np.shape(speed_m_s))
         beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0)
-        power = 2.0 if np.all(beyond >= 1.0) else self._power()
+        power = 2.0 if np.all(beyond >= 1.0) else self._power
         return force * np.where(beyond < 1.0, beyond**power, beyond**2)
 
+    @cached_property
     def _power(self) -> float:
-        """Return the power of the speed that a force is at the lowest that it holds for."""
+        """The power of the speed that a force is at the lowest that it holds for."""
         low = self.term.term.valid['u'][0]
         here, faster = (float(self.at(speed)) for speed in (low, low * (1.0 + _STEP)))
         if here * faster <= 0.0:

@@ -8,10 +8,10 @@ the lead-in, where the engine is stopped by default.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import isfinite
 
 import numpy as np
@@ -145,12 +145,8 @@ class Turn:
         """
         Return how far rate, drag and rudder have grown, 0..1.
         """
-        time = np.asarray(after_lead_in_s, np.float64)
-        begins, grown, falls, ends = self.corners_s
-        if grown <= begins or ends <= falls:  # an edge of nothing, or lost beside the times
-            return ((time >= begins) & (time < ends)).astype(np.float64)
-        risen = np.clip((time - begins) / (grown - begins), 0.0, 1.0)
-        return risen - np.clip((time - falls) / (ends - falls), 0.0, 1.0)
+        result: Float64 = shares([self], after_lead_in_s)[0]
+        return result
 
     def turned_rad(self, after_lead_in_s: ArrayLike) -> Float64:
         """
@@ -167,6 +163,32 @@ class Turn:
             return positive
         within = np.minimum(positive, self.edge_s)
         return positive - within + 0.5 * within**2 / self.edge_s
+
+
+def shares(turns: Sequence[Turn], after_lead_in_s: ArrayLike) -> Float64:
+    """
+    Return how far rate, drag and rudder of each turn have grown, 0..1.
+
+    Parameters
+    ----------
+    turns
+        t of them.
+    after_lead_in_s
+        Times of any shape [s].
+
+    Returns
+    -------
+    (t, ...)
+    """
+    time = np.asarray(after_lead_in_s, np.float64)
+    corners = np.reshape([turn.corners_s for turn in turns], (-1, 4)).T
+    begins, grown, falls, ends = corners.reshape(4, -1, *[1] * time.ndim)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        risen = np.clip((time - begins) / (grown - begins), 0.0, 1.0)
+        fallen = np.clip((time - falls) / (ends - falls), 0.0, 1.0)
+    at_once = (grown <= begins) | (ends <= falls)  # an edge of nothing, or lost beside the times
+    result: Float64 = np.where(at_once, (time >= begins) & (time < ends), risen - fallen)
+    return result
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,9 +253,10 @@ class Scenario:
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0.0):
                 yield f'{name} is {value!r}, expected 0 or more'
-        for name in ('heading_rad', 'current_m_s'):
-            if not np.all(np.isfinite(getattr(self, name))):
-                yield f'{name} is {getattr(self, name)!r}, expected finite'
+        if not isfinite(self.heading_rad):
+            yield f'heading_rad is {self.heading_rad!r}, expected finite'
+        if not all(map(isfinite, self.current_m_s)):
+            yield f'current_m_s is {self.current_m_s!r}, expected finite'
         if self.speed_m_s == 0.0 or self.lead_in_s + self.duration_s == 0.0:
             yield 'speed and length of the record must not be 0'
         times = [order.time_s for order in self.orders]
@@ -245,10 +268,10 @@ class Scenario:
             if not all(early <= late for early, late in pairwise(corners)):
                 yield f'a turn is at {turn.corners_s}, expected ascending and within the record'
         fractions = [(order.shaft, order.thrust) for order in self.orders]
-        if not np.all(np.isfinite(fractions)):
+        if not all(map(isfinite, chain(*fractions))):
             yield f'orders are {self.orders!r}, expected finite fractions'
         rates = [(turn.rate_rad_s, turn.drag_area_m2, turn.rudder_rad) for turn in self.turns]
-        if not np.all(np.isfinite(rates)):
+        if not all(map(isfinite, chain(*rates))):
             yield f'turns are {self.turns!r}, expected finite values'
         for name in ('water_speed', 'gust_force'):
             noise = getattr(self, name)

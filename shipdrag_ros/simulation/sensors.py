@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import FURTHER, Block, Channel, Float64, in_arrival_order
-from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Action
 from shipdrag_ros.simulation.scenario import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
 

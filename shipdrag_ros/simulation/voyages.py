@@ -20,7 +20,7 @@ import numpy as np
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import CoefficientBaseline, Ship
-from shipdrag_ros.ship.run_sheet import kinematic_viscosity
+from shipdrag_ros.ship.model import kinematic_viscosity
 from shipdrag_ros.simulation.scenario import GaussMarkov, Scenario
 from shipdrag_ros.simulation.sensors import sense, standard_sensors
 from shipdrag_ros.simulation.surge import simulate

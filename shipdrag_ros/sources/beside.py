@@ -41,8 +41,7 @@ def is_source(name: str, beginning: Callable[[], bytes]) -> bool:
         return True
     first = beginning()
     from shipdrag_ros.sources import formats  # where all names say what they are, not needed
-    from shipdrag_ros.sources.format import CERTAIN, Head
-    from shipdrag_ros.sources.opened import GZIP
+    from shipdrag_ros.sources.format import CERTAIN, GZIP, Head
 
     if first.startswith(GZIP):
         try:

@@ -25,7 +25,7 @@ from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import best
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
-from shipdrag_ros.sources.format import Format, Head, Job, Option
+from shipdrag_ros.sources.format import Format, Head, Job, Lines, Option
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
@@ -37,7 +37,6 @@ from shipdrag_ros.sources.log import (
     out_of_order,
     rejected_words,
 )
-from shipdrag_ros.sources.opened import Lines
 
 JUMP_NS = 10 * SECOND_NS
 """A time that steps further forward, and back with the next one, is a damaged one."""

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from shipdrag_ros.display import Section, Table, day, ship_speed, speed_unit
+from shipdrag_ros.display import Section, Table, clock, day, ship_speed, speed_unit, way
 from shipdrag_ros.fleet.store import same_time
-from shipdrag_ros.forecast.priors import GUST
+from shipdrag_ros.forecast.foretell import GUST
 from shipdrag_ros.forecast.result import Band, Z
-from shipdrag_ros.forecast.words import clock, way
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship

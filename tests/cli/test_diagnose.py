@@ -14,8 +14,8 @@ import pytest
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
+from shipdrag_ros.cli.arguments import WindowedBag, open_windowed
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import WindowedBag, open_windowed
 from shipdrag_ros.diagnosis.document import read_earlier
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import coasts_of

@@ -14,8 +14,7 @@ import pytest
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.forecast import document
-from shipdrag_ros.display import ship_speed
-from shipdrag_ros.forecast import words
+from shipdrag_ros.display import clock, ship_speed
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
 
@@ -74,7 +73,7 @@ def test_a_script_gets_the_same(found: dict[str, Any], coastdown_bag: Path) -> N
     assert (frame['time_low_s'] < frame['time_high_s']).all()
     # a speed that reads as the one before has no row of its own
     speeds = [ship_speed(each, made.made[0].ship.mass_kg) for each in frame['speed_m_s']]
-    shown = dict.fromkeys(zip(map(words.clock, frame['after_s']), speeds, strict=True))
+    shown = dict.fromkeys(zip(map(clock, frame['after_s']), speeds, strict=True))
     assert [row[:2] for row in made.table().rows] == list(shown)
 
 

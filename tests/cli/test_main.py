@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros import cli
-from shipdrag_ros.cli import node
+from shipdrag_ros.cli import on_board
 from shipdrag_ros.errors import BagError
 
 SHIPDRAG = Path(sys.executable).with_name('shipdrag')
@@ -25,7 +25,7 @@ def run_verb(monkeypatch: pytest.MonkeyPatch, result: int | BaseException, *argu
             raise result
         return result
 
-    monkeypatch.setattr(node, 'run', run)
+    monkeypatch.setattr(on_board, 'run_node', run)
     return cli.main(['node', '--ship', 'a', '--out', 'b', *arguments])
 
 

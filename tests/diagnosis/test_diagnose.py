@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, diagnose, verdict, words
-from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.diagnose import compare, observed
 from shipdrag_ros.diagnosis.known import Facts
 from shipdrag_ros.diagnosis.observation import Observation
@@ -346,7 +345,7 @@ def test_without_anything_hidden_nothing_is_most_probable() -> None:
     assert 0.3 < (found.limits['locked_propeller'].would_be_named or np.inf) < 0.75
     assert found.limits['turning'].would_be_named == 0.0  # the heading shows that she turns
     assert 'turning of any size' in words.sentence(replace(found, verdict=Verdict.NONE))
-    assert 'any size' in {row[3] for row in diagnosis_cells.limits(found).rows}
+    assert 'any size' in {row[3] for row in words.limits_table(found).rows}
 
 
 @pytest.mark.parametrize(

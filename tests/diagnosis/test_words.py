@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis import words
 from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Where
 from shipdrag_ros.diagnosis.words import answers, place, probability, sentence
 from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
@@ -124,13 +124,13 @@ def test_nothing_is_told_to_be_certain(value: float, said: str) -> None:
 
 def test_tables_leave_out_what_is_not_there() -> None:
     found = diagnosis(Verdict.NAMED, (('fouling',), 0.9995), effects=(FOULING,))
-    assert diagnosis_cells.gaps(found).rows == (('model as stated', '0.200', '-', '20.00'),)
-    (row,) = diagnosis_cells.parameters(found.effects).rows
+    assert words.gaps_table(found).rows == (('model as stated', '0.200', '-', '20.00'),)
+    (row,) = words.parameters_table(found.effects).rows
     assert row[:4] == ('fouling', 'friction_factor', '0.401', '0.012')
-    size, side, _ = diagnosis_cells.parameters([WAVES]).rows
+    size, side, _ = words.parameters_table([WAVES]).rows
     assert size[2:4] == ('51200', '3000')
     assert side[2:4] == ('astern', '-')
-    assert diagnosis_cells.noise(found.traces).rows == ()
+    assert words.noise_table(found.traces).rows == ()
 
 
 def test_a_place_before_the_stop_ends_at_zero_and_not_at_minus_zero() -> None:

@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipdrag_ros.display import clock, way
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Followed, Passed, interval_score
 from shipdrag_ros.forecast.foretell import HullNow, KnownCurve, deceleration, foretell, if_stopped
 from shipdrag_ros.forecast.result import Band, PathAhead
+from shipdrag_ros.library.forecasts import milestone_sentence, milestone_table
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Channel
@@ -252,16 +253,16 @@ def test_the_interval_score() -> None:
 
 def test_words(early: Estimate, ship: Ship) -> None:
     first = foretell(early, ship).milestones[0]
-    text = words.sentence(first, ship.mass_kg, 451.0)
+    text = milestone_sentence(first, ship.mass_kg, 451.0)
     assert text.endswith(' nm; was 7:31')
-    early_m = words.table([Passed(first, -2.5, -9.0)], ship.mass_kg).rows[0]
+    early_m = milestone_table([Passed(first, -2.5, -9.0)], ship.mass_kg).rows[0]
     short = first._replace(distance_m=Band(100.0, 50.0, 300.0))  # in one unit
-    shown = words.table([Passed(short, None, None)], ship.mass_kg).rows[0]
+    shown = milestone_table([Passed(short, None, None)], ship.mass_kg).rows[0]
     assert shown[4:6] == ('0.05 nm', '0.03 nm to 0.16 nm')
     assert (early_m[3], early_m[6]) == ('before', 'before')
-    assert words.sentence(first, ship.mass_kg, -2.5).endswith('; passed before')
-    assert words.clock(first.time_s.median) in text
-    assert words.way(100.0, ship.mass_kg) == '100 m'
+    assert milestone_sentence(first, ship.mass_kg, -2.5).endswith('; passed before')
+    assert clock(first.time_s.median) in text
+    assert way(100.0, ship.mass_kg) == '100 m'
 
 
 @pytest.mark.parametrize('kind', ['speed_through_water', 'position'])

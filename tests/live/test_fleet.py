@@ -9,8 +9,8 @@ from typing import Any
 
 import httpx
 
+from shipdrag_ros.cli.on_board import fleet_pages
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.watch import fleet_pages
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.source import NodeSource
 

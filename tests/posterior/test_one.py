@@ -14,7 +14,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
-from shipdrag_ros.simulation.hydrodynamics import friction_n
+from shipdrag_ros.ship.model import friction_n
 from tests.posterior.conftest import window_of
 
 ONE = Parameters(estimator='one')

@@ -14,8 +14,7 @@ from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdow
 from shipdrag_ros.coastdown.regimes.bank import OUT
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.replay.page import comparison_picture, cut_picture, write_report
-from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.together import RankedHull, rank
+from shipdrag_ros.replay.run_result import RankedHull, RunResult, rank
 from tests.page import Page
 from tests.runs import seen
 

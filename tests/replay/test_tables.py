@@ -11,9 +11,8 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
 from shipdrag_ros.replay import tables as cells
-from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.run_result import RunResult, rank
 from shipdrag_ros.replay.tables import write_curves
-from shipdrag_ros.replay.together import rank
 from tests.runs import seen
 
 

@@ -19,12 +19,12 @@ from ruamel.yaml import YAML
 
 from shipdrag_ros.errors import EffectFileError, ShipFileError
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.ship.model import friction_n
 from shipdrag_ros.ship.term import LearntTerm, read_folders
 from shipdrag_ros.simulation import Scenario, sense, simulate, simulate_columns, standard_sensors
 from shipdrag_ros.simulation.declared import effect_of
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import LIBRARY, declared, find, parse, using
-from shipdrag_ros.simulation.hydrodynamics import friction_n
 
 ROOT = Path(__file__).resolve().parents[2]
 WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')

@@ -19,12 +19,11 @@ from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import (
     TableResult,
     read_csv,
 )
-from shipdrag_ros.sources.formats.csv.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import LogTable, parse_input, parse_time
 from shipdrag_ros.sources.log import BASE_NS, Log
 
 from .conftest import into_bag

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 import shipdrag_ros as sd
 from shipdrag_ros.samples import Block
 from shipdrag_ros.sources.formats.csv.cells import BadCell, CellReader, row_clock
-from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, parse_time
-from shipdrag_ros.sources.formats.csv.table import LogTable
+from shipdrag_ros.sources.formats.csv.table import NANOSECONDS, LogTable, parse_time
 
 COLUMNS = {
     'speed_through_water': 'log:kn',

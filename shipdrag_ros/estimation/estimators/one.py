@@ -15,10 +15,9 @@ from functools import partial
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import AtEnd, ValidRange
 from shipdrag_ros.estimation.estimators import Estimator
 from shipdrag_ros.estimation.record import LEAST_STAMPS, RunRows, block_medians
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.result import AtEnd, Estimate, ResistanceCurve, Track, ValidRange
 from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import CODES, KIND_COUNT, LOG, POSITION, Rows

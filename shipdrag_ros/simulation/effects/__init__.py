@@ -24,9 +24,8 @@ from shipdrag_ros.imports import of_other_packages
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import LearntTerm, Ship, StatedEffect
 from shipdrag_ros.ship.term import check_name
-from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import effect_of, effects_in
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure
+from shipdrag_ros.simulation.effect import Action, Effect, Frame, Measure
 
 GROUP = 'shipdrag.effects'
 

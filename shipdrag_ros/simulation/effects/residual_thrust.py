@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import stated
-from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effect import Action, Frame
 
 
 def _act(frame: Frame, decay_s: float, fraction: float) -> Action:

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from math import copysign
 
-from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import stated
-from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effect import Action, Frame
 from shipdrag_ros.simulation.scenario import Turn
 
 _RUDDER_RAD = 0.17  # 10 degrees, to the side she turns to

@@ -6,9 +6,8 @@ from __future__ import annotations
 from math import pi, sqrt
 
 from shipdrag_ros.ship import GRAVITY_M_S2
-from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.declared import stated
-from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effect import Action, Frame
 
 
 def _act(frame: Frame, force_n: float, side: float, wave_length_m: float) -> Action:

@@ -15,9 +15,17 @@ from xml.etree.ElementTree import ParseError, XMLParser
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Head, Job
+from shipdrag_ros.sources.format import (
+    BROKEN,
+    CERTAIN,
+    LIKELY,
+    NO,
+    Head,
+    Job,
+    check_unpacked,
+    opened,
+)
 from shipdrag_ros.sources.log import Tally, iso_ns
-from shipdrag_ros.sources.opened import BROKEN, check_unpacked, opened
 from shipdrag_ros.sources.stream import Origin, Reading, stream_format
 
 _CHUNK = 1 << 16

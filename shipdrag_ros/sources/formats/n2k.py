@@ -25,8 +25,8 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, days_of, fraction_ns, of_day_ns
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 from shipdrag_ros.sources import format
+from shipdrag_ros.sources.format import Lines
 from shipdrag_ros.sources.log import BASE_NS, DATE_FROM_NS, Tally, iso_ns
-from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
 
 MINUTE_NS = 60 * SECOND_NS

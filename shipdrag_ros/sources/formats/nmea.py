@@ -56,6 +56,7 @@ from shipdrag_ros.nmea.sentences import (
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources import format
+from shipdrag_ros.sources.format import BROKEN, Lines, opened
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
@@ -66,7 +67,6 @@ from shipdrag_ros.sources.log import (
     most_of,
     rejected_words,
 )
-from shipdrag_ros.sources.opened import BROKEN, Lines, opened
 from shipdrag_ros.sources.stream import SourcedValues
 
 _UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below

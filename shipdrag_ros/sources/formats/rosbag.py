@@ -32,7 +32,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import BagError, ImportDataError, reason_of
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
 from shipdrag_ros.messages.topics import TOPICS
-from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
+from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job, beginning
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     LIMIT_NS,
@@ -42,7 +42,6 @@ from shipdrag_ros.sources.log import (
     most_of,
     rejected_words,
 )
-from shipdrag_ros.sources.opened import beginning
 
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20

@@ -17,9 +17,8 @@ from math import pi
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, TRANSDUCER, Head, Job
+from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, TRANSDUCER, Head, Job, Lines
 from shipdrag_ros.sources.log import Tally, iso_ns
-from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.stream import Origin, Reading, counted, stream_format, wind, yaw
 
 _SELF = 'vessels.self'

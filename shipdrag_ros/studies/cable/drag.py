@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
+from shipdrag_ros.ship.model import ROPES, QuadraticDrag
 
 SHORTEST = 20.0  # l/d; the formulas hold above it
 LONGEST = 1000.0  # l/d; beyond it nothing was measured, and a C0 should be stated

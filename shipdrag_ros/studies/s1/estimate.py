@@ -19,10 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.estimators import Estimator
-from shipdrag_ros.estimation.result import Estimate, OrderTrial, Track
+from shipdrag_ros.estimation.result import Estimate, OrderTrial, Track, ValidRange
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import AtEnd
-from shipdrag_ros.estimation.result import ResistanceCurve
+from shipdrag_ros.estimation.result import AtEnd, ResistanceCurve
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.least_squares import OrderTable, rounding

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
+from shipdrag_ros.ship.model import QuadraticDrag
 from shipdrag_ros.studies.cable.drag import (
     Cable,
     CableSurface,

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import Output, show
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.face import show
 from shipdrag_ros.studies.residual.face import verb as words
 from shipdrag_ros.studies.residual.fit import Hulls, ResidualFit, fit_residual
 from shipdrag_ros.studies.surface.face import verb as surface_words

@@ -22,15 +22,13 @@ from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.nmea.sentences import DAY_NS, NoValue, of_day_ns
 from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64
-from shipdrag_ros.sources.formats.csv.columns import (
+from shipdrag_ros.sources.formats.csv.table import (
     COMPASS,
     NANOSECONDS,
-    InputColumns,
-    TimeColumn,
-)
-from shipdrag_ros.sources.formats.csv.table import (
     Cells,
+    InputColumns,
     LogTable,
+    TimeColumn,
     are_numbers,
     texts_of,
     written,

@@ -35,19 +35,21 @@ from shipdrag_ros.sources.formats.csv.cells import (
     row_clock,
     usable,
 )
-from shipdrag_ros.sources.formats.csv.columns import (
+from shipdrag_ros.sources.formats.csv.table import (
     ANGLE_UNITS,
     COMPASS,
     LENGTH_UNITS,
     NANOSECONDS,
     SPEED_UNITS,
+    Cells,
     InputColumns,
+    LogTable,
     TimeColumn,
+    are_numbers,
     columns_of,
     parse_input,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.table import Cells, LogTable, are_numbers
 
 _STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
 _MOVING_M_S = 0.4

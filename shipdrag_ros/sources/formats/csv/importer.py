@@ -64,13 +64,14 @@ from shipdrag_ros.sources.formats.csv.cells import (
     usable,
     zone_of,
 )
-from shipdrag_ros.sources.formats.csv.columns import (
+from shipdrag_ros.sources.formats.csv.guess import Guess
+from shipdrag_ros.sources.formats.csv.table import (
     SPEED_UNITS,
+    LogTable,
+    TableRows,
     parse_time,
     role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.guess import Guess
-from shipdrag_ros.sources.formats.csv.table import LogTable, TableRows
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     ImportResult,

@@ -28,11 +28,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add, number
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import Output, Presentation, by_columns, show
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, GREEN, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.studies.cable import drag
-from shipdrag_ros.studies.face import Presentation, by_columns, show
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

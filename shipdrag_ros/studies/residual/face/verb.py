@@ -38,13 +38,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add, number, unused_file
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import Output, Presentation, by_columns, show
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.formats.csv.table import Numbers, read_numbers
-from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.residual import fit
 from shipdrag_ros.studies.residual.fit import with_residual
 from shipdrag_ros.studies.surface.face import verb

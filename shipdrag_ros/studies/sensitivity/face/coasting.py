@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shipdrag_ros.cli.output import Presentation, by_columns
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, one_axis
 from shipdrag_ros.simulation.effects import effects_of
-from shipdrag_ros.studies.face import Presentation, by_columns
 from shipdrag_ros.studies.sensitivity.coasting import LOG_SD_M_S, POSITION_SD_M, WORST, CoastStudy
 
 if TYPE_CHECKING:

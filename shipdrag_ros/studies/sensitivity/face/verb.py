@@ -33,11 +33,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import Output, Presentation, by_columns, show
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.report.drawing import BLUE, ORANGE, VERMILION, new_figure, one_axis, styled
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.manoeuvring import Motions, mariner, meaning, parse
 from shipdrag_ros.studies.sensitivity import coasting, steering
 from shipdrag_ros.studies.sensitivity.face import coasting as face

@@ -33,13 +33,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add, new_file, whole
-from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.output import Output, Presentation, by_columns, show
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.report.drawing import BLUE, VERMILION, one_axis
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.formats.csv.table import read_numbers
-from shipdrag_ros.studies.face import Presentation, by_columns, show
 from shipdrag_ros.studies.surface.fit import LOWEST, MAX_DEGREE, Prediction, Surface, fit_surface
 
 if TYPE_CHECKING:

@@ -26,7 +26,6 @@ from distributed import Client, get_worker
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import FleetError
-from shipdrag_ros.fleet.engine import Engine, Lost
 from shipdrag_ros.fleet.find import find
 from shipdrag_ros.fleet.store import (
     BAGS,
@@ -36,7 +35,7 @@ from shipdrag_ros.fleet.store import (
     read_coastdowns,
     ship_texts,
 )
-from shipdrag_ros.fleet.update import update
+from shipdrag_ros.fleet.update import Engine, Lost, update
 from shipdrag_ros.library.replaying import Notes
 from shipdrag_ros.library.trends import trends_of
 
@@ -188,7 +187,7 @@ def test_a_run_is_counted_once_however_often_it_was_copied(bags, tmp_path, engin
 
 @pytest.mark.parametrize('place', ['tcp://127.0.0.1:9', 'nonsense', 'http://127.0.0.1:8786'])
 def test_a_scheduler_that_cannot_be_reached_is_told(place: str, monkeypatch) -> None:
-    monkeypatch.setattr('shipdrag_ros.fleet.engine._REACHED_S', 0.5)
+    monkeypatch.setattr('shipdrag_ros.fleet.update._REACHED_S', 0.5)
     start_s = time.monotonic()
     with pytest.raises(FleetError, match='cannot be reached'), Engine(scheduler=place):
         pass
@@ -206,7 +205,7 @@ def test_a_scheduler_is_reached_from_within_a_loop(engine: Engine) -> None:
 
 @pytest.mark.parametrize('says', [b'', b'HTTP/1.1 400 Bad Request\r\n\r\n'])
 def test_what_is_no_scheduler_is_told(says: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('shipdrag_ros.fleet.engine._REACHED_S', 0.5)
+    monkeypatch.setattr('shipdrag_ros.fleet.update._REACHED_S', 0.5)
     with socket.create_server(('127.0.0.1', 0)) as server:
         place = f'tcp://127.0.0.1:{server.getsockname()[1]}'
 
@@ -232,7 +231,7 @@ def test_a_folder_without_a_bag_is_told(tmp_path, capsys) -> None:
 
 
 def test_that_no_worker_is_left_is_an_error_and_no_wait_for_ever(monkeypatch) -> None:
-    monkeypatch.setattr('shipdrag_ros.fleet.engine._LOOK_S', 1.0)
+    monkeypatch.setattr('shipdrag_ros.fleet.update._LOOK_S', 1.0)
     with Engine(workers=1) as lonely:
         assert lonely._client is not None
         lonely._client.cluster.scale(0)

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from shipdrag_ros.estimation.record import condense, right
 from shipdrag_ros.inference.rows import LOG, Rows
-from shipdrag_ros.posterior.rows import condense, right
 
 
 def test_the_first_readings_of_a_fast_fall_are_right() -> None:

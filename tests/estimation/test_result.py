@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation.curve import ValidRange, froude_max
-from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
+from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve, ValidRange, froude_max
 
 
 def curve(froude: np.ndarray, slope: np.ndarray, slope_sigma: float) -> ResistanceCurve:
