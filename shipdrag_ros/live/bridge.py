@@ -368,6 +368,7 @@ class Bridge:
             coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
         lead_s, ready_s = self._health.lead
         return headline.Situation(
+            bag=self._bag,
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
             lifecycle=state.values.get('lifecycle', ''),
             monitor=state.values.get('monitor', ''),

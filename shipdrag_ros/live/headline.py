@@ -269,6 +269,8 @@ class Situation:
 
     Attributes
     ----------
+    bag
+        Name of what is played; '' of a node that runs.
     silent_s
         Since the node was last heard; None: never.
     lifecycle, monitor
@@ -293,6 +295,7 @@ class Situation:
         Whether the last run has its reciprocal.
     """
 
+    bag: str = ''
     silent_s: float | None = None
     lifecycle: str = ''
     monitor: str = ''
@@ -317,6 +320,8 @@ def headline(now: Situation) -> Headline:
     """
     Say where things stand and what to do.
     """
+    if now.silent_s is None and now.bag:
+        return Headline(Tone.WATCH, 'READING', f'{now.bag} is read from its beginning.')
     if now.silent_s is None:
         return Headline(
             Tone.BAD,
@@ -347,14 +352,14 @@ def headline(now: Situation) -> Headline:
 def _sailing(now: Situation) -> Headline:
     if now.monitor == 'coastdown' and now.coast_s is not None:
         return _coasting(now)
+    if now.just_ended is not None:  # an engine that drives her again is no stop either
+        return _ended(now, now.just_ended)
     if now.monitor == 'candidate':
         return Headline(
             Tone.ACT,
             'SLOWING: coastdown?',
             'If the engine is stopped: leave it, rudder amidships. The answer takes two minutes.',
         )
-    if now.just_ended is not None:
-        return _ended(now, now.just_ended)
     return _before(now)
 
 

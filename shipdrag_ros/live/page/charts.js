@@ -165,6 +165,15 @@ export function drawSpeeds(chart, rows, span, units, offset, forecast) {
   const newest = cut.length ? cut[cut.length - 1][0] : 0;
   // what is to come, not more of it than half of what was
   const coming = (forecast?.rows ?? []).map(([t, ...rest]) => [forecast.made_s + t, ...rest]).filter(([t]) => t > newest && t < newest + span / 2);
+  // the estimate of one coastdown is not joined to that of the next
+  const made = cut.filter(row => row[3] != null).map(([t]) => t);
+  const apart = 5 * Math.min(...made.slice(1).map((t, i) => t - made[i]));
+  let last = -Infinity;
+  const estimates = cut.map(([t, , , v]) => {
+    if (v == null) return t - last > apart ? null : undefined; // a gap, or nothing to draw
+    last = t;
+    return units.toSpeed(v);
+  });
   const speed = column => [...cut.map(row => (row[column] == null ? null : units.toSpeed(row[column]))), ...coming.map(() => null)];
   const ahead = column => [...cut.map(() => null), ...coming.map(row => units.toSpeed(row[column]))];
   chart.draw(`${units.name} ${offset}`, () => ({
@@ -175,12 +184,12 @@ export function drawSpeeds(chart, rows, span, units, offset, forecast) {
       timeSeries(offset),
       { label: 'log', stroke: ink('--accent'), width: 2, points: { show: false } },
       { label: 'over ground', stroke: ink('--second'), width: 1.5, dash: [6, 4], points: { show: false } },
-      { label: 'estimate', stroke: ink('--third'), width: 3, dash: [2, 3], spanGaps: true, points: { show: false } },
+      { label: 'estimate', stroke: ink('--third'), width: 3, dash: [2, 3], points: { show: false } },
       { label: 'foretold (shaded: 90 %)', stroke: ink('--third'), width: 1.5, points: { show: false } },
       { label: 'low', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
       { label: 'high', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
     ].map(each => (each.stroke ? { ...each, value: said(v => v.toFixed(2)) } : each)),
-  }), [[...cut, ...coming].map(row => row[0]), speed(1), speed(2), speed(3), ahead(1), ahead(2), ahead(3)]);
+  }), [[...cut, ...coming].map(row => row[0]), speed(1), speed(2), [...estimates, ...coming.map(() => null)], ahead(1), ahead(2), ahead(3)]);
 }
 
 export function drawShafts(chart, rows, span, offset) {
