@@ -348,6 +348,22 @@ def test_what_slows_a_boat_quickly_is_no_power_reduced() -> None:
     assert abs(after_s(ended.start_ns, 600.0)) <= 5.0
 
 
+@pytest.mark.parametrize('factor', [0.3, 0.6, 1.3])
+def test_a_log_alone_that_is_wrong_for_a_minute_hides_no_stop(ship, factor) -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 1900.0)
+    speed = 8.0 / (1.0 + 0.0019 * np.maximum(time - 900.0, 0.0))
+    read = (speed + 0.05 * rng.standard_normal(len(time))) * np.where(
+        (time >= 400.0) & (time < 460.0), factor, 1.0
+    )
+    stamps = START_NS + np.round(time * 1e9).astype(np.int64)
+    monitor = Monitor(ship, Parameters(), estimate=refuse, final=refuse)
+    events = monitor.update(Block.of(Channel.SPEED_THROUGH_WATER, stamps, read))
+    (ended,) = standing([*events, *monitor.finish()])
+    assert abs(after_s(ended.start_ns, 900.0)) <= 20.0
+    assert ended.ended_by is EndedBy.RECORD_END
+
+
 def test_a_small_craft_with_short_windows() -> None:
     # 1.2 m, 20 Hz, coasting for 27 s: the record of a towing tank
     model = Ship.from_yaml(
