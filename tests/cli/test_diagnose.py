@@ -337,7 +337,7 @@ def test_the_first_word_is_that_there_is_no_coastdown_and_why(slowing, tmp_path,
     first, second, *_ = capsys.readouterr().out.splitlines()
     why = 'nothing slowed: the speed never fell by more than'
     if slowing:
-        why = 'it was none (settled): power was reduced, not cut'
+        why = 'it was none (brake): something but the water slowed her'
     assert first.startswith(f"No coastdown was found in '{sailed}': ")
     assert why in first
     assert 'nothing is missing' not in second.lower()

@@ -165,9 +165,9 @@ def _joined(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     chance = n.JOINED * setting.step_s / 3600.0 * _sailed(setting, speed)
     for regime in (s.DRIVEN, s.AMID):
         part = n.AMID[0] if regime == s.AMID else 1.0 - n.AMID[0]
-        j = born(all_, best, now_s, chance * part, regime, 1.0)
-        if j >= 0:
-            all_.row[j].kind, all_.row[j].glided = s.GOVERNED, 0
+        j = born(all_, best, now_s, chance * part, s.LEVEL if regime == s.DRIVEN else regime, 1.0)
+        if j >= 0:  # a level that is sailing at once
+            all_.row[j].regime, all_.row[j].kind, all_.row[j].glided = regime, s.GOVERNED, 0
             _start(bank, setting, j, speed, by_log)
 
 
