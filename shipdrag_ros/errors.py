@@ -94,7 +94,7 @@ def disk_errors(path: Path, done: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise BagError(f'{str(path)!r} cannot be {done}: {error.strerror}') from error
+        raise BagError(f'{str(path)!r} cannot be {done}: {error.strerror or error}') from error
 
 
 class ImportDataError(ShipdragError):

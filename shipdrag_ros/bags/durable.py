@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain, count, islice
 from pathlib import Path
 from time import monotonic
@@ -337,11 +338,11 @@ class DurableRecording:
         """
         with self._lock:
             begun_s, now_s = self._begun_s, monotonic()
-            waiting = [] if begun_s is None else self._taken + self._queue
+            first = (self._taken or self._queue)[:1] if begun_s is not None else []
             return replace(
                 self._told,
-                waiting=len(waiting),
-                oldest_s=now_s - max(begun_s or 0.0, waiting[0][0]) if waiting else 0.0,
+                waiting=len(self._taken) + len(self._queue) if first else 0,
+                oldest_s=now_s - max(begun_s or 0.0, first[0][0]) if first else 0.0,
                 uncompacted=len(self._uncompacted),
                 why_uncompacted=self._told.why_uncompacted if self._uncompacted else '',
             )
@@ -404,7 +405,7 @@ class DurableRecording:
                 self._sync()
                 file.close()
                 self._leave(file)
-                _beside(self._compact)
+                _beside(partial(self._compact, wait=False))
                 file = self._open()
 
     def _fitting(self, file: LiveFile, due: Sequence[EncodedMessage]) -> int:
@@ -487,12 +488,14 @@ class DurableRecording:
             left = self._taken + self._queue
             self._told.lost += 0 if self._begun_s is None else len(left)
             self._taken, self._queue, self._held_bytes = [], [], 0
-        self._compact()
+        self._compact(wait=True)
         for file in self._uncompacted:
             file.release()
 
-    def _compact(self) -> None:
-        with self._compacting:
+    def _compact(self, *, wait: bool) -> None:
+        if not self._compacting.acquire(blocking=wait):
+            return  # another is at it; what it does not see is left to the next part, or the end
+        try:
             for file in tuple(self._uncompacted):
                 try:
                     if not self._gone(file):
@@ -501,6 +504,8 @@ class DurableRecording:
                     self._uncompacted.remove(file)
                 except Exception as error:  # it is tried again with the next part, and counted
                     self._told.why_uncompacted = reason_of(error)
+        finally:
+            self._compacting.release()
 
     def _gone(self, file: LiveFile) -> bool:
         """Say whether somebody removed a file; what was in it is lost, and counted."""

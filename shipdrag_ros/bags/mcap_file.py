@@ -11,6 +11,7 @@ left without its `metadata.yaml` by a crash is taken for what its files say.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections import deque
@@ -172,6 +173,10 @@ class McapFile:
             yield data
 
 
+def _at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # a named pipe is no file, and would wait
+
+
 @contextmanager
 def mapped(path: Path, unpacked: IO[bytes] | None) -> Iterator[Buffer]:
     """
@@ -189,7 +194,7 @@ def mapped(path: Path, unpacked: IO[bytes] | None) -> Iterator[Buffer]:
     BagError
         If it cannot be read.
     """
-    with disk_errors(path, 'read'), path.open('rb') as file:
+    with disk_errors(path, 'read'), open(path, 'rb', opener=_at_once) as file:
         source = unpacked or file
         data = mmap(source.fileno(), 0, access=ACCESS_READ) if source.seek(0, 2) else None
     with data or nullcontext(b'') as held:

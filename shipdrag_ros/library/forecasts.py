@@ -313,7 +313,7 @@ class IfStopped(Shown):
         Name of the last run.
     ship
     hull
-        Where the hull as last known is from, in
+        Where the hull as last known is from, in words.
     measured
         What kind of speed it begins from.
     gliding

@@ -110,6 +110,7 @@ class Bridge:
         self.trace = figures.Trace()
         self.past: list[outputs.PastRun] = []
         self.ship = ship
+        self.problem = ''  # why the bag is not read
         self._heard_s: float | None = None
         self._health = topics.Health(())
         self._recent = headline.Recent()
@@ -117,6 +118,7 @@ class Bridge:
         self._course_at_stop: float | None = None
         self._lead_at_stop: float | None = None
         self._coast_ns: int | None = None
+        self._sailed = True  # steadily, since the last coastdown
         self._bands: list[tuple[float, float]] = []
         self._speed: outputs.Figure | None = None
         self.resistance: outputs.Figure | None = None
@@ -252,6 +254,7 @@ class Bridge:
         state = health.of('state')
         since, lead_s = state.number('coastdown since'), state.number('steady lead')
         coasting = state.values.get('monitor') == 'coastdown'
+        self._sailed = not coasting and (self._sailed or state.values.get('monitor') == 'steady')
         if lead_s and not coasting:
             self._lead_at_stop = lead_s
         if coasting and self._coast_ns is None and since:
@@ -372,7 +375,7 @@ class Bridge:
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
             lifecycle=state.values.get('lifecycle', ''),
             monitor=state.values.get('monitor', ''),
-            trouble=state.message if state.level >= topics.ERROR else '',
+            trouble=self._trouble(state),
             doubt=self._doubt(),
             lead_s=lead_s,
             ready_s=ready_s,
@@ -380,9 +383,15 @@ class Bridge:
             band=self._bands[-1][1] if self._bands else None,
             to_go_s=figures.to_go_s(self._bands, headline.GOAL),
             ended=self._ended(),
+            sailed=self._sailed,
             steer_deg=self._steer_deg(),
             paired=self._is_paired,
         )
+
+    def _trouble(self, state: topics.Status) -> str:
+        if self._heard_s is None:
+            return self.problem
+        return state.message if state.level >= topics.ERROR else ''
 
     def _doubt(self) -> str:
         """Say which sources of the motion are not well; '' where all are."""

@@ -289,6 +289,8 @@ class Situation:
         Until `band` is `GOAL`; None where it cannot be foreseen.
     ended
         The last coastdown, None before the first.
+    sailed
+        Whether she has sailed steadily since.
     steer_deg
         Compass heading of the reciprocal run that is still to be made.
     paired
@@ -307,6 +309,7 @@ class Situation:
     band: float | None = None
     to_go_s: float | None = None
     ended: Ended | None = None
+    sailed: bool = False
     steer_deg: float | None = None
     paired: bool = False
 
@@ -320,6 +323,8 @@ def headline(now: Situation) -> Headline:
     """
     Say where things stand and what to do.
     """
+    if now.silent_s is None and now.bag and now.trouble:
+        return Headline(Tone.BAD, 'BAG NOT READ', _sentence(now.trouble))
     if now.silent_s is None and now.bag:
         return Headline(Tone.WATCH, 'READING', f'{now.bag} is read from its beginning.')
     if now.silent_s is None:
@@ -352,14 +357,15 @@ def headline(now: Situation) -> Headline:
 def _sailing(now: Situation) -> Headline:
     if now.monitor == 'coastdown' and now.coast_s is not None:
         return _coasting(now)
-    if now.just_ended is not None:  # an engine that drives her again is no stop either
-        return _ended(now, now.just_ended)
-    if now.monitor == 'candidate':
+    # what follows the end at once, an engine ahead or astern, is no other stop
+    if now.monitor == 'candidate' and (now.just_ended is None or now.sailed):
         return Headline(
             Tone.ACT,
             'SLOWING: coastdown?',
             'If the engine is stopped: leave it, rudder amidships. The answer takes two minutes.',
         )
+    if now.just_ended is not None:
+        return _ended(now, now.just_ended)
     return _before(now)
 
 

@@ -303,6 +303,7 @@ class BagSource(PictureFeed):
             else:
                 self._playing = False
         self._show_verdict()
+        self.bridge.problem = self._timeline.problem
         jumped, self._jumped = self._jumped, False
         return jumped
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tracemalloc
 from collections import Counter
@@ -338,3 +339,9 @@ def test_an_empty_bag_of_another_tool(tmp_path: Path) -> None:
     assert run.duration_s == 0.0
     assert run.software is None
     assert run.compression == 'none'
+
+
+def test_a_named_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'a.mcap')
+    with pytest.raises(BagError, match='not seekable'):
+        open_runs([tmp_path / 'a.mcap'])

@@ -23,6 +23,7 @@ ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
     [
         (Situation(), 'NO NODE HEARD', 'shipdrag node --ship FILE'),
         (Situation(bag='run.mcap'), 'READING', 'run.mcap'),
+        (Situation(bag='run.mcap', trouble='no disk'), 'BAG NOT READ', 'No disk.'),
         (replace(STEADY, silent_s=65.0), 'NODE SILENT for 1:05', 'old'),
         (replace(STEADY, lifecycle='inactive'), 'NODE INACTIVE', 'nothing'),
         (replace(STEADY, trouble='no data: log'), 'NO SPEED', 'No data: log.'),
@@ -43,6 +44,7 @@ ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
         (replace(COASTING, band=0.021), '±2.1 %', 'Good enough'),
         (replace(STEADY, ended=ENDED, steer_deg=9.7), 'TURNED: this run ends here', 'steer 010'),
         (replace(STEADY, ended=ENDED, monitor='candidate'), 'TURNED', 'Sail on'),
+        (replace(STEADY, ended=ENDED, monitor='candidate', sailed=True), 'SLOWING', 'rudder'),
         (replace(STEADY, ended=ENDED, paired=True), 'TURNED', 'Both runs'),
         (replace(STEADY, ended=replace(ENDED, ago_s=601.0)), 'STEADY 24 min', 'master'),
         (replace(STEADY, ended=replace(ENDED, band=None, why_not='a plateau')), 'RUN NOT', 'A pl'),

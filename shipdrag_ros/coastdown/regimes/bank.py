@@ -157,9 +157,10 @@ def _joined(bank: Bank, setting: BankSetting, log: float, track: float) -> None:
     best = 0
     while all_.row[best].behind < 0.0:
         best += 1
-    by_log = log > 0.0 and all_.row[best].liar != s.THE_LOG
+    liar = all_.row[best].liar
+    by_log = log > 0.0 and liar != s.THE_LOG
     speed = log if by_log else track
-    if not speed > 0.0:
+    if not speed > 0.0 or (liar == s.THE_TRACK and not by_log):
         return
     now_s = (all_.clock[0] - 1) * setting.step_s
     chance = n.JOINED * setting.step_s / 3600.0 * _sailed(setting, speed)

@@ -167,7 +167,8 @@ export function drawSpeeds(chart, rows, span, units, offset, forecast) {
   const coming = (forecast?.rows ?? []).map(([t, ...rest]) => [forecast.made_s + t, ...rest]).filter(([t]) => t > newest && t < newest + span / 2);
   // the estimate of one coastdown is not joined to that of the next
   const made = cut.filter(row => row[3] != null).map(([t]) => t);
-  const apart = 5 * Math.min(...made.slice(1).map((t, i) => t - made[i]));
+  const steps = made.slice(1).map((t, i) => t - made[i]).sort((a, b) => a - b);
+  const apart = 5 * steps[steps.length >> 1];
   let last = -Infinity;
   const estimates = cut.map(([t, , , v]) => {
     if (v == null) return t - last > apart ? null : undefined; // a gap, or nothing to draw

@@ -72,19 +72,19 @@ function ask() {
   if (document.hidden) setTimeout(draw, 1000); else requestAnimationFrame(draw);
 }
 
-/** Forget what is older than two days; a point in ten seconds is enough of what is older than half an hour. */
+/** Forget what is older than two days; a point in ten seconds, and the estimates, are enough of what is older than half an hour. */
 function thin() {
   const { rows } = picture;
   const newest = rows[rows.length - 1][0];
   if (rows.length < thinned + THIN_EVERY) return;
   let last = -1;
-  picture.rows = rows.filter(([second]) => {
+  picture.rows = rows.filter(([second, , , estimate]) => {
     if (second < newest - LONGEST_S) return false;
     if (second >= newest - FINE_S) return true;
     const tens = Math.floor(second / 10);
     const first = tens !== last;
     last = tens;
-    return first;
+    return first || estimate != null;
   });
   thinned = picture.rows.length;
 }
