@@ -80,7 +80,7 @@ BIN_LENGTH_M = _number('BIN_LENGTH_M', 150.0, 'm', 'of a ship of that bin in a c
 CRAFT_M = _number('CRAFT_M', 60.0, 'm', 'a craft that is shorter has shorter bins, by the root')
 LOG_LAG_S = _number('LOG_LAG_S', 4.0, 's', 'middle of the filters of logs')
 LOG_LAG_MOST = _number('LOG_LAG_MOST', 30.0, 's', 'no filter of a log is longer')
-LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log')
+LOG_LAG_SD = _number('LOG_LAG_SD', 0.9, 'ln', 'of the filter of one log, or GNSS')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
 # the hull
