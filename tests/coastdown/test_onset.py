@@ -94,8 +94,8 @@ TWO_GLIDES = pytest.mark.xfail(
     ('slow_s', 'shaft'),
     [
         *((3, shaft) for shaft in (0.0, 0.2, 0.4)),
-        (50, 0.0),
-        *(pytest.param(50, shaft, marks=TWO_GLIDES) for shaft in (0.3, 0.4)),
+        *((50, shaft) for shaft in (0.0, 0.3)),
+        pytest.param(50, 0.4, marks=TWO_GLIDES),
     ],
 )
 def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(

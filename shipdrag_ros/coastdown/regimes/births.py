@@ -17,8 +17,9 @@ from shipdrag_ros.compiled import compiled
 _PARENTS = (-1.0, -3.0, -7.0)  # nats below the best: histories that have children, in turn
 LOST = 16.0
 """Nats below the best of a history that is dropped."""
-_ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
-_THIN_EVERY = 6  # bins
+_ALIKE_S = 8.0  # two stops so near each other are one ...
+_SAME, _SAME_SPREAD = 0.6, 2.0  # ... where states differ by less: in sd, in variance
+_THIN_EVERY, _SLOW_EVERY = 6, 3  # bins
 _HALVINGS = 24  # in search of the weight of the last that is kept
 _NO_RAMP_S = 1e-3  # nothing pushed before
 _LOG_S = math.log(float(n.NO_THRUST))
@@ -246,6 +247,10 @@ def levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: 
     for k in range(len(n.LEVELS)):
         for m in range(kinds * ramps):
             share = chance * n.LEVELS_SHARE[k] / (kinds * ramps)
+            if m >= kinds and not claimed:  # the begin of a slow ramp is no sharper
+                if bank.clock[0] % _SLOW_EVERY != 0:
+                    continue
+                share *= _SLOW_EVERY
             ramp_s = (n.LEVEL_RAMP_S[m // kinds] if engaged else n.ENGAGE_S) * setting.pace
             j = born(bank, i, now_s, share, s.LEVEL, ramp_s)
             if j < 0:
@@ -368,6 +373,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
         bank.row[j].weight += math.log(chance)
         bank.row[j].liar = liar
         bank.row[j].stays = bank.row[j].stays_way = np.nan
+        bank.row[j].stuck = n.STUCK
 
 
 @compiled(uncounted=True)
@@ -473,20 +479,27 @@ def _children(
 
 @compiled(uncounted=True)
 def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
-    """Say whether two histories differ by the moment of an old switch alone."""
+    """Say whether two histories differ by moments alone that nothing to come can tell."""
     f, v = bank.row[i], bank.row[j]
     last = f.count - 1
-    if f.count != v.count or f.liar != v.liar or f.kind != v.kind or last < 0:
-        first = f.count == 0 and v.count == 0 and f.regime == v.regime
-        return bool(first and f.liar == v.liar and f.kind == v.kind)
-    if f.regime != v.regime or now_s - bank.switched[i, last].at < _OLD_S * pace:
+    if f.count != v.count or f.liar != v.liar or f.kind != v.kind or f.regime != v.regime:
         return False
-    if abs(bank.switched[i, last].at - bank.switched[j, last].at) > _ALIKE_S * pace:
-        return False
-    differ = 0
+    if last < 0:
+        return True
     for k in range(last + 1):
-        differ += bank.switched[i, k].what != bank.switched[j, k].what
-    return differ == 0
+        one, other = bank.switched[i, k], bank.switched[j, k]
+        if one.what != other.what:
+            return False
+        if one.what in (s.GLIDE, s.BRAKE) and abs(one.at - other.at) > _ALIKE_S * pace:
+            return False
+    if is_fade(f) or now_s - max(f.since, v.since) < max(f.ramp_s, v.ramp_s):
+        return False
+    for k in range(s.STATES):
+        a, b = bank.spread[i, k, k], bank.spread[j, k, k]
+        off = bank.mean[i, k] - bank.mean[j, k]
+        if off * off > _SAME**2 * min(a, b) or max(a, b) > _SAME_SPREAD * min(a, b):
+            return False
+    return True
 
 
 @compiled(uncounted=True)
@@ -509,10 +522,9 @@ def thin(bank: Histories, setting: BankSetting) -> float:
     norm = best + math.log(total)
     for i in range(count):
         bank.row[i].weight -= norm
-    if bank.clock[0] % _THIN_EVERY == 0:
-        _keep(bank, -LOST)
-        _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
     _keep(bank, _least_of_the_best(bank))  # or the next births find no room
+    if bank.clock[0] % _THIN_EVERY == 0:
+        _merge(bank, bank.clock[0] * setting.step_s, setting.pace)
     return float(norm)
 
 

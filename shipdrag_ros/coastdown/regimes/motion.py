@@ -418,6 +418,20 @@ def _holds(f: np.record, nu: float, density: float, scaled: bool) -> None:
     f.revs = f.revs + share * (nu - f.revs) if known else nu
 
 
+@compiled(inline=True, uncounted=True)
+def _standing(nu: float, revs: float, scaled: bool) -> float:
+    """Return the density of the revs of a screw that stands, or comes to stand."""
+    stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
+    last = 1.0 if np.isnan(revs) else max(revs, 0.0)
+    # or anything below its last: it runs down
+    below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
+    if scaled and not np.isnan(revs):  # mostly a little
+        below = 0.5 * below + 0.5 * _off(nu, 0.9 * last)
+    if not scaled:  # and does not stay
+        below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
+    return 0.5 * stands + 0.5 * below
+
+
 @compiled(uncounted=True)
 def _dragged(
     f: np.record, kind: int, nu: float, u_part: float, handled: bool, scaled: bool
@@ -440,15 +454,8 @@ def _dragged(
         at = n.WINDMILL[0] * u_part
         return _normal(nu - at, wide) if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD[0] else 0.0
     if kind == s.STANDS or np.isnan(revs):
-        stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
         last = 1.0 if np.isnan(revs) else max(revs, 0.0)
-        # or anything below its last: it runs down
-        below = 1.0 / (last + n.SHAFT_SD[0]) if nu < last + n.SHAFT_SD[0] else 0.0
-        if scaled and not np.isnan(revs):  # mostly a little
-            below = 0.5 * below + 0.5 * _off(nu, 0.9 * last)
-        if not scaled:  # and does not stay
-            below *= 2.0 * min(max(1.0 - nu / (last + n.SHAFT_SD[0]), 0.0), 1.0)
-        density = 0.5 * stands + 0.5 * below
+        density = _standing(nu, revs, scaled)
         if not scaled and last < n.CREEPS:  # or creeps on, as it likes
             density = 0.9 * _off(nu, last) + (0.1 / n.CREEPS if nu < n.CREEPS else 0.0)
         _holds(f, nu, density, scaled)
@@ -500,8 +507,12 @@ def _shaft(
         return math.log(1.0 if astern else n.SHAFT_LIES)
     if f.liar == s.THE_SHAFTS:  # no better known where they stay than what a level has
         stays, f.stays = f.stays, nu
-        still = 0.0 if np.isnan(stays) else n.STUCK * _off(nu, stays)
-        return math.log(still + 1.0 - n.STUCK)
+        if np.isnan(stays):
+            return math.log(1.0 - n.STUCK)
+        still = f.stuck * (_standing(nu, stays, True) if stays < n.CREEPS else _off(nu, stays))
+        density = still + 1.0 - f.stuck
+        f.stuck = min(max(still / density, n.BAD), 1.0 - n.BAD)
+        return math.log(density)
     # at any revs, mostly at those of before
     if regime == s.AMID or (regime == s.LEVEL and not scaled):
         before, stands = f.revs, nu < n.CREEPS  # then another pushes, unheard

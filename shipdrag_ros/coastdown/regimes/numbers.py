@@ -210,7 +210,7 @@ SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 # what is made of it: the only loss
 ANNOUNCE = _grid(
     'ANNOUNCE',
-    (0.7, 0.03, 0.002),
+    (0.6, 0.03, 0.002),
     '1',
     'P(gliding) above; below, with that of the glide announced: an end is not taken back',
 )

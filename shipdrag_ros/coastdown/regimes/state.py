@@ -55,6 +55,7 @@ HISTORY = np.dtype(
         ('p_var', 'f8'),
         ('stays', 'f8'),  # where an instrument that says nothing true stays
         ('stays_way', 'f8'),  # and its fixes
+        ('stuck', 'f8'),  # chance that a shaft that says nothing true stays
         ('mean_u', 'f8'),  # over the bin, less that at its end
         ('mean_lag', 'f8'),
         ('excess', 'f8'),  # log density of the bin's readings of motion, over its expectation
