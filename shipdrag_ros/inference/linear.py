@@ -110,28 +110,26 @@ def whitened_products(
 
 class _Elimination(NamedTuple):
     """
-    Unknowns of linear models, which go one after another; the residual stands behind them.
+    Unknowns of linear models, which go one after another, the last first.
 
     Attributes
     ----------
     order : (p,)
-        In which they go: first those of which all priors say the same, then those in which a
-        prior seldom differs from the one before.
+        Last those of which all priors say the same, before them those in which a prior seldom
+        differs from the one before.
     since : (f,)
-        How many of them each prior shares with the one before.
-    alike
-        How many have one prior; what is left is kept from them on.
-    left : (1 + p - alike, 1 + p, 1 + p)
-        Products of what is left, the upper half.
-    row, pivot : (p, 1 + p), (p,)
-        What an unknown is, by those that are left when it goes.
+        How many of them, from the first on, hold all in which a prior differs from that one.
+    left : (1 + d, 1 + p, 1 + p)
+        Products, the lower half, of the residual and the unknowns that are left, by their
+        number; d of them have no prior that all share.
+    row, pivot : (p, p), (p,)
+        What an unknown is, by the residual and those that are left when it goes.
     log_evidence : (1 + p,)
         Less what is left of the residual.
     """
 
     order: Int64
     since: Int64
-    alike: int
     left: Float64
     row: Float64
     pivot: Float64
@@ -140,88 +138,83 @@ class _Elimination(NamedTuple):
 
 @compiled
 def _ordered(mean: Float64, precision: Float64, first: int, count: int) -> _Elimination:
-    """Return where all of the families (f, p) begin; some unknowns go last."""
+    """Prepare the families (f, p), some unknowns of which go last."""
     f, p = mean.shape
-    changes = np.zeros((p, f), np.bool_)
+    differs = np.zeros((p, f), np.bool_)
     for a in range(p):
         for q in range(1, f):
-            changes[a, q] = (
-                mean[q, a] != mean[q - 1, a] or precision[q, a] != precision[q - 1, a]
-            )
-    often = changes.sum(axis=1)
+            same = mean[q, a] == mean[q - 1, a] and precision[q, a] == precision[q - 1, a]
+            differs[a, q] = not same
+    often = differs.sum(axis=1)
     if count < p:
         often[first : first + count] += f
-    order = np.argsort(often, kind='mergesort')
+    order = np.argsort(-often, kind='mergesort')
     since = np.zeros(f, np.int64)
-    for q in range(1, f):
-        while since[q] < p and not changes[order[since[q]], q]:
-            since[q] += 1
-    alike = int(np.sum(often == 0))
-    left, row = np.empty((1 + p - alike, 1 + p, 1 + p)), np.empty((p, 1 + p))
-    return _Elimination(order, since, alike, left, row, np.empty(p), np.zeros(1 + p))
+    for a in range(p):
+        for q in range(1, f):
+            if differs[order[a], q]:
+                since[q] = a + 1
+    left = np.empty((1 + np.count_nonzero(often), 1 + p, 1 + p))
+    return _Elimination(order, since, left, np.empty((p, p)), np.empty(p), np.zeros(1 + p))
 
 
 @compiled
-def _begin(models: _Elimination, products: Float64) -> None:
-    """Fill in the products (1 + p, 1 + p) of residual and columns."""
-    order, left = models.order, models.left[0]
-    p = len(order)
-    left[p, p] = products[0, 0]
-    for a in range(p):
-        left[a, p] = products[1 + order[a], 0]
-        for b in range(a, p):
-            left[a, b] = products[1 + order[a], 1 + order[b]]
+def _begin(models: _Elimination, products: Float64) -> int:
+    """Fill in the products (1 + p, 1 + p) of residual and columns; return how many are left."""
+    order, left = models.order, models.left[-1]
+    left[0, 0] = products[0, 0]
+    for a in range(len(order)):
+        left[1 + a, 0] = products[1 + order[a], 0]
+        for b in range(a + 1):
+            left[1 + a, 1 + b] = products[1 + order[a], 1 + order[b]]
+    return len(order)
 
 
 @compiled
 def _eliminate(
-    models: _Elimination, products: Float64, mean: Float64, precision: Float64, gone: int
+    models: _Elimination, products: Float64, mean: Float64, precision: Float64, many: int
 ) -> int:
-    """Let the unknowns of one model go, some of which are gone; return how many could."""
-    p, row = len(mean), models.row
-    for a in range(gone, p):
-        i = models.order[a]
-        now = models.left[max(a - models.alike, 0)]
-        then = models.left[max(a + 1 - models.alike, 0)]
-        own, known = now[a, a], precision[i]
-        whole = products[1 + i, 1 + i]
+    """Let the unknowns of a model go of which many are left; return how many cannot."""
+    d = len(models.left) - 1
+    for a in range(many - 1, -1, -1):
+        now, then = models.left[min(a + 1, d)], models.left[min(a, d)]
+        i, row, log_evidence = models.order[a], models.row[a], models.log_evidence[a + 1]
+        own, whole, known = now[a + 1, a + 1], products[1 + i, 1 + i], precision[i]
         if own < _FOLLOWS * whole:
             own = 0.0  # what is left of a column that follows from others is rounding
         pivot = own + known
         if not pivot > _FOLLOWS * (whole + known):
-            return a
-        log_evidence = models.log_evidence[a]
-        for b in range(a + 1, p + 1):
-            row[a, b] = now[a, b]
+            return a + 1
+        for b in range(a + 1):
+            row[b] = now[a + 1, b]
         if known < np.inf:
-            row[a, p] += known * mean[i]
+            row[0] += known * mean[i]
             log_evidence -= 0.5 * np.log(pivot)
             if known > 0.0:
                 log_evidence += 0.5 * (np.log(known) - known * mean[i] ** 2)
-        models.log_evidence[a + 1], models.pivot[a] = log_evidence, pivot
-        for b in range(a + 1, p + 1):
-            part = row[a, b] / pivot
-            for c in range(b, p + 1):
-                then[b, c] = now[b, c] - part * row[a, c]
-        for b in range(a + 1, p + 1):
-            row[a, b] /= pivot
-    return p
+        models.log_evidence[a], models.pivot[a] = log_evidence, pivot
+        for b in range(a + 1):
+            part = row[b] / pivot
+            for c in range(b + 1):
+                then[b, c] = now[b, c] - part * row[c]
+        for b in range(a + 1):
+            row[b] /= pivot
+    return 0
 
 
 @compiled
-def _log_evidence(models: _Elimination, precision: Float64, gone: int) -> float:
-    """Return the logarithm of the evidence of a model whose unknowns are gone."""
-    p = len(precision)
-    result = models.log_evidence[p] - 0.5 * models.left[-1, p, p] if gone == p else -np.inf
+def _log_evidence(models: _Elimination, precision: Float64, many: int) -> float:
+    """Return the logarithm of the evidence of a model; `many` unknowns could not go."""
+    result = models.log_evidence[0] - 0.5 * models.left[0, 0, 0]
     # beyond what no residual at all would give it is rounding
     rounding = result > _ROUNDING and precision.min() > 0.0
-    return float(result) if np.isfinite(result) and not rounding else -np.inf
+    return float(result) if many == 0 and np.isfinite(result) and not rounding else -np.inf
 
 
 @compiled
 def evidences(products: Float64, mean: Float64, precision: Float64) -> Float64:
     """
-    Return the logarithms of the evidence (s, f) of linear models.
+    Return the logarithms of the evidence of linear models, of all settings and families.
 
     Parameters
     ----------
@@ -238,45 +231,38 @@ def evidences(products: Float64, mean: Float64, precision: Float64) -> Float64:
 
     Notes
     -----
-    Unknowns go one after another. What is left where a family begins to differ from the one
-    before is kept from it.
+    Unknowns are eliminated one after another: what is left where a family begins to differ from
+    the one before is kept from it.
     """
     s, f = len(products), len(mean)
-    logs = np.empty((s, f))
-    models = _ordered(mean, precision, 0, 0)
+    logs, models = np.empty((s, f)), _ordered(mean, precision, 0, 0)
     for k in range(s):
-        _begin(models, products[k])
-        gone = 0
+        many = _begin(models, products[k])
         for q in range(f):
-            since = min(gone, models.since[q])
-            gone = _eliminate(models, products[k], mean[q], precision[q], since)
-            logs[k, q] = _log_evidence(models, precision[q], gone)
+            many = max(many, models.since[q])
+            many = _eliminate(models, products[k], mean[q], precision[q], many)
+            logs[k, q] = _log_evidence(models, precision[q], many)
     return logs
 
 
 @compiled
 def _solution(models: _Elimination, count: int) -> tuple[Float64, Float64]:
-    """Return the unknowns (p,) and the covariance of the last of them, in their order."""
-    row, p = models.row, len(models.order)
-    at, away = np.empty(p), p - count
-    covariance = np.zeros((count, count))
-    for a in range(p - 1, -1, -1):
-        total = row[a, p]
-        for b in range(a + 1, p):
-            total -= row[a, b] * at[b]
-        at[a] = total
-        if a < away:
-            continue
-        j = a - away
-        for c in range(j + 1, count):
-            part = row[a, away + c]
-            for b in range(j + 1, count):
-                covariance[j, b] -= part * covariance[c, b]
-        variance = 1.0 / models.pivot[a]
-        for b in range(j + 1, count):
-            covariance[b, j] = covariance[j, b]
-            variance -= row[a, away + b] * covariance[j, b]
-        covariance[j, j] = variance
+    """Return the unknowns (p,) and the covariance of the first of them, in their order."""
+    p = len(models.order)
+    at, covariance = np.empty(p), np.zeros((count, count))
+    for a in range(p):
+        row = models.row[a]
+        at[a] = row[0]
+        for b in range(a):
+            at[a] -= row[1 + b] * at[b]
+        if a < count:
+            covariance[a, a] = 1.0 / models.pivot[a]
+            for c in range(a):
+                for b in range(a):
+                    covariance[a, b] -= row[1 + c] * covariance[c, b]
+            for b in range(a):
+                covariance[b, a] = covariance[a, b]
+                covariance[a, a] -= row[1 + b] * covariance[a, b]
     return at, covariance
 
 
@@ -308,24 +294,21 @@ def solve(
     """
     s, f, p, m = len(products), len(mean), mean.shape[1], wanted.sum()
     logs, steps, covariance = np.empty(m), np.zeros((m, p)), np.zeros((m, count, count))
-    models = _ordered(mean, precision, first, count)
-    order, last = models.order, models.order[p - count :] - first
-    j = 0
+    models, j = _ordered(mean, precision, first, count), 0
+    place = models.order[:count] - first
     for k in range(s):
-        _begin(models, products[k])
-        gone = 0
+        many = _begin(models, products[k])
         for q in range(f):
-            gone = min(gone, models.since[q])
+            many = max(many, models.since[q])
             if not wanted[k, q]:
                 continue
-            gone = _eliminate(models, products[k], mean[q], precision[q], gone)
-            logs[j] = _log_evidence(models, precision[q], gone)
+            many = _eliminate(models, products[k], mean[q], precision[q], many)
+            logs[j] = _log_evidence(models, precision[q], many)
             if logs[j] > -np.inf:
                 at, spread = _solution(models, count)
-                for a in range(p):
-                    steps[j, order[a]] = at[a]
+                steps[j][models.order] = at
                 for a in range(count):
                     for b in range(count):
-                        covariance[j, last[a], last[b]] = spread[a, b]
+                        covariance[j, place[a], place[b]] = spread[a, b]
             j += 1
     return logs, steps, covariance
