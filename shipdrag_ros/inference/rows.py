@@ -102,6 +102,27 @@ def bin_means(time_s: Float64, value: Float64, edges: Float64) -> tuple[Float64,
     return np.add.reduceat(time_s[order], first) / count, mean, count
 
 
+@compiled
+def block_medians(value: Float64, edges: Int64) -> Float64:
+    """
+    Return the medians of parts of a record.
+
+    Parameters
+    ----------
+    value : (n,)
+    edges : (b + 1,)
+        Where each part begins, and the end of the last; none is empty.
+
+    Returns
+    -------
+    (b,)
+    """
+    result = np.empty(len(edges) - 1)
+    for i in range(len(result)):
+        result[i] = np.median(value[edges[i] : edges[i + 1]])
+    return result
+
+
 MAD_TO_SD = 1.482602218505602
 """Standard deviation of normal noise over the median of its size."""
 

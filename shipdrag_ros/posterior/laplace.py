@@ -147,8 +147,7 @@ class NormalMixture(NamedTuple):
 
     def through(self, columns: Float64) -> tuple[Float64, Float64]:
         """Return means and variances (m, v) of what columns (p, v) make of the unknowns."""
-        variance = np.einsum('pv,mpq,qv->mv', columns, self.covariance, columns, optimize=True)
-        return self.mean @ columns, variance
+        return self.mean @ columns, np.sum(columns * (self.covariance @ columns), axis=1)
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,7 @@ class RunPosterior:
     mean, covariance : (p,), (p, p)
         Of the mixture over families and settings of the noise.
     force
-        That mixture, of the coefficients of forces less their mean.
+        That mixture, of the coefficients of forces that are free, less their mean.
     family : (f,)
         Probability of each family of `problem.families`.
     noise
@@ -275,14 +274,11 @@ def _mixed(problem: RunModel, taught: FamilySet, now: Float64, settings: Setting
 
 
 def _of_force(problem: RunModel, found: _Averaged) -> NormalMixture:
-    """Return the mixture of the coefficients of forces, less their mean."""
+    """Return the mixture of the coefficients of forces that are free, less their mean."""
     weight, mean, covariance = found.free
-    k, free = problem.coefficients, problem.free[problem.free < problem.coefficients]
-    many, f = np.arange(len(weight)), len(free)
-    means, spread = np.zeros((len(many), k)), np.zeros((len(many), k, k))
-    means[:, free] = mean[:, :f] - found.step[free]
-    spread[np.ix_(many, free, free)] = covariance[:, :f, :f]
-    return NormalMixture(weight, means, spread)
+    free = problem.free_forces
+    f = len(free)
+    return NormalMixture(weight, mean[:, :f] - found.step[free], covariance[:, :f, :f])
 
 
 def _seen(problem: RunModel, now: Float64) -> Seen:
