@@ -23,7 +23,7 @@ ALONE = np.ones((1, 1), np.bool_)
 """What `solve` is asked for of one model."""
 
 # Sums may be taken in any order, so that they are vectorised; the order is
-# fixed when compiled, not by the data or where they lie.
+# fixed when compiled, and by where a line begins, not by where the data lie.
 SUMS = {'reassoc', 'contract', 'nsz'}
 
 
@@ -42,12 +42,15 @@ def products_of(table: Float64) -> Float64:
     (c, c)
     """
     size, n = table.shape
-    products = np.empty((size, size))
+    products, begins = np.empty((size, size)), np.zeros(size, np.int64)
     for a in range(size):
+        while begins[a] < n and table[a, begins[a]] == 0.0:
+            begins[a] += 1
         for b in range(a + 1):
-            total = 0.0
-            for i in range(n):
-                total += table[a, i] * table[b, i]
+            since, total = max(begins[a], begins[b]), 0.0
+            one, other = table[a, since:], table[b, since:]
+            for i in range(len(one)):
+                total += one[i] * other[i]
             products[a, b] = products[b, a] = total
     return products
 
