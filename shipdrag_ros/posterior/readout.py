@@ -20,7 +20,7 @@ _NORMAL = 1.959964  # sd of a normal distribution within which so much is
 _FARTHEST = (1.0 - _BAND) ** -0.5  # sd of any (Chebyshev)
 _BAND_AT = 8  # speeds at which the band of a mixture is sought
 _STEPS = 4096  # from 0 to the farthest
-_SLOPE, _BY_SLOPE = 0.117, 6  # of the normal distribution there, and how often it is followed
+_SLOPE, _BY_SLOPE = 0.09, 6  # of the probability there, roughly, and how often it is followed
 _ROUNDING = 1e-12  # of a correlation
 
 
@@ -162,7 +162,7 @@ def _quantile(weight: Float64, mean: Float64, sd: Float64) -> Float64:
     """
     Return what 95 % of each mixture (m, v) of variance 1 about 0 is not beyond, in even steps.
 
-    Sought by the slope of a normal distribution, then by halving.
+    Sought by a usual slope, then by halving.
     """
     m, v = mean.shape
     half, step, at = np.empty(v), _FARTHEST / _STEPS, int(_STEPS * _NORMAL / _FARTHEST)
