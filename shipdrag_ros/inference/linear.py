@@ -188,20 +188,24 @@ def _eliminate(
         pivot = own + known
         if not pivot > _FOLLOWS * (whole + known):
             return a + 1
-        for b in range(a + 1):
-            row[b] = now[a + 1, b]
+        if 0.0 < known < np.inf:
+            log_evidence += 0.5 * np.log(known)
         if known < np.inf:
-            row[0] += known * mean[i]
             log_evidence -= 0.5 * np.log(pivot)
-            if known > 0.0:
-                log_evidence += 0.5 * (np.log(known) - known * mean[i] ** 2)
         models.log_evidence[a], models.pivot[a] = log_evidence, pivot
         for b in range(a + 1):
-            part = row[b] / pivot
+            row[b] = now[a + 1, b]
+        # counted from its mean: what a narrow prior far away says would be lost in rounding
+        row[0] -= own * mean[i]
+        for b in range(a + 1):
+            part, away = row[b] / pivot, now[a + 1, b] * mean[i]
             for c in range(b + 1):
                 then[b, c] = now[b, c] - part * row[c]
+            then[b, 0] -= away
+        then[0, 0] -= row[0] * mean[i]
         for b in range(a + 1):
             row[b] /= pivot
+        row[0] += mean[i]
     return 0
 
 
@@ -224,7 +228,7 @@ def evidences(products: Float64, mean: Float64, precision: Float64) -> Float64:
     products : (s, 1 + p, 1 + p)
         Of whitened residual and columns.
     mean, precision : (f, p)
-        Of the priors; a precision of 0: nothing is known, of infinity: the unknown is 0.
+        Of the priors; a precision of 0: nothing is known, of infinity: it is the mean.
 
     Returns
     -------
