@@ -79,7 +79,7 @@ class Slowing:
         """
         for series in window.each('speed_through_water', 'speed_over_ground'):
             if len(series) >= _BLOCKS:
-                time_s = (series.time_ns - window.start_ns) * 1e-9
+                time_s = np.asarray((series.time_ns - window.start_ns) * 1e-9, np.float64)
                 many, more = divmod(len(series), _BLOCKS)
                 edges = many * np.arange(1 + _BLOCKS) + np.minimum(np.arange(1 + _BLOCKS), more)
                 speed = block_medians(np.abs(series.value), edges)

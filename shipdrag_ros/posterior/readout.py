@@ -54,7 +54,7 @@ class ReadOut:
     def n_r_m_s2(self) -> Float64:
         """The part of sigma that would go if n_r were known."""
         at = self.found.problem.coefficients + motion.INERTIA
-        part = np.abs(self.cross[:, at]) / np.sqrt(self.found.covariance[at, at])
+        part: Float64 = np.abs(self.cross[:, at]) / np.sqrt(self.found.covariance[at, at])
         return np.minimum(part, self.sigma_m_s2)
 
     @property
