@@ -186,12 +186,10 @@ def _eliminate(
         if own < _FOLLOWS * whole:
             own = 0.0  # what is left of a column that follows from others is rounding
         pivot = own + known
-        if not pivot > _FOLLOWS * (whole + known):
-            return a + 1
-        if 0.0 < known < np.inf:
-            log_evidence += 0.5 * np.log(known)
         if known < np.inf:
-            log_evidence -= 0.5 * np.log(pivot)
+            if not pivot > _FOLLOWS * (whole + known):
+                return a + 1
+            log_evidence += 0.5 * np.log((known if known > 0.0 else 1.0) / pivot)
         models.log_evidence[a], models.pivot[a] = log_evidence, pivot
         for b in range(a + 1):
             row[b] = now[a + 1, b]
