@@ -340,8 +340,7 @@ def test_a_longer_run_down_delays(driven: Ship) -> None:
 def test_why_nothing_is_foretold(driven: Ship) -> None:
     with pytest.raises(EstimationError, match='neither a coastdown nor a baseline'):
         HullNow.of_file(replace(driven, baseline=None))
-    with pytest.raises(EstimationError, match='makes no way'):
-        if_stopped(HullNow.of_file(driven), driven, 0.0, START_NS)
+    assert not if_stopped(HullNow.of_file(driven), driven, 0.0, START_NS).milestones
 
 
 PATH_STOP_NS = START_NS + 300 * SECOND_NS
