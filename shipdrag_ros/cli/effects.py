@@ -15,7 +15,7 @@ from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError, EffectFileError, FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.ship import Fact, LearntTerm, Ship, parse_fact
+from shipdrag_ros.ship import SHIP_FILE, Fact, LearntTerm, Ship, parse_fact
 from shipdrag_ros.ship.expression import unit_text
 from shipdrag_ros.ship.facts import RATE as RATE
 from shipdrag_ros.ship.facts import usage
@@ -320,7 +320,6 @@ def run_learn(options: argparse.Namespace) -> int:
     # what follows takes half a second to import
     from shipdrag_ros.learning import words
     from shipdrag_ros.library.diagnosis import learn_from
-    from shipdrag_ros.replay.playback import attached_ship
 
     output = Output(options.json)
     name = options.name or options.out.stem
@@ -328,7 +327,7 @@ def run_learn(options: argparse.Namespace) -> int:
     given = None if options.ship is None else Ship.load(options.ship)
     bags, kept = _bags(options.bags)
     runs = open_windowed(bags, remap=options.remap, output=output)
-    if given is None and kept and not any(attached_ship(run) for run, _ in runs):
+    if given is None and kept and not any(run.ship for run, _ in runs):
         given = _one(kept)
     with stages(output) as progress:
         found = learn_from(output, runs, given, name, progress)
@@ -358,7 +357,6 @@ def _bags(given: Sequence[WindowedBag]) -> tuple[list[WindowedBag], dict[str, st
             found.append(each)
             continue
         need('pyarrow')
-        from shipdrag_ros.fleet.find import SHIP_FILE
         from shipdrag_ros.fleet.store import read_bags, ship_texts
 
         rows = [row for row in read_bags(each.path).to_pylist() if row['coastdowns']]

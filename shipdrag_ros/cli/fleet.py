@@ -19,7 +19,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.progress import Progress
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import SHIP_FILE, Ship
 
 if TYPE_CHECKING:
     from shipdrag_ros.fleet.update import Report
@@ -341,9 +341,6 @@ def _plain(value: object) -> object:
     if isinstance(value, list):
         return [_plain(each) for each in value]
     return value if value is None or isinstance(value, str | int | float) else str(value)
-
-
-SHIP_FILE = 'ship.yaml'
 
 
 def add_poster(parser: argparse.ArgumentParser) -> None:

@@ -31,7 +31,6 @@ from shipdrag_ros.replay import (
 from shipdrag_ros.replay.coasts import DISMISSED, dismissed_glides, whole_window
 from shipdrag_ros.replay.playback import (
     StopTime,
-    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -88,7 +87,7 @@ def diagnose_runs(
     refuse_mixed(runs, given)
     alone = stop is None and given is None and all(window is None for _, window in runs)
     asked = _Together(runs, facts, earlier, progress)
-    if alone and not any(attached_ship(run) for run, _ in runs):
+    if alone and not any(run.ship for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = asked.sailing(None, f'No coastdown was found: {why}.', facts)
         return asked.unused(sailing, facts), None
@@ -288,7 +287,7 @@ def _found(
     warnings: list[str] = []
     for run, _ in runs:
         refuse_without_input(run)
-    known = filter(None, (attached_ship(run) for run, _ in runs))
+    known = filter(None, (run.ship for run, _ in runs))
     ship, parameters = given or next(known, None) or ship_of(runs[0][0], None), None
     for each, window in runs:
         stage = partial(progress, f'replaying {each.name}')

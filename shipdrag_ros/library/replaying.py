@@ -18,7 +18,6 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import (
     StopTime,
-    attached_ship,
     refuse_without_input,
     ship_of,
     told_beside,
@@ -117,7 +116,7 @@ def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
     """
     named: dict[str, str] = {}
     for run, given in runs:
-        ship = given or attached_ship(run)
+        ship = given or run.ship
         if ship is not None and ship.name:
             named.setdefault(ship.name, run.name)
     if len(named) > 1:
