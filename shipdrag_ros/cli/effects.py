@@ -128,30 +128,24 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
 def _show_diagnosis(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     from shipdrag_ros.diagnosis import words
 
-    for line in found.summary(ship):
-        output.say(line)
+    output.say(*found.summary(ship))
     if found.question:
         return
-    output.heading('How probable')
-    output.table(words.probabilities_table(found))
+    output.table(words.probabilities_table(found), 'How probable')
     sizes = words.sizes_table(found)
     if sizes.rows:
         were = '' if found.effects else ', were it the one'
-        output.heading(f'How large{were}; sd is one standard deviation')
-        output.table(sizes)
+        output.table(sizes, f'How large{were}; sd is one standard deviation')
     if found.limits:
         output.heading('Effects that are not named: how large they can be; sizes in SI')
         output.table(words.limits_table(found))
     if found.facts:
-        output.heading('Facts that were given')
-        output.table(words.facts_table(found))
-    output.heading('Gap between model and data')
-    output.table(words.gaps_table(found))
+        output.table(words.facts_table(found), 'Facts that were given')
+    output.table(words.gaps_table(found), 'Gap between model and data')
     advice = words.advice(found)
     if advice:
         output.heading('What would decide')
-    for line in advice:
-        output.say(f'  {line}')
+    output.say(*advice, lead='  ')
 
 
 def add_baseline(parser: argparse.ArgumentParser) -> None:
@@ -275,8 +269,7 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
             for one in found.runs
         )
         output.table(Table(('', 'resistance', 'sd', 'chi2 a sample'), beside))
-    for warning in found.warnings:
-        output.say(f'WARNING: {warning}')
+    output.say(*found.warnings, lead='WARNING: ')
 
 
 def add_learn(parser: argparse.ArgumentParser) -> None:
@@ -332,10 +325,8 @@ def run_learn(options: argparse.Namespace) -> int:
     with stages(output) as progress:
         found = learn_from(output, runs, given, name, progress)
     output.say(words.sentence(found))
-    for line in words.lines(found):
-        output.say(line)
-    output.heading('How probable')
-    output.table(words.table(found))
+    output.say(*words.lines(found))
+    output.table(words.table(found), 'How probable')
     if found.term is not None:
         options.out.write_text(found.term.to_yaml(), encoding='utf-8')
         output.log(f'effect in {options.out}')

@@ -119,8 +119,7 @@ def _show_fleet(output: Output, store: Path, report: Report) -> None:
             f'{twin.bag!r} has the content of {twin.same_as!r}{other * twin.differs} and is '
             'counted once'
         )
-    for note in report.notes:
-        output.say(note)
+    output.say(*report.notes)
     if report.skipped:
         output.heading(f'{len(report.skipped)} skipped')
     for each in report.skipped[:_SHOWN]:
@@ -272,13 +271,11 @@ def _show_trends(
     if not trends:
         output.say('The store holds no coastdown: no trend.')
     else:
-        output.heading('Which hull first')
-        output.table(words.ranking(trends))
+        output.table(words.ranking(trends), 'Which hull first')
         output.say(words.ranked_by(trends))
     for trend in trends:
         output.heading(trend.series.name)
-        for line in words.lines(trend):
-            output.say(line)
+        output.say(*words.lines(trend))
         if trend.events:
             output.table(words.event_table(trend))
     if skipped:

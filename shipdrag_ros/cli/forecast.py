@@ -90,8 +90,7 @@ def run(options: argparse.Namespace) -> int:
 def _show(output: Output, each: forecasts.GlideForecast) -> None:
     one = forecasts.Forecasts((each,))
     output.heading(f'{each.bag}, {clock(each.after_s)} after the stop')
-    for line in one.summary().splitlines():
-        output.say(line)
+    output.say(*one.summary().splitlines())
     if each.checked is not None:
         output.table(each.table())
 

@@ -133,11 +133,12 @@ class Output:
         self._result = _console(sys.stderr if json_to == STDOUT else sys.stdout)
         self._log = _console(sys.stderr)
 
-    def say(self, text: str) -> None:
+    def say(self, *texts: str, lead: str = '') -> None:
         """
-        Print a line of the result.
+        Print lines of the result, each behind a lead.
         """
-        self._result.print(text, soft_wrap=True)
+        for text in texts:
+            self._result.print(f'{lead}{text}', soft_wrap=True)
 
     def heading(self, text: str) -> None:
         """
@@ -145,10 +146,12 @@ class Output:
         """
         self._result.print(f'\n{text}', style='bold', soft_wrap=True)
 
-    def table(self, table: Table) -> None:
+    def table(self, table: Table, heading: str | None = None) -> None:
         """
-        Print a table of the result; words to the left, figures to the right.
+        Print a table of the result, under a heading; words to the left, figures to the right.
         """
+        if heading is not None:
+            self.heading(heading)
         heads = any(table.columns)
         shown = RichTable(box=None, show_header=heads, header_style='bold', pad_edge=False)
         for number, name in enumerate(table.columns):
@@ -286,13 +289,10 @@ def show(output: Output, shown: Presentation, report: Path | None) -> None:
     """
     output.say(shown.sentence)
     for part in shown.sections:
-        for text in part.text:
-            output.say(text)
+        output.say(*part.text)
         for caption, table in part.tables:
-            output.heading(caption)
-            output.table(table)
-        for line in part.lines:
-            output.say(f'- {line}')
+            output.table(table, caption)
+        output.say(*part.lines, lead='- ')
     if report is None:
         return
     from shipdrag_ros.report.document import write_page  # takes long to import

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.estimation.result import Estimate
@@ -464,14 +465,14 @@ class HullNow:
 
     @classmethod
     def of_run(
-        cls, speed_m_s: Float64, resistance_m_s2: Float64, sigma_m_s2: Float64, source: str
+        cls, speed_m_s: Float64, resistance_m_s2: Float64, sigma_m_s2: Float64, start_ns: int
     ) -> HullNow:
         """
-        Take the curve of a coastdown that has ended; the next run differs from it.
+        Take the curve of a coastdown that began then; the next run differs from it.
         """
         alike = np.full(len(speed_m_s), ALIKE.mean)
-        level_sd = ANOTHER_RUN.sd
-        return cls(KnownCurve(speed_m_s, resistance_m_s2, sigma_m_s2, alike, level_sd), source)
+        known = KnownCurve(speed_m_s, resistance_m_s2, sigma_m_s2, alike, ANOTHER_RUN.sd)
+        return cls(known, f'the coastdown of {utc(start_ns)}')
 
     @classmethod
     def of_file(cls, ship: Ship) -> HullNow:

@@ -434,8 +434,8 @@ def _hull(coastdown: EndedCoastdown) -> HullNow:
     assert coastdown.estimate is not None
     curve = coastdown.estimate.valid_curve
     curve = curve if len(curve) > 1 else coastdown.estimate.curve
-    named = f'the coastdown of {utc(coastdown.start_ns)}'
-    return HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, named)
+    known = curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2
+    return HullNow.of_run(*known, coastdown.start_ns)
 
 
 def _recent(run: RunResult) -> tuple[Window, Series, str]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import ENDED_BY
 from shipdrag_ros.coastdown.running import speed_at_rest
-from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT, utc
+from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.force import clean_hull
@@ -163,8 +163,8 @@ def _if_stopped(
         return {'why': 'no speed is read'}
     try:
         if run is not None and run.curve is not None:
-            curve, of = run.curve, f'the coastdown of {utc(run.start_ns)}'
-            hull = HullNow.of_run(curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, of)
+            known = run.curve.speed_m_s, run.curve.resistance_m_s2, run.curve.sigma_m_s2
+            hull = HullNow.of_run(*known, run.start_ns)
         else:
             hull = HullNow.of_file(ship)
         rest_m_s = speed_at_rest(ship)

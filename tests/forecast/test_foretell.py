@@ -319,7 +319,7 @@ def test_a_run_is_known_better_than_the_file_that_it_contradicts(driven: Ship) -
     fouled = glide(replace(driven, effects=(FOULED,)))
     speed = np.linspace(2.0, SPEED_M_S, 30)
     r = fouled.specific_resistance(speed)
-    hull = HullNow.of_run(speed, r, 0.02 * r, 'the last run')
+    hull = HullNow.of_run(speed, r, 0.02 * r, START_NS)
     later = if_stopped(HullNow.of_file(driven), driven, SPEED_M_S, START_NS).reaches(4.0).time_s
     sooner = if_stopped(hull, driven, SPEED_M_S, START_NS).reaches(4.0).time_s
     was = float(np.interp(-4.0, -fouled.speed_through_water_m_s, fouled.time_s)) - 1.0
