@@ -5,20 +5,17 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from shipdrag_ros.cli.arguments import add, new_file, whole
-from shipdrag_ros.cli.output import Output, ProgressLines
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.progress import Progress
 from shipdrag_ros.ship import SHIP_FILE, Ship
 
 if TYPE_CHECKING:
@@ -89,7 +86,7 @@ def run_fleet(options: argparse.Namespace) -> int:
         Engine(
             workers=options.workers, scheduler=options.scheduler, at_most=len(found.sources)
         ) as engine,
-        _progress(output) as progress,
+        stages(output, every_s=_EVERY_S, at_once=False) as progress,
     ):
         report = update(found, store, engine, progress)
     _show_fleet(output, options.out, report)
@@ -153,16 +150,6 @@ def _document(store: Path, report: Report) -> dict[str, object]:
         'skipped': [{'bag': each.bag, 'reason': each.reason} for each in report.skipped],
         'notes': list(report.notes),
     }
-
-
-@contextmanager
-def _progress(output: Output) -> Iterator[Progress]:
-    """Show a bar to a terminal; to a file a line now and then, with the time left."""
-    if sys.stderr.isatty():
-        with output.progress('') as bar:
-            yield lambda text, done, total: bar(done, total)
-        return
-    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).show
 
 
 _LISTED = 4

@@ -31,7 +31,9 @@ _COMPILES = 'compiling, once after an installation or an update; this takes abou
 
 
 @contextmanager
-def stages(output: Output) -> Iterator[Progress]:
+def stages(
+    output: Output, *, every_s: float = _EVERY_S, at_once: bool = True
+) -> Iterator[Progress]:
     """
     Show one stage after the other, and compiling where that is really done.
 
@@ -39,6 +41,8 @@ def stages(output: Output) -> Iterator[Progress]:
     ----------
     output
         Whose log it goes to.
+    every_s, at_once
+        Of `ProgressLines`, where no terminal shows it.
 
     Yields
     ------
@@ -46,7 +50,7 @@ def stages(output: Output) -> Iterator[Progress]:
         Called with each stage, how much of it is done, and of how much.
     """
     with output.bar() as bar, compiling_said(output.log):
-        yield bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
+        yield bar or ProgressLines(output.log, every_s=every_s, at_once=at_once).show
 
 
 @contextmanager
