@@ -242,7 +242,6 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
         f'{low:.2f} to {high:.2f} m/s.'
     )
-    output.heading('Learnt baseline over the one before')
     stated = found.stated_sd
     rows = []
     for i, name in enumerate(found.names):
@@ -251,7 +250,7 @@ def _show_baseline(output: Output, found: LearntBaseline) -> None:
         after = f'{found.relative_sd[i]:.1%}'
         rows.append((name, f'{found.factors[i]:.3f}', f'{sd:.3f}', before, after))
     columns = ('', 'factor', 'sd', 'relative_sd before', 'after')
-    output.table(Table(columns, tuple(rows)))
+    output.table(Table(columns, tuple(rows)), 'Learnt baseline over the one before')
     if len(found.runs) >= ENOUGH:
         output.say(
             f'Runs scatter by {found.shared.scatter:.1%} of their resistance '

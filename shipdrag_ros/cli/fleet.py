@@ -119,8 +119,7 @@ def _show_fleet(output: Output, store: Path, report: Report) -> None:
     output.say(*report.notes)
     if report.skipped:
         output.heading(f'{len(report.skipped)} skipped')
-    for each in report.skipped[:_SHOWN]:
-        output.say(f'  {each.bag!r}: {each.reason}')
+    output.say(*(f'  {each.bag!r}: {each.reason}' for each in report.skipped[:_SHOWN]))
     if len(report.skipped) > _SHOWN:
         output.say(f'  and {len(report.skipped) - _SHOWN} more, which --json and bags/ list')
 

@@ -67,8 +67,7 @@ def run(options: argparse.Namespace) -> int:
     # a window says when `now` is, not that she glides in it
     results = replayed(options, output, parts=options.if_stopped_now)
     for result in results:
-        for warning in result.run.warnings:
-            output.log(f'{result.bag}: {warning}')
+        output.log(*(f'{result.bag}: {warning}' for warning in result.run.warnings))
     if options.if_stopped_now:
         stopped = forecasts.if_stopped_now(results)
         output.heading(stopped.bag)
@@ -88,9 +87,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(output: Output, each: forecasts.GlideForecast) -> None:
-    one = forecasts.Forecasts((each,))
     output.heading(f'{each.bag}, {clock(each.after_s)} after the stop')
-    output.say(*one.summary().splitlines())
+    output.say(forecasts.Forecasts((each,)).summary())
     if each.checked is not None:
         output.table(each.table())
 

@@ -120,8 +120,7 @@ def run(options: argparse.Namespace) -> int:
     documents = []
     for source, each, result in zip(options.sources, chosen, results, strict=True):
         output.log(f'{source}: {each.kind}')
-        for understood in result.understood:
-            output.log(f'  {understood}')
+        output.log(*(f'  {understood}' for understood in result.understood))
         output.say(*result.summary(options.out))
         output.table(result.table())
         output.say(*result.details())

@@ -167,11 +167,12 @@ class Output:
             shown.add_row(*row)
         self._result.print(shown)
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Print a line that is not part of the result.
+        Print lines that are not part of the result.
         """
-        self._log.print(text, soft_wrap=True, style='dim')
+        for text in texts:
+            self._log.print(text, soft_wrap=True, style='dim')
 
     @contextmanager
     def progress(self, text: str) -> Iterator[PartDone]:

@@ -109,8 +109,7 @@ def diagnose_runs(
             coastdowns=len(seen.coasts),
         )
     except ShipdragError:
-        for line in seen.warnings:  # no notes hold them
-            listener.log(line)
+        listener.log(*seen.warnings)  # no notes hold them
         raise
     unused = tuple(f'no coastdown was found {each}' for each in seen.without if seen.coasts)
     found = replace(found, notes=(*found.notes, *seen.warnings, *unused))
@@ -228,15 +227,13 @@ def coasts_of(
     """
     refuse_mixed(runs, given)
     seen = _found(listener, runs, given, progress)
-    for line in seen.warnings:  # a diagnosis has them among its notes
-        listener.log(line)
+    listener.log(*seen.warnings)  # a diagnosis has them among its notes
     if not (seen.coasts or (whole and seen.whole)):
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
             'was stopped after steady sailing'
         )
-    for each in seen.without:
-        listener.log(f'no coastdown was found {each}')
+    listener.log(*(f'no coastdown was found {each}' for each in seen.without))
     return (seen.whole if whole and seen.whole else seen.coasts), seen.ship, seen.parameters
 
 

@@ -33,9 +33,9 @@ _MOVING_M_S = 0.5
 class Listener(Protocol):
     """Receives lines, and how far the work is."""
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Take a line that is not part of the result.
+        Take lines that are not part of the result.
         """
 
     def progress(self, text: str) -> AbstractContextManager[PartDone]:
@@ -57,11 +57,11 @@ class Notes:
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def log(self, text: str) -> None:
+    def log(self, *texts: str) -> None:
         """
-        Keep a line.
+        Keep lines.
         """
-        self.lines.append(text)
+        self.lines += texts
 
     def progress(self, text: str) -> AbstractContextManager[PartDone]:
         """

@@ -266,8 +266,7 @@ def _ships(
             except ShipFileError as error:
                 listener.log(f'{error}\nits prices are not used')
         events[name], problems = read_events(files.get(EVENTS_FILE, ''))
-        for problem in problems:
-            listener.log(f'{name}: {problem}')
+        listener.log(*(f'{name}: {problem}' for problem in problems))
     return ships, events
 
 

@@ -167,8 +167,8 @@ def _if_stopped(
             hull = HullNow.of_run(*known, run.start_ns)
         else:
             hull = HullNow.of_file(ship)
-        rest_m_s = speed_at_rest(ship)
-        found = if_stopped(hull, ship, speed_m_s, now_s * SECOND_NS, rest_m_s=rest_m_s)
+        now_ns = now_s * SECOND_NS
+        found = if_stopped(hull, ship, speed_m_s, now_ns, rest_m_s=speed_at_rest(ship))
     except ShipdragError as error:
         return {'why': str(error)}
     if not found.targets_m_s:
